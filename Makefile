@@ -1,0 +1,78 @@
+# Foldyn: `make demo` and `make test` set up all that they need in .venv.
+# They ask for python3 (3.11 to 3.13) with its venv module, and make; nothing else.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+CASES      := src/foldyn/studies/herkal/cases
+DEMO_CASES ?= case1 case2 case3 case4
+DEMO_OUT   ?= demo-results
+DEMO_FLAGS ?=
+PYTEST_FLAGS ?=
+
+.PHONY: help demo test lint format docs wheel-check clean setup
+.DEFAULT_GOAL := help
+
+help:  ## list what can be made
+	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
+	@echo
+	@echo '  PYTHON=python3.12        the interpreter that .venv is made with'
+	@echo '  DEMO_CASES="case1"       a part of the demo;  DEMO_FLAGS="..." more flags of foldyn run'
+	@echo '  PYTEST_FLAGS="-k mass"   more flags of pytest'
+
+# ------------------------------------------------------------------------------ set-up
+$(BIN)/python:
+	@command -v $(PYTHON) >/dev/null 2>&1 || { \
+	  echo 'make: no "$(PYTHON)" found. Install Python 3.11 to 3.13 (Debian, Ubuntu:' \
+	       'apt install python3 python3-venv), or name one: make PYTHON=python3.12' >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))' || { \
+	  echo "make: Foldyn needs Python 3.11 to 3.13, and $(PYTHON) is" \
+	       "$$($(PYTHON) -V 2>&1 | cut -d' ' -f2). Name another: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
+	  echo 'make: $(PYTHON) has no venv module. Install it (Debian, Ubuntu:' \
+	       'apt install python3-venv) and call make again.' >&2; exit 1; }
+	@echo 'Making $(VENV) ...'
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(STAMP): pyproject.toml requirements.lock | $(BIN)/python
+	@echo 'Installing the locked dependencies into $(VENV) (once; a few minutes) ...'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	  --no-deps --no-build-isolation --editable .
+	@touch $@
+
+setup: $(STAMP)  ## make .venv with everything in it
+
+# ------------------------------------------------------------------------------ use
+demo: $(STAMP)  ## run the four shipped case studies; pictures in demo-results/
+	@set -e; for name in $(DEMO_CASES); do \
+	  echo "== $$name"; \
+	  $(BIN)/foldyn run $(CASES)/$$name.toml --out $(DEMO_OUT)/$$name $(DEMO_FLAGS); \
+	done
+	@echo; echo 'The pictures:'; find $(DEMO_OUT) -name '*.png' | sort | sed 's/^/  /'
+
+test: $(STAMP)  ## run the tests
+	@$(BIN)/python -m pytest $(PYTEST_FLAGS)
+
+lint: $(STAMP)  ## ruff, pyright and the layers contract
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: $(STAMP)  ## put the code in order
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+docs: $(STAMP)  ## build the documentation; every warning is an error
+	$(BIN)/python -m sphinx -W --keep-going -n -q -b html docs docs/_build/html
+	@echo 'The first page: docs/_build/html/index.html'
+
+wheel-check: $(STAMP)  ## build the wheel, install it into an empty environment, run a shipped case
+	.ci/wheel-check $(BIN)/python
+
+clean:  ## remove .venv and all that was built
+	rm -rf $(VENV) build dist docs/_build demo-results .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,92 @@
+"""Foldyn: statics and dynamics of origami structures.
+
+From a crease pattern to a validated motion: bars and hinges with the stiffness of MERLIN2, the
+mass by one of several rules, and the integration of M x'' + C x' + F_int(x) = p(t).
+
+>>> import foldyn as fd
+>>> pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+>>> len(pattern.vertices), len(pattern.faces)
+(9, 4)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# Public names and where they live; loaded when first used, so that `import foldyn` is quick.
+_HOME = {
+    "Pattern": "patterns",
+    "read_pattern": "formats",
+    "write_pattern": "formats",
+    "BarLaw": "materials",
+    "CustomBarLaw": "materials",
+    "CustomHingeLaw": "materials",
+    "EnhancedLinear": "materials",
+    "HingeLaw": "materials",
+    "Sheet": "structures",
+    "Structure": "structures",
+    "discretize": "structures",
+    "Case": "cases",
+    "Fix": "cases",
+    "Force": "cases",
+    "Rayleigh": "cases",
+    "State": "cases",
+    "Constant": "cases",
+    "Pulse": "cases",
+    "HalfSine": "cases",
+    "Ramp": "cases",
+    "Step": "cases",
+    "Harmonic": "cases",
+    "Table": "cases",
+    "read_case": "cases",
+    "save": "results",
+    "load": "results",
+    "case_of": "results",
+    "simulate": "dynamics",
+    "critical_step": "dynamics",
+    "initial_state": "dynamics",
+}
+_MODULES = (
+    "cases", "dynamics", "errors", "formats", "materials", "mechanics", "patterns", "plots",
+    "report", "results", "signals", "structures", "studies",
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from foldyn.cases import (
+        Case,
+        Constant,
+        Fix,
+        Force,
+        HalfSine,
+        Harmonic,
+        Pulse,
+        Ramp,
+        Rayleigh,
+        State,
+        Step,
+        Table,
+        read_case,
+    )
+    from foldyn.dynamics import critical_step, initial_state, simulate
+    from foldyn.formats import read_pattern, write_pattern
+    from foldyn.materials import BarLaw, CustomBarLaw, CustomHingeLaw, EnhancedLinear, HingeLaw
+    from foldyn.patterns import Pattern
+    from foldyn.results import case_of, load, save
+    from foldyn.structures import Sheet, Structure, discretize
+
+__all__ = [*_HOME, *_MODULES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"foldyn.{_HOME[name]}"), name)
+    if name in _MODULES:
+        return import_module(f"foldyn.{name}")
+    raise AttributeError(f"module 'foldyn' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

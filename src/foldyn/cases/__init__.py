@@ -1,0 +1,59 @@
+"""Cases: supports, loads, histories, damping, states, and the case file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from foldyn.cases.case import Case
+from foldyn.cases.damping import Rayleigh
+from foldyn.cases.histories import (
+    HISTORIES,
+    Constant,
+    Function,
+    HalfSine,
+    Harmonic,
+    History,
+    Pulse,
+    Ramp,
+    Step,
+    Table,
+    as_history,
+)
+from foldyn.cases.loads import Force
+from foldyn.cases.selection import resolve_nodes, select
+from foldyn.cases.state import State
+from foldyn.cases.supports import Fix
+
+if TYPE_CHECKING:
+    from foldyn.cases.casefile import CaseFile, read_case_file
+
+__all__ = [
+    "HISTORIES",
+    "Case",
+    "CaseFile",
+    "Constant",
+    "Fix",
+    "Force",
+    "Function",
+    "HalfSine",
+    "Harmonic",
+    "History",
+    "Pulse",
+    "Ramp",
+    "Rayleigh",
+    "State",
+    "Step",
+    "Table",
+    "as_history",
+    "read_case_file",
+    "resolve_nodes",
+    "select",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("CaseFile", "read_case_file"):  # they need pydantic, which is slow to import
+        from foldyn.cases import casefile
+
+        return getattr(casefile, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

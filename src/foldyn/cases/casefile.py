@@ -1,0 +1,224 @@
+"""Reading a case file: a TOML text that is checked whole before anything runs."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from foldyn.cases.case import Case
+from foldyn.cases.damping import Rayleigh
+from foldyn.cases.decode import call_from
+from foldyn.cases.loads import Force
+from foldyn.cases.messages import describe
+from foldyn.cases.schema import CaseSchema
+from foldyn.cases.selection import resolve_nodes
+from foldyn.cases.supports import Fix
+from foldyn.cases.values import choice
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.formats import read_pattern
+from foldyn.patterns import GENERATORS, Pattern
+from foldyn.structures import MASS_RULES, ModelOptions, Sheet, discretize
+
+SAMPLES = 2000
+"""Samples that a motion keeps when the file does not say."""
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What to compute.
+
+    Attributes
+    ----------
+    kind : str
+        "dynamics".
+    arguments : dict
+        Keyword arguments of its function (`simulate`): method, duration, dt, every, force.
+    """
+
+    kind: str
+    arguments: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """What to keep and show.
+
+    Attributes
+    ----------
+    nodes : ndarray of int64
+        Nodes that figures and spectra show.
+    every : int or float
+        Interval between samples: steps (int) or seconds (float).
+    """
+
+    nodes: NDArray[np.int64]
+    every: int | float
+
+
+@dataclass(frozen=True, eq=False)
+class CaseFile:
+    """A case file that has been read and checked.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    title : str
+        Its title, or "".
+    pattern : Pattern
+    sheet : Sheet
+    masses : list of str
+        Mass rules, one or several to compare.
+    analysis : Analysis
+    output : Output
+    """
+
+    path: Path
+    title: str
+    pattern: Pattern
+    sheet: Sheet
+    masses: list[str]
+    analysis: Analysis
+    output: Output
+    _parts: Mapping[str, Any] = field(repr=False)
+    _cases: dict[str, Case] = field(repr=False)
+
+    def case(self, mass: str | None = None) -> Case:
+        """Case with one of the mass rules, by default the first that the file names."""
+        rule = self.masses[0] if mass is None else choice("mass", mass, MASS_RULES)
+        if rule not in self._cases:
+            self._cases[rule] = _build(self.path, self.pattern, self.sheet, rule, self._parts)
+        return self._cases[rule]
+
+
+def read_case_file(path: str | os.PathLike[str]) -> CaseFile:
+    """Read a case file and check it whole.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file; see the documentation for its keys. Relative paths in it start at its folder.
+
+    Returns
+    -------
+    CaseFile
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or anything in it cannot be used; the message names the file, the
+        key, the value and what to do.
+    """
+    path = Path(path)
+    document = _read_toml(path)
+    try:
+        schema = CaseSchema.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error, CaseSchema)}") from None
+    with _placed(path, "pattern"):
+        pattern = _pattern(schema.pattern, path.parent)
+    with _placed(path, ""):
+        sheet = Sheet(**schema.sheet.model_dump())
+    if sheet.density is None:
+        raise InputError(f"{path}: sheet.density: missing; a motion needs it (kg/m3)")
+    parts: dict[str, Any] = {
+        "options": {name: getattr(schema.model, name) for name in schema.model.model_fields_set},
+    }
+    named = parts["options"].pop("mass", None)
+    masses = [ModelOptions().mass] if named is None else list(named)
+    with _placed(path, "damping."):
+        parts["damping"] = Rayleigh(schema.damping.alpha, schema.damping.beta)
+    parts["supports"] = []
+    for i, item in enumerate(schema.supports):
+        with _placed(path, f"supports[{i}]."):
+            parts["supports"].append(Fix(item.nodes, item.axes))
+    parts["loads"] = [Force(item.nodes, item.force, item.history) for item in schema.loads]
+
+    cases = {masses[0]: _build(path, pattern, sheet, masses[0], parts)}
+    with warnings.catch_warnings():  # the other rules would only repeat them
+        warnings.simplefilter("ignore", FoldynWarning)
+        for rule in masses[1:]:
+            cases[rule] = _build(path, pattern, sheet, rule, parts)
+    case = cases[masses[0]]
+    analysis = schema.analysis.model_dump()
+    every = schema.output.every
+    every = schema.analysis.duration / SAMPLES if every is None else every
+    with _placed(path, ""):
+        nodes = _output_nodes(case, schema.output.nodes)
+    return CaseFile(
+        path=path,
+        title=schema.title,
+        pattern=pattern,
+        sheet=sheet,
+        masses=masses,
+        analysis=Analysis(analysis.pop("kind"), {**analysis, "every": every}),
+        output=Output(nodes, every),
+        _parts=parts,
+        _cases=cases,
+    )
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_bytes().decode("utf-8")
+        return tomllib.loads(text)
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; give a case file (TOML)") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file in UTF-8; give a case file (TOML)") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+
+
+def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
+    if "kind" in table:
+        arguments = {name: value for name, value in table.items() if name != "kind"}
+        return call_from(GENERATORS[table["kind"]], arguments)
+    try:
+        if "file" in table:
+            return read_pattern(folder / table["file"])
+        return Pattern(table["vertices"], table["faces"], table.get("assignments"))
+    except InputError as error:
+        place = f'.file = "{table["file"]}": ' if "file" in table else ": "
+        raise InputError(f"{place}{error}") from None
+
+
+def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
+    with _placed(path, "model: "):
+        structure = discretize(pattern, sheet, mass=mass, **parts["options"])
+        _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
+    with _placed(path, ""):
+        return Case(structure, parts["supports"], parts["loads"], parts["damping"])
+
+
+def _output_nodes(case: Case, chosen: Any) -> NDArray[np.int64]:
+    """Nodes to show: those chosen, else those loaded, else every vertex that can move."""
+    if chosen is not None:
+        return resolve_nodes(case.structure, chosen, "output.nodes")
+    if case.loads:
+        return case.loaded_nodes
+    vertices = len(case.structure.pattern.vertices)
+    return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
+
+
+@contextmanager
+def _placed(path: Path, place: str) -> Iterator[None]:
+    """Put the file and the place in front of an error from a lower layer."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {place}{error}") from None

@@ -1,0 +1,121 @@
+"""From tables (of a case file or a stored case) to histories, laws and calls of generators.
+
+Every message begins with what follows the table's own place: ".duration = -1: must be ...", so
+that the caller puts "loads[0].history" in front.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, get_args, get_origin, get_type_hints
+
+from foldyn.cases.histories import HISTORIES, History
+from foldyn.cases.values import choice, number, show, suggest
+from foldyn.errors import InputError
+
+
+def history_from(table: Any) -> History:
+    """History from its table, such as ``{kind = "pulse", duration = 1.0}``."""
+    kind, arguments = _kind_of(table, HISTORIES)
+    return call_from(HISTORIES[kind], arguments, checks_itself=True)
+
+
+def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
+    """Law from its name, or from its table such as ``{kind = "enhanced", theta1 = 75}``.
+
+    A name is returned as it is.
+    """
+    if isinstance(spec, str):
+        return choice("", spec, laws)
+    kind, arguments = _kind_of(spec, laws)
+    return call_from(laws[kind], arguments, skip=("name",))
+
+
+def call_from(
+    function: Callable[..., Any],
+    arguments: Mapping[str, Any],
+    *,
+    skip: Iterable[str] = (),
+    checks_itself: bool = False,
+) -> Any:
+    """Call a function or class with a table's entries, checked against its signature.
+
+    Parameters
+    ----------
+    function : callable
+        Its annotations decide: float, int, bool, str and fixed tuples of them are checked here,
+        everything else is left to the function.
+    arguments : mapping
+        Keyword arguments by name.
+    skip : iterable of str
+        Parameters that a table may not set.
+    checks_itself : bool
+        Whether the function checks the types too, with messages that begin with the name of the
+        argument.
+    """
+    parameters = {
+        name: parameter
+        for name, parameter in inspect.signature(function).parameters.items()
+        if name not in skip
+    }
+    check_keys(arguments, parameters)
+    for name, parameter in parameters.items():
+        if parameter.default is parameter.empty and name not in arguments:
+            raise InputError(f".{name}: missing; known keys: {', '.join(parameters)}")
+    values = dict(arguments)
+    if not checks_itself:
+        hints = get_type_hints(function.__init__ if isinstance(function, type) else function)
+        for name, value in values.items():
+            values[name] = _checked(f".{name}", value, hints.get(name, Any))
+    try:
+        return function(**values)
+    except InputError as error:
+        raise InputError(f"{'.' if checks_itself else ': '}{error}") from None
+
+
+def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Refuse a key that is not known, with a suggestion and the keys that are."""
+    known = list(known)
+    for key in table:
+        if key not in known:
+            raise InputError(f".{key}: {unknown_key(key, known)}")
+
+
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """Text for an unknown key."""
+    known = list(known)
+    return f"unknown key; {suggest(key, known)}known keys: {', '.join(known) or 'none'}"
+
+
+def _kind_of(table: Any, kinds: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    listed = ", ".join(kinds)
+    if not isinstance(table, Mapping):
+        raise InputError(f' = {show(table)}: must be a table {{ kind = "..." }}, kind: {listed}')
+    if "kind" not in table:
+        raise InputError(f".kind: missing; choose one of {listed}")
+    kind = choice(".kind", table["kind"], kinds)
+    return kind, {name: value for name, value in table.items() if name != "kind"}
+
+
+def _checked(place: str, value: Any, hint: Any) -> Any:
+    if hint is float:
+        return number(place, value)
+    if hint is int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise InputError(f"{place} = {show(value)}: must be a whole number")
+        return value
+    if hint in (str, bool):
+        if not isinstance(value, hint):
+            what = "text" if hint is str else "true or false"
+            raise InputError(f"{place} = {show(value)}: must be {what}")
+        return value
+    inner = get_args(hint)
+    if get_origin(hint) is tuple and Ellipsis not in inner:
+        if not isinstance(value, list | tuple) or len(value) != len(inner):
+            raise InputError(f"{place} = {show(value)}: must be a list of {len(inner)} entries")
+        return tuple(
+            _checked(f"{place}[{i}]", item, part)
+            for i, (item, part) in enumerate(zip(value, inner, strict=True))
+        )
+    return value

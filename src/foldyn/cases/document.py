@@ -1,0 +1,270 @@
+"""A case as a document (a table that TOML can hold) and named arrays, and back.
+
+The document has the sections of a case file. What is long lives in the arrays and is referred to
+as ``{ variable = "name" }``: the pattern's vertices and faces, per-crease values, tables of
+histories. Numbers survive exactly.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.case import Case
+from foldyn.cases.damping import Rayleigh
+from foldyn.cases.decode import history_from, law_from
+from foldyn.cases.histories import HISTORIES, Constant, History, Table
+from foldyn.cases.loads import Force
+from foldyn.cases.supports import Fix
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.materials import BAR_LAWS, HINGE_LAWS
+from foldyn.patterns import Pattern
+from foldyn.structures import Sheet, Structure, discretize
+
+LAWS: Mapping[str, Mapping[str, type]] = {
+    "bar_law": BAR_LAWS,
+    "fold_law": HINGE_LAWS,
+    "bend_law": HINGE_LAWS,
+}
+PER_CREASE = ("crease_stiffness", "crease_rest")
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A case in writing.
+
+    Attributes
+    ----------
+    sections : dict
+        Sections of a case file, of plain Python values.
+    arrays : dict of str to ndarray
+        What the sections refer to, by variable name.
+    obstacles : tuple of str
+        Why the case cannot be rebuilt from the document; empty when it can.
+    """
+
+    sections: dict[str, Any]
+    arrays: dict[str, NDArray]
+    obstacles: tuple[str, ...]
+
+
+def to_document(case: Case, stage_times: NDArray[np.float64] | None = None) -> Document:
+    """Write a case down.
+
+    Parameters
+    ----------
+    case : Case
+    stage_times : ndarray, shape (n,), optional
+        Times (s) at which functions of time are sampled; without them such a case cannot be
+        rebuilt.
+
+    Returns
+    -------
+    Document
+    """
+    return _Writer(case, stage_times).document()
+
+
+def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> Case:
+    """Rebuild a case from its document.
+
+    Raises
+    ------
+    InputError
+        The document is damaged.
+    """
+    try:
+        return _read(_resolve(sections, arrays))
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"the stored case is damaged ({type(error).__name__}: {error})") from error
+
+
+class _Writer:
+    """Collects the arrays and obstacles while the sections are written."""
+
+    def __init__(self, case: Case, stage_times: NDArray[np.float64] | None) -> None:
+        self.case = case
+        self.stage_times = stage_times
+        self.arrays: dict[str, NDArray] = {}
+        self.obstacles: list[str] = []
+        self.histories: list[tuple[History, dict[str, Any]]] = []
+
+    def document(self) -> Document:
+        case, structure = self.case, self.case.structure
+        sections: dict[str, Any] = {
+            "pattern": self._pattern(structure.pattern),
+            "nodes": self._store("rest_position", structure.nodes),
+            "sheet": {
+                f.name: float(value)
+                for f in dataclasses.fields(structure.sheet)
+                if (value := getattr(structure.sheet, f.name)) is not None
+            },
+            "model": self._model(structure.options),
+            "damping": {"alpha": case.damping.alpha, "beta": case.damping.beta},
+            "supports": [{"nodes": _nodes(fix.nodes), "axes": fix.axes} for fix in case.supports],
+            "loads": [self._load(load) for load in case.loads],
+        }
+        if not self.obstacles and not _same(structure, _structure(_resolve(sections, self.arrays))):
+            self.obstacles.append(
+                "its structure differs from what discretize makes of its pattern, sheet and options"
+            )
+        return Document(sections, self.arrays, tuple(dict.fromkeys(self.obstacles)))
+
+    def _store(self, name: str, values: Any) -> dict[str, str]:
+        self.arrays[name] = np.asarray(values)
+        return {"variable": name}
+
+    def _pattern(self, pattern: Pattern | None) -> dict[str, Any]:
+        if pattern is None:
+            self.obstacles.append("its structure has no pattern")
+            return {}
+        lengths = [len(face) for face in pattern.faces]
+        flat = [vertex for face in pattern.faces for vertex in face]
+        return {
+            "name": pattern.name,
+            "vertices": self._store("vertices", pattern.vertices),
+            "faces": self._store("faces", np.array(flat, dtype=np.int64)),
+            "face_offsets": self._store(
+                "face_offsets", np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+            ),
+            "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
+        }
+
+    def _model(self, options: Any) -> dict[str, Any]:
+        section: dict[str, Any] = {}
+        for option in dataclasses.fields(options):
+            name, value = option.name, getattr(options, option.name)
+            if value is None:
+                continue
+            if name in LAWS:
+                section[name] = self._law(name, value)
+            elif name in PER_CREASE:
+                array = np.asarray(value, dtype=np.float64)
+                section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
+            else:
+                section[name] = value
+        return section
+
+    def _law(self, name: str, law: Any) -> Any:
+        if isinstance(law, str):
+            return law
+        kind = next((kind for kind, built_in in LAWS[name].items() if type(law) is built_in), None)
+        if kind is None:
+            self.obstacles.append(
+                f'{name} is "{law.name}", a user\'s own law, of which only the name is stored'
+            )
+            return {"kind": "user", "name": str(law.name)}
+        arguments = {
+            f.name: getattr(law, f.name)
+            for f in dataclasses.fields(law)
+            if f.init and f.name != "name"
+        }
+        return {"kind": kind, **{key: _plain(value) for key, value in arguments.items()}}
+
+    def _load(self, load: Force) -> dict[str, Any]:
+        section: dict[str, Any] = {"nodes": _nodes(load.nodes), "force": list(load.vector)}
+        if load.history != Constant():
+            section["history"] = self._history(load.history)
+        return section
+
+    def _history(self, history: History) -> dict[str, Any]:
+        known = next((table for other, table in self.histories if other == history), None)
+        if known is None:
+            known = self._new_history(history)
+            self.histories.append((history, known))
+        return known
+
+    def _new_history(self, history: History) -> dict[str, Any]:
+        if HISTORIES.get(history.kind) is not type(history):  # a function of the user's own
+            if self.stage_times is None:
+                self.obstacles.append(
+                    "a load has a function of time as history, and the time step of the run, at "
+                    "which it would be sampled, is not known"
+                )
+                return {"kind": "user"}
+            history = Table(self.stage_times, history(self.stage_times))
+        table: dict[str, Any] = {"kind": history.kind}
+        for item in dataclasses.fields(history):
+            value = getattr(history, item.name)
+            if isinstance(value, np.ndarray):
+                value = self._store(f"tables_{len(self.histories)}_{item.name}", value)
+            table[item.name] = _plain(value)
+        return table
+
+
+def _read(sections: Mapping[str, Any]) -> Case:
+    supports = [Fix(item["nodes"], item["axes"]) for item in sections["supports"]]
+    loads = [
+        Force(
+            item["nodes"],
+            item["force"],
+            history_from(item["history"]) if "history" in item else None,
+        )
+        for item in sections["loads"]
+    ]
+    structure = _structure(sections)
+    with warnings.catch_warnings():  # they were given when the case was first made
+        warnings.simplefilter("ignore", FoldynWarning)
+        return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
+
+
+def _structure(sections: Mapping[str, Any]) -> Structure:
+    table = sections["pattern"]
+    flat = table["faces"].tolist()
+    faces = [flat[start:end] for start, end in pairwise(table["face_offsets"].tolist())]
+    letters = [str(letter) for letter in table["assignments"]]
+    model = dict(sections["model"])
+    for name, laws in LAWS.items():
+        if name in model:
+            model[name] = law_from(model[name], laws)
+    nodes = sections["nodes"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        pattern = Pattern(table["vertices"], faces, letters, table["name"])
+        sheet = Sheet(**sections["sheet"])
+        structure = discretize(pattern, sheet, **model)
+        if nodes.shape == structure.nodes.shape and not np.array_equal(nodes, structure.nodes):
+            # panel centers given by hand, or found to other last digits on another machine
+            centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
+            structure = discretize(pattern, sheet, **model, centers=centers)
+    return structure
+
+
+def _same(one: Structure, other: Structure) -> bool:
+    """Whether two structures hold the same arrays."""
+    for item in dataclasses.fields(one):
+        first, second = getattr(one, item.name), getattr(other, item.name)
+        arrays = isinstance(first, np.ndarray) or isinstance(second, np.ndarray)
+        if arrays and not np.array_equal(first, second):
+            return False
+    return True
+
+
+def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
+    """Put the arrays in the place of their references."""
+    if isinstance(value, Mapping):
+        if set(value) == {"variable"}:
+            if value["variable"] not in arrays:
+                raise InputError(f"the stored case lacks its variable {value['variable']}")
+            return arrays[value["variable"]]
+        return {key: _resolve(item, arrays) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_resolve(item, arrays) for item in value]
+    return value
+
+
+def _nodes(nodes: Any) -> Any:
+    return nodes if isinstance(nodes, str) else list(nodes)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

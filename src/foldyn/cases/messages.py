@@ -1,0 +1,82 @@
+"""Messages for a case file that does not fit its schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from foldyn.cases.decode import unknown_key
+from foldyn.cases.values import nearest, show
+
+_TEXTS = {
+    "missing": "missing; give its value",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "string_type": "must be text",
+    "bool_type": "must be true or false",
+    "finite_number": "must be a finite number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+}
+
+
+def describe(error: ValidationError, schema: type[BaseModel]) -> str:
+    """Text for all that a validation found: one line, and one more for each further error."""
+    items = error.errors(include_url=False, include_context=True)
+    unknown = [item for item in items if item["type"] == "extra_forbidden"]
+    # a misspelled key is also missing under its right name: say it once, and first
+    meant = {(*item["loc"][:-1], _meant(item["loc"], schema)) for item in unknown}
+    rest = [
+        item
+        for item in items
+        if item["type"] != "extra_forbidden"
+        and not (item["type"] == "missing" and item["loc"] in meant)
+    ]
+    lines = [_line(item, schema) for item in [*unknown, *rest]]
+    return "\n  also ".join(dict.fromkeys(lines))
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """Path of a key: ("loads", 0, "nodes") becomes "loads[0].nodes"."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _line(item: Mapping[str, Any], schema: type[BaseModel]) -> str:
+    location, kind, value = item["loc"], item["type"], item["input"]
+    place, context = dotted(location), item.get("ctx", {})
+    if kind == "value_error":  # an InputError of ours: its text continues the path
+        return f"{place}{context['error']}"
+    if kind == "extra_forbidden":
+        known = _section(schema, location[:-1]).model_fields
+        return f"{place}: {unknown_key(str(location[-1]), known)}"
+    if kind == "missing":
+        return f"{place}: {_TEXTS[kind]}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        text = f"must be a table, written [{place}]" if "[" not in place else "must be a table"
+    elif kind == "list_type":
+        is_table = bool(get_args(schema.model_fields[location[0]].annotation))
+        text = f"must be a list of tables, written [[{place}]]" if is_table else "must be a list"
+    else:
+        text = _TEXTS.get(kind, item["msg"]).format(**context)
+    return f"{place} = {show(value)}: {text}"
+
+
+def _meant(location: Sequence[str | int], schema: type[BaseModel]) -> str | None:
+    return nearest(str(location[-1]), _section(schema, location[:-1]).model_fields)
+
+
+def _section(schema: type[BaseModel], location: Sequence[str | int]) -> type[BaseModel]:
+    for part in location:
+        if isinstance(part, int):
+            continue
+        annotation = schema.model_fields[part].annotation
+        inner = get_args(annotation)
+        schema = inner[0] if inner else annotation
+    return schema

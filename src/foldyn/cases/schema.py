@@ -1,0 +1,204 @@
+"""The case file's contract: its sections, keys and types.
+
+Limits of values live here only where a message should name the key; everything else is checked
+by the objects that are built from the sections. Validators raise InputError with a text that
+continues the key's path (" = -1: must be ...", ".kind: missing ...").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
+
+from foldyn.cases.decode import check_keys, history_from, law_from
+from foldyn.cases.histories import History
+from foldyn.cases.selection import check_nodes
+from foldyn.cases.values import choice, number, numbers, show, vector
+from foldyn.errors import InputError
+from foldyn.materials import BAR_LAWS, HINGE_LAWS
+from foldyn.patterns import GENERATORS
+from foldyn.structures import MASS_RULES
+from foldyn.structures.options import CALIBRATIONS, SCHEMES
+
+ANALYSES = ("dynamics",)
+LATER_ANALYSES = ("statics", "modes", "frf")
+METHODS = ("rk4",)
+"""Integrators that a case file may name."""
+
+
+class Section(BaseModel):
+    """A table of the case file: no unknown keys, no coercion, no NaN or infinity."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+def _pattern(value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(f" = {show(value)}: must be a table, written [pattern]")
+    sources = [key for key in ("kind", "file", "vertices") if key in value]
+    if len(sources) > 1:
+        raise InputError(f": give only one of {' and '.join(sources)}")
+    if not sources:
+        if "faces" in value:
+            raise InputError(".vertices: missing; faces need vertices")
+        raise InputError(": give kind (a generator), file, or vertices and faces")
+    if "kind" in value:
+        choice(".kind", value["kind"], GENERATORS)
+    elif "file" in value:
+        check_keys(value, ["file"])
+        if not isinstance(value["file"], str) or not value["file"]:
+            raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
+    else:
+        check_keys(value, ["vertices", "faces", "assignments"])
+        if "faces" not in value:
+            raise InputError(".faces: missing; give the vertex numbers of every panel")
+        _inline(value)
+    return dict(value)
+
+
+def _inline(value: Mapping[str, Any]) -> None:
+    vertices = numbers(".vertices", value["vertices"])
+    if vertices.ndim != 2 or vertices.shape[1] not in (2, 3):
+        raise InputError(".vertices: must be a list of points [x, y, z]")
+    faces = value["faces"]
+    if not isinstance(faces, list) or not faces:
+        raise InputError(f".faces = {show(faces)}: must be a list of panels, as in [[0, 1, 2]]")
+    for i, face in enumerate(faces):
+        if not isinstance(face, list) or any(
+            isinstance(v, bool) or not isinstance(v, int) for v in face
+        ):
+            raise InputError(f".faces[{i}] = {show(face)}: must be a list of vertex numbers")
+    letters = value.get("assignments", [])
+    if not isinstance(letters, list) or any(not isinstance(letter, str) for letter in letters):
+        raise InputError(
+            f'.assignments = {show(letters)}: must be a list of letters "M", "V", "F", "U", one '
+            "per crease"
+        )
+
+
+def _masses(value: Any) -> list[str]:
+    names = value if isinstance(value, list) else [value]
+    if not names:
+        raise InputError(f" = []: give at least one of {', '.join(MASS_RULES)}")
+    for i, name in enumerate(names):
+        choice(f"[{i}]" if isinstance(value, list) else "", name, MASS_RULES)
+        if name in names[:i]:
+            raise InputError(f"[{i}] = {show(name)}: is listed twice")
+    return names
+
+
+def _creases(value: Any) -> Any:
+    if not isinstance(value, list):
+        return number("", value)
+    array = numbers("", value)
+    if array.ndim != 1 or not array.size:
+        raise InputError(f" = {show(value)}: must be a number, or a list of one per crease")
+    return array
+
+
+def _every(value: Any) -> int | float:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value < 1:
+            raise InputError(f" = {value}: must be at least 1 (steps)")
+        return value
+    return number("", value, above=0.0)
+
+
+def _analysis(value: Any) -> Any:
+    if isinstance(value, Mapping) and "kind" in value:
+        kind = value["kind"]
+        if kind in LATER_ANALYSES:
+            raise InputError(
+                f".kind = {show(kind)}: not available in this version; available: "
+                f"{', '.join(ANALYSES)}"
+            )
+        choice(".kind", kind, ANALYSES)
+    return value
+
+
+Positive = Annotated[float, Field(gt=0)]
+Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
+BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
+HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
+PerCrease = Annotated[Any, PlainValidator(_creases)]
+HistorySpec = Annotated[History | None, PlainValidator(history_from)]
+
+
+class SheetSection(Section):
+    """[sheet]: arguments of `Sheet`."""
+
+    youngs_modulus: Positive
+    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    thickness: Positive
+    density: Positive | None = None
+    length_scale_ratio: Positive = 1.0
+
+
+class ModelSection(Section):
+    """[model]: arguments of `discretize`; what is left out has its default there."""
+
+    scheme: Annotated[Any, PlainValidator(lambda value: choice("", value, SCHEMES))] = None
+    mass: Annotated[list[str] | None, PlainValidator(_masses)] = None
+    bar_law: BarLawSpec = None
+    fold_law: HingeLawSpec = None
+    bend_law: HingeLawSpec = None
+    calibration: Annotated[Any, PlainValidator(lambda value: choice("", value, CALIBRATIONS))] = (
+        None
+    )
+    crease_stiffness: PerCrease = None
+    crease_rest: PerCrease = None
+
+
+class DampingSection(Section):
+    """[damping]: Rayleigh coefficients."""
+
+    alpha: Annotated[float, Field(ge=0)] = 0.0
+    beta: Annotated[float, Field(ge=0)] = 0.0
+
+
+class SupportSection(Section):
+    """One of [[supports]]."""
+
+    nodes: Nodes
+    axes: str = "xyz"
+
+
+class LoadSection(Section):
+    """One of [[loads]]."""
+
+    nodes: Nodes
+    force: Annotated[Any, PlainValidator(lambda value: vector("", value))]
+    history: HistorySpec = None
+
+
+class DynamicsSection(Section):
+    """[analysis] of kind "dynamics": arguments of `simulate`."""
+
+    kind: str
+    duration: Positive
+    method: Annotated[str, PlainValidator(lambda value: choice("", value, METHODS))] = "rk4"
+    dt: Positive | None = None
+    force: bool = False
+
+
+class OutputSection(Section):
+    """[output]: what is kept and shown."""
+
+    nodes: Nodes = None
+    every: Annotated[Any, PlainValidator(_every)] = None
+
+
+class CaseSchema(Section):
+    """The whole case file."""
+
+    title: str = ""
+    pattern: Annotated[dict[str, Any], PlainValidator(_pattern)]
+    sheet: SheetSection
+    model: ModelSection = ModelSection()
+    damping: DampingSection = DampingSection()
+    supports: list[SupportSection] = []
+    loads: list[LoadSection] = []
+    analysis: Annotated[DynamicsSection, BeforeValidator(_analysis)]
+    output: OutputSection = OutputSection()

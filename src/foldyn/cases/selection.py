@@ -1,0 +1,213 @@
+"""Selections: nodes by number, or vertices by an expression such as "zmax and y>0".
+
+An expression is made of
+
+- ``xmin xmax ymin ymax zmin zmax``: vertices at an extreme of the pattern;
+- comparisons of ``x``, ``y`` or ``z`` (m) with numbers: ``y > 0``, ``0 <= x < 1.5``, ``z == 0``;
+- ``and``, ``or``, ``not`` and parentheses.
+
+All of them use a tolerance of 1e-9 of the pattern's size, so that rounding in the coordinates does
+not matter: ``y > 0`` leaves out a vertex at y = 1e-17. Expressions select among the vertices of
+the pattern (at rest), never panel centers. They are read by a small parser, never evaluated.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.cases.values import show
+from foldyn.errors import InputError
+
+TOLERANCE = 1e-9
+"""Tolerance of a selection relative to the size of the pattern."""
+
+_LONGEST = 1000
+_AXES = {"x": 0, "y": 1, "z": 2}
+_REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
+_MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
+
+
+def select(points: Any, expression: str) -> NDArray[np.int64]:
+    """Vertices that an expression selects.
+
+    Parameters
+    ----------
+    points : Pattern or array_like, shape (n, 3)
+        A pattern, or points (m).
+    expression : str
+        See the module's text.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Numbers of the selected points in increasing order, k >= 1.
+
+    Raises
+    ------
+    InputError
+        The expression cannot be read or selects nothing.
+
+    Examples
+    --------
+    >>> select([[0, 0, 0], [1, 0, 0], [1, 2, 0]], "xmax and y>0")
+    array([2])
+    """
+    vertices = np.asarray(getattr(points, "vertices", points), dtype=np.float64)
+    span = np.ptp(vertices, axis=0)
+    selector = _Selector(expression, vertices, TOLERANCE * float(np.linalg.norm(span)))
+    found = np.flatnonzero(selector.mask())
+    if found.size == 0:
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        ranges = ", ".join(f"{axis} {low[i]:.6g} to {high[i]:.6g}" for axis, i in _AXES.items())
+        raise InputError(f'"{expression}": selects no vertex; the pattern spans {ranges} (m)')
+    return found
+
+
+def resolve_nodes(
+    structure: Any, nodes: int | Sequence[int] | ArrayLike | str, field: str = "nodes"
+) -> NDArray[np.int64]:
+    """Numbers of nodes of a structure from a number, several, or an expression.
+
+    Parameters
+    ----------
+    structure : Structure
+        Its `nodes` (n, 3) bound the numbers; its pattern's vertices serve expressions.
+    nodes : int, sequence of int, or str
+        Numbers are kept in the order given.
+    field : str
+        Name of the field for messages.
+
+    Raises
+    ------
+    InputError
+        A number is out of range or listed twice, or an expression selects nothing.
+    """
+    if isinstance(nodes, str):
+        pattern = structure.pattern  # None for a structure made by hand: all nodes are vertices
+        try:
+            return select(structure.nodes if pattern is None else pattern, nodes)
+        except InputError as error:
+            raise InputError(f"{field} = {error}") from None
+    chosen = np.array(check_nodes(nodes, field), dtype=np.int64)
+    count = len(structure.nodes)
+    bad = chosen[(chosen < 0) | (chosen >= count)]
+    if bad.size:
+        raise InputError(
+            f"{field} = {show(nodes)}: node {bad[0]} is out of range; this structure has nodes 0 "
+            f"to {count - 1}"
+        )
+    return chosen
+
+
+def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
+    """Return a node selection as text or as a tuple of numbers, checked but for its range."""
+    if isinstance(nodes, str):
+        if not nodes.strip():
+            raise InputError(f'{field} = "{nodes}": selects nothing; {_REMEDY}')
+        return nodes
+    array = np.atleast_1d(np.asarray(nodes, dtype=object))
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(
+            f"{field} = {show(nodes)}: must be node numbers, as in [0, 1], or a selection such as "
+            '"xmin"'
+        )
+    for item in array:
+        if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
+            raise InputError(f"{field} = {show(nodes)}: {show(item)} is not a node number")
+    numbers = tuple(int(item) for item in array)
+    if len(set(numbers)) < len(numbers):
+        twice = next(item for item in numbers if numbers.count(item) > 1)
+        raise InputError(f"{field} = {show(nodes)}: node {twice} is listed twice")
+    return numbers
+
+
+class _Selector:
+    """One expression applied to points with an absolute tolerance (m)."""
+
+    def __init__(self, expression: str, points: NDArray, tolerance: float) -> None:
+        self.expression = expression
+        self.points = points
+        self.tolerance = tolerance
+
+    def mask(self) -> NDArray[np.bool_]:
+        text = self.expression.strip()
+        if len(text) > _LONGEST:
+            raise self._error(f"is longer than {_LONGEST} characters")
+        try:
+            tree = ast.parse(text, mode="eval")
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise self._error("cannot be read (compare with ==, not =)") from None
+        return self._truth(tree.body)
+
+    def _truth(self, node: ast.expr) -> NDArray[np.bool_]:
+        if isinstance(node, ast.BoolOp):
+            combine = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
+            return combine.reduce([self._truth(value) for value in node.values])
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return ~self._truth(node.operand)
+        if isinstance(node, ast.Name):
+            return self._extreme(node.id)
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            parts = [
+                self._comparison(left, operator, right)
+                for left, operator, right in zip(sides, node.ops, sides[1:], strict=False)
+            ]
+            return np.logical_and.reduce(parts)
+        raise self._error(f"{ast.unparse(node)} is not a condition")
+
+    def _extreme(self, name: str) -> NDArray[np.bool_]:
+        axis, which = _AXES.get(name[:1]), name[1:]
+        if axis is None or which not in ("min", "max"):
+            raise self._error(
+                f"{name} is not known; use xmin, xmax, ymin, ymax, zmin, zmax, or compare x, y or "
+                "z with a number"
+            )
+        values = self.points[:, axis]
+        if which == "min":
+            return values <= values.min() + self.tolerance
+        return values >= values.max() - self.tolerance
+
+    def _comparison(
+        self, left: ast.expr, operator: ast.cmpop, right: ast.expr
+    ) -> NDArray[np.bool_]:
+        if not isinstance(left, ast.Name):
+            left, right = right, left
+            operator = _MIRRORED.get(type(operator), type(operator))()
+        if not isinstance(left, ast.Name) or left.id not in _AXES:
+            raise self._error("compare x, y or z with a number")
+        difference = self.points[:, _AXES[left.id]] - self._number(right)
+        if isinstance(operator, ast.Lt):
+            return difference < -self.tolerance
+        if isinstance(operator, ast.LtE):
+            return difference <= self.tolerance
+        if isinstance(operator, ast.Gt):
+            return difference > self.tolerance
+        if isinstance(operator, ast.GtE):
+            return difference >= -self.tolerance
+        if isinstance(operator, ast.Eq):
+            return np.abs(difference) <= self.tolerance
+        if isinstance(operator, ast.NotEq):
+            return np.abs(difference) > self.tolerance
+        raise self._error("compare with <, <=, >, >=, == or !=")
+
+    def _number(self, node: ast.expr) -> float:
+        sign = 1.0
+        while isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+            sign = -sign if isinstance(node.op, ast.USub) else sign
+            node = node.operand
+        value = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self._error(f"{ast.unparse(node)} is not a number")
+        try:
+            return sign * float(value)
+        except OverflowError:
+            raise self._error(f"{ast.unparse(node)} is not a finite number") from None
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f'"{self.expression}": {what}; {_REMEDY}')

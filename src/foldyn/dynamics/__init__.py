@@ -1,0 +1,16 @@
+"""Dynamics: integrators, critical step, energy audit, initial states."""
+
+from foldyn.dynamics.critical_step import critical_step, largest_frequency
+from foldyn.dynamics.initial import initial_state
+from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.progress import Progress
+from foldyn.dynamics.simulate import simulate
+
+__all__ = [
+    "METHODS",
+    "Progress",
+    "critical_step",
+    "initial_state",
+    "largest_frequency",
+    "simulate",
+]

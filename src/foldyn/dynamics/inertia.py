@@ -1,0 +1,173 @@
+"""The mass matrix inside compiled loops: M v and the solution of M a = r on free dofs.
+
+A lumped matrix is a division. A consistent one is factored once per distinct set of supported
+nodes (axes with equal supports share it) and solved by sparse triangular substitution.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
+
+from foldyn.errors import InputError
+from foldyn.materials.compiled import kernel
+
+
+class Inertia(NamedTuple):
+    """Mass matrix (nodal, CSR), its inverse where diagonal, its factors where not."""
+
+    lumped: bool
+    inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
+    indptr: NDArray
+    indices: NDArray
+    data: NDArray
+    factor_of_axis: NDArray  # (3,) which factor serves each axis
+    start: NDArray  # (factors + 1,) first row of each factor in the arrays below
+    nodes: NDArray  # free nodes of each factor
+    row_order: NDArray
+    column_order: NDArray
+    lower_ptr: NDArray  # strictly lower part of L, by columns
+    lower_row: NDArray
+    lower: NDArray
+    upper_ptr: NDArray  # strictly upper part of U, by columns
+    upper_row: NDArray
+    upper: NDArray
+    pivot: NDArray  # 1 / diagonal of U
+
+
+def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
+    """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3).
+
+    Raises
+    ------
+    InputError
+        A free node has no mass.
+    """
+    mass = sparse.csr_array(mass)
+    mass.sort_indices()
+    diagonal = mass.diagonal()
+    massless = np.flatnonzero((diagonal <= 0.0) & ~fixed.all(axis=1))
+    if len(massless):
+        shown = ", ".join(map(str, massless[:8])) + (", ..." if len(massless) > 8 else "")
+        raise InputError(
+            f"node {shown} is free but has no mass: fix it along x, y and z, attach a panel to "
+            "it, or choose a mass rule that gives it mass"
+        )
+    lumped = sparse.csr_array(mass - sparse.diags_array(diagonal)).count_nonzero() == 0
+    if lumped:
+        inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])
+        factor_of_axis, factors = np.zeros(3, np.int64), []
+    else:
+        inverse = np.zeros((0, 3))
+        free = [np.flatnonzero(~fixed[:, axis]) for axis in range(3)]
+        sets: list[NDArray] = []
+        factor_of_axis = np.zeros(3, np.int64)
+        for axis, nodes in enumerate(free):
+            same = [k for k, known in enumerate(sets) if np.array_equal(known, nodes)]
+            factor_of_axis[axis] = same[0] if same else len(sets)
+            if not same:
+                sets.append(nodes)
+        factors = [_factor(mass, nodes) for nodes in sets]
+    return Inertia(
+        lumped,
+        inverse,
+        mass.indptr.astype(np.int64),
+        mass.indices.astype(np.int64),
+        mass.data.astype(float),
+        factor_of_axis,
+        *_join(factors),
+    )
+
+
+def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
+    """L and U without their diagonals, the orders and the pivots of the free part."""
+    if not len(nodes):
+        empty = sparse.csc_array((0, 0))
+        return nodes, nodes, nodes, empty, empty, np.zeros(0)
+    block = sparse.csc_array(mass[nodes][:, nodes])
+    options = {"SymmetricMode": True}
+    lu = linalg.splu(block, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    lower, upper = sparse.csc_array(lu.L), sparse.csc_array(lu.U)
+    return (
+        nodes,
+        lu.perm_r,
+        lu.perm_c,
+        sparse.csc_array(sparse.tril(lower, -1)),
+        sparse.csc_array(sparse.triu(upper, 1)),
+        1.0 / upper.diagonal(),
+    )
+
+
+def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
+    """Arrays of all factors end to end, column pointers made absolute."""
+
+    def column(parts, kind):
+        return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
+
+    def pointers(matrices):
+        # every factor keeps its own closing pointer, so factor k's columns start at start[k] + k
+        out, base = [], 0
+        for m in matrices:
+            out.append(m.indptr.astype(np.int64) + base)
+            base += m.nnz
+        return column(out, np.int64)
+
+    lowers, uppers = [f[3] for f in factors], [f[4] for f in factors]
+    return (
+        np.concatenate([[0], np.cumsum([len(f[0]) for f in factors])]).astype(np.int64),
+        column([f[0] for f in factors], np.int64),
+        column([f[1] for f in factors], np.int64),
+        column([f[2] for f in factors], np.int64),
+        pointers(lowers),
+        column([m.indices for m in lowers], np.int64),
+        column([m.data for m in lowers], float),
+        pointers(uppers),
+        column([m.indices for m in uppers], np.int64),
+        column([m.data for m in uppers], float),
+        column([f[5] for f in factors], float),
+    )
+
+
+@kernel
+def times_mass(m, v, out):
+    """out = M v, both (n, 3)."""
+    for i in range(v.shape[0]):
+        for c in range(3):
+            out[i, c] = 0.0
+        for p in range(m.indptr[i], m.indptr[i + 1]):
+            j, value = m.indices[p], m.data[p]
+            for c in range(3):
+                out[i, c] += value * v[j, c]
+
+
+@kernel
+def solve_mass(m, r, a, scratch):
+    """Solve M a = r on free dofs; a is zero on fixed ones. scratch holds n numbers."""
+    if m.lumped:
+        for i in range(r.shape[0]):
+            for c in range(3):
+                a[i, c] = r[i, c] * m.inverse[i, c]
+        return
+    a[:] = 0.0
+    for c in range(3):
+        k = m.factor_of_axis[c]
+        first = m.start[k]
+        count = m.start[k + 1] - first
+        offset = first + k
+        for i in range(count):
+            scratch[m.row_order[first + i]] = r[m.nodes[first + i], c]
+        for j in range(count):
+            value = scratch[j]
+            for p in range(m.lower_ptr[offset + j], m.lower_ptr[offset + j + 1]):
+                scratch[m.lower_row[p]] -= m.lower[p] * value
+        for j in range(count - 1, -1, -1):
+            value = scratch[j] * m.pivot[first + j]
+            scratch[j] = value
+            for p in range(m.upper_ptr[offset + j], m.upper_ptr[offset + j + 1]):
+                scratch[m.upper_row[p]] -= m.upper[p] * value
+        for i in range(count):
+            a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]

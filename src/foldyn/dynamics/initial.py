@@ -1,0 +1,33 @@
+"""Initial states from results."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from foldyn.cases import State
+from foldyn.errors import InputError
+
+
+def initial_state(result: Any, at: int = -1) -> State:
+    """State at sample `at` of a result (dims time or step, node, axis), to start a motion from.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        A trajectory or a path.
+    at : int, default -1
+        Number of the sample; negative ones count from the end.
+    """
+    for dimension in ("time", "step"):
+        if dimension in result.sizes:
+            count = result.sizes[dimension]
+            break
+    else:
+        raise InputError("initial_state: the result has neither a time nor a step dimension")
+    if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
+        raise InputError(f"at = {at!r}: the result has samples 0 to {count - 1}")
+    sample = result.isel({dimension: at})
+    velocity = sample["velocity"].to_numpy() if "velocity" in sample else None
+    return State(sample["displacement"].to_numpy(), velocity)

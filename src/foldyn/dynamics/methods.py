@@ -1,0 +1,38 @@
+"""The registry of integrators."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from numpy.typing import NDArray
+
+from foldyn.dynamics import rk4
+from foldyn.errors import InputError
+
+
+class Method(NamedTuple):
+    """An explicit integrator with a fixed step.
+
+    `advance` is a compiled function with the arguments of `rk4.advance`, `stages` the abscissas
+    at which it wants the factors of the histories, `amplification` its R(z) and `order` what
+    tests hold it to.
+    """
+
+    name: str
+    order: int
+    stages: NDArray
+    amplification: Callable[[NDArray], NDArray]
+    advance: Callable[..., tuple[int, int, int]]
+
+
+METHODS: Mapping[str, Method] = {
+    "rk4": Method("rk4", rk4.ORDER, rk4.STAGES, rk4.amplification, rk4.advance),
+}
+
+
+def method_of(name: str) -> Method:
+    """Integrator by its name."""
+    if name not in METHODS:
+        raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
+    return METHODS[name]

@@ -1,0 +1,37 @@
+"""What a long run tells while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+
+class Progress(NamedTuple):
+    """State of a run: simulated time and duration (s), steps done, relative energy error."""
+
+    time: float
+    duration: float
+    steps: int
+    energy_error: float
+
+
+Reporter = Callable[[Progress], None]
+
+
+def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], None]]:
+    """Reporter and its closing function: none, a bar on stderr (True), or the user's own."""
+    if callable(choice):
+        return choice, lambda: None
+    if not choice:
+        return lambda _: None, lambda: None
+    from tqdm import tqdm
+
+    layout = "{l_bar}{bar}| {n:.3g}/{total:.3g} s [{elapsed}<{remaining}{postfix}]"
+    bar = tqdm(total=1.0, bar_format=layout, leave=False)
+
+    def show(state: Progress) -> None:
+        bar.total = state.duration
+        bar.set_postfix_str(f"energy error {state.energy_error:.1e}", refresh=False)
+        bar.update(state.time - bar.n)
+
+    return show, bar.close

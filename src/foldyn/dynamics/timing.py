@@ -1,0 +1,86 @@
+"""Steps and samples: how duration, time step and output interval fit together."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import NamedTuple
+
+from foldyn.errors import InputError
+
+DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
+
+
+class Schedule(NamedTuple):
+    """A motion of `steps` steps of `dt` seconds, sampled every `every` steps from t = 0."""
+
+    dt: float
+    steps: int
+    every: int
+
+    @property
+    def samples(self) -> int:
+        """Number of samples, the first at t = 0."""
+        return self.steps // self.every + 1
+
+
+def positive(name: str, value: object) -> float:
+    """Return a positive finite number, or refuse it."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{name} = {value!r}: give a number (s)")
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(f"{name} = {value}: must be finite and greater than 0")
+    return float(value)
+
+
+def schedule(duration: float, dt: float | None, every: int | float, critical: float) -> Schedule:
+    """Fit a time step and the sampling to a duration.
+
+    `every` counts steps if it is an int and seconds if it is a float. Without `dt` the step is
+    half the critical one, shortened so that it divides the sampling interval and the duration.
+    """
+    duration = positive("duration", duration)
+    if isinstance(every, bool) or not isinstance(every, (int, float)):
+        raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")
+    in_seconds = not isinstance(every, int)
+    if in_seconds:
+        every = positive("every", every)
+        if every > duration * (1.0 + 1e-9):
+            raise InputError(f"every = {every:g} s: longer than the duration of {duration:g} s")
+    elif every < 1:
+        raise InputError(f"every = {every}: must be at least 1 step")
+    if dt is None:
+        target = DEFAULT_FRACTION * critical
+        if not math.isfinite(target):
+            raise InputError("dt: nothing limits the step of this case (no stiffness); give dt")
+        span = float(every) if in_seconds else duration
+        count = max(1, math.ceil(span / target * (1.0 - 1e-12)))
+        dt = span / count
+        per_sample = count if in_seconds else int(every)
+    else:
+        dt = positive("dt", dt)
+        if dt > duration * (1.0 + 1e-9):
+            raise InputError(f"dt = {dt:g} s: longer than the duration of {duration:g} s")
+        per_sample = max(1, round(every / dt)) if in_seconds else int(every)
+        if in_seconds and abs(per_sample * dt - every) > 1e-9 * every:
+            near = every / max(1, math.ceil(every / dt))
+            raise InputError(
+                f"every = {every:g} s is not a whole number of steps of dt = {dt:g} s; "
+                f"use dt = {near:.6g}, or leave dt out"
+            )
+    steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
+    return Schedule(dt, steps, per_sample)
+
+
+def check_memory(samples: int, nodes: int, supported: int) -> None:
+    """Refuse an output that would not fit in memory, before anything is computed."""
+    needed = 8.0 * samples * (6 * nodes + supported + 6)
+    try:
+        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return
+    if needed > 0.8 * available:
+        raise InputError(
+            f"{samples} samples of {nodes} nodes need {needed / 2**30:.1f} GiB of "
+            f"{available / 2**30:.1f} GiB: raise every"
+        )

@@ -1,0 +1,43 @@
+"""Foldyn's exceptions and warnings.
+
+Bad input raises `InputError` (the command line exits with 2, nothing written); a computation
+that fails raises `ComputationError` (exit status 1) and carries what was computed until then.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class FoldynError(Exception):
+    """Base of everything that Foldyn raises on purpose."""
+
+
+class InputError(FoldynError, ValueError):
+    """The input cannot be used; the message names the field, the value and the remedy."""
+
+
+class ComputationError(FoldynError, RuntimeError):
+    """A computation failed.
+
+    Attributes
+    ----------
+    partial : xarray.Dataset or None
+        What was computed until the failure.
+    """
+
+    def __init__(self, message: str, partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+class InstabilityError(ComputationError):
+    """A motion grew without bound, became NaN, or left the range of its time step."""
+
+
+class PenetrationError(ComputationError):
+    """A hinge's dihedral jumped by more than pi: panel passed through panel."""
+
+
+class FoldynWarning(UserWarning):
+    """Something works, but perhaps not as intended."""

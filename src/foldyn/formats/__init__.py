@@ -1,0 +1,8 @@
+"""Pattern files: one module a format, found by extension through a registry."""
+
+from __future__ import annotations
+
+from foldyn.formats.files import read_pattern, write_pattern
+from foldyn.formats.registry import FORMATS, Format
+
+__all__ = ["FORMATS", "Format", "read_pattern", "write_pattern"]

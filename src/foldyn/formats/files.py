@@ -1,0 +1,114 @@
+"""Read and write pattern files of any registered format."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from foldyn.errors import InputError
+from foldyn.formats.registry import FORMATS, Format
+from foldyn.patterns import Pattern
+
+
+def read_pattern(path: str | os.PathLike[str]) -> Pattern:
+    """Read a pattern from a file, whose extension tells the format.
+
+    Parameters
+    ----------
+    path : path-like
+        The file, for example "crane.fold"; `FORMATS` lists the extensions.
+
+    Returns
+    -------
+    Pattern
+        With coordinates in meters.
+
+    Raises
+    ------
+    InputError
+        No such file, an unknown extension, or content that is not a sound pattern; the message
+        names the file and the field.
+    """
+    file = _as_path(path)
+    fmt = _format_of(file)
+    if fmt.read is None:
+        raise InputError(f"{file}: {fmt.name} files can be written but not read.")
+    try:
+        text = file.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file; check the path.") from None
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{file}: is not a text file in UTF-8; check that it is {fmt.name}."
+        ) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read: {_reason(error)}.") from None
+    try:
+        return fmt.read(text)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
+    """Write a pattern to a file, whose extension tells the format.
+
+    The whole text is made first and the file put in place in one step, so that a failure
+    leaves what was there before.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to make or to replace; its directory must exist.
+    pattern : Pattern
+        What to write.
+
+    Raises
+    ------
+    InputError
+        An unknown extension (nothing is touched then), or the file cannot be written.
+    """
+    file = _as_path(path)
+    fmt = _format_of(file)
+    if fmt.write is None:
+        raise InputError(f"{file}: {fmt.name} files can be read but not written.")
+    if not isinstance(pattern, Pattern):
+        raise InputError(f"pattern = {pattern!r}: give a Pattern to write.")
+    content = fmt.write(pattern).encode()
+    part = None
+    try:
+        # Through a link to the file it stands for, so that the link stays one.
+        target = Path(os.path.realpath(file))
+        part = target.with_name(f".{target.name}.{os.getpid()}.part")
+        part.write_bytes(content)
+        part.replace(target)
+    except (OSError, ValueError) as error:
+        with suppress(OSError, ValueError):
+            if part is not None:
+                part.unlink()
+        raise InputError(
+            f"{file}: cannot be written: {_reason(error)}; check that its directory exists and "
+            "may be written to."
+        ) from None
+
+
+def _as_path(path: Any) -> Path:
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError(f"path = {path!r}: give the path of a file.") from None
+
+
+def _format_of(file: Path) -> Format:
+    if os.path.isdir(file):
+        raise InputError(f"{file}: is a directory; name a pattern file in it.")
+    found = FORMATS.get(file.suffix.lower())
+    if found is None:
+        has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
+        raise InputError(f"{file}: {has}; known ones are {', '.join(sorted(FORMATS))}.")
+    return found
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)

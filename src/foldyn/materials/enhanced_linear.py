@@ -1,0 +1,121 @@
+"""Enhanced linear moment law of folds: linear, but stiffening to infinity as panels meet.
+
+With p = pi/theta1 below theta1 (mirrored above theta2 with p = pi/(2 pi - theta2)),
+M/k = (theta1 - theta0) + tan(p (theta - theta1)/2) / (p/2); linear between.
+Source: Liu and Paulino, Proc. R. Soc. A 473, 2017 (MERLIN).
+
+Where the rest angle theta0 lies beyond theta1 or theta2, the published law has a moment at
+rest. `rest="stress_free"` subtracts that moment (and the energy at rest), so that the pattern as
+drawn is in equilibrium; `rest="as_published"` keeps both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.materials.compiled import kernel, scalar
+from foldyn.materials.law import PARAMETERS, HingeLaw
+
+TWO_PI = 2.0 * math.pi
+
+
+@scalar
+def energy(theta, rest, theta1, theta2):
+    """Energy / k as published: not zero at rest where rest lies beyond theta1 or theta2."""
+    if theta < theta1:
+        p = math.pi / theta1
+        d = rest - theta1
+        lnc = math.log(math.cos(0.5 * p * (theta1 - theta)))
+        return 0.5 * d * d + d * (theta1 - theta) - 4.0 / (p * p) * lnc
+    if theta > theta2:
+        p = math.pi / (TWO_PI - theta2)
+        d = theta2 - rest
+        lnc = math.log(math.cos(0.5 * p * (theta - theta2)))
+        return 0.5 * d * d + d * (theta - theta2) - 4.0 / (p * p) * lnc
+    return 0.5 * (theta - rest) ** 2
+
+
+@scalar
+def moment(theta, rest, theta1, theta2):
+    """Moment / k as published."""
+    if theta < theta1:
+        half = 0.5 * math.pi / theta1
+        return theta1 - rest + math.tan(half * (theta - theta1)) / half
+    if theta > theta2:
+        half = 0.5 * math.pi / (TWO_PI - theta2)
+        return theta2 - rest + math.tan(half * (theta - theta2)) / half
+    return theta - rest
+
+
+@scalar
+def slope(theta, theta1, theta2):
+    """Slope / k: 1 between theta1 and theta2, 1/cos^2 beyond."""
+    if theta < theta1:
+        return 1.0 / math.cos(0.5 * math.pi / theta1 * (theta - theta1)) ** 2
+    if theta > theta2:
+        return 1.0 / math.cos(0.5 * math.pi / (TWO_PI - theta2) * (theta - theta2)) ** 2
+    return 1.0
+
+
+@kernel
+def _at_rest(rest, theta1, theta2):
+    out = np.empty((rest.size, 2))
+    for i in range(rest.size):
+        out[i, 0] = moment(rest[i], rest[i], theta1, theta2)
+        out[i, 1] = energy(rest[i], rest[i], theta1, theta2)
+    return out
+
+
+@dataclass(frozen=True)
+class EnhancedLinear(HingeLaw):
+    """Linear fold that locks as the panels meet.
+
+    Parameters
+    ----------
+    theta1, theta2 : float
+        Dihedrals (degrees) between which the law is linear, 0 < theta1 < theta2 < 360.
+    rest : {"stress_free", "as_published"}
+        Whether the law's moment at the rest angle is subtracted (see the module's text).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> law = EnhancedLinear(theta1=45, theta2=315)
+    >>> float(law.moment(np.pi / 2, rest=np.pi / 3).round(4))
+    0.5236
+    """
+
+    theta1: float = 45.0
+    theta2: float = 315.0
+    rest: Literal["stress_free", "as_published"] = "stress_free"
+    code: ClassVar[int] = 2
+    name: str = "enhanced"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.theta1 < self.theta2 < 360.0:
+            raise InputError(
+                f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "
+                "0 < theta1 < theta2 < 360 (degrees)"
+            )
+        if self.rest not in ("stress_free", "as_published"):
+            raise InputError(
+                f"EnhancedLinear: rest = {self.rest!r}: choose 'stress_free' or 'as_published'"
+            )
+
+    def parameters(self, rest: NDArray) -> NDArray:
+        """theta1, theta2 (rad), and the moment and energy at rest to subtract, per hinge."""
+        table = np.zeros((len(rest), PARAMETERS))
+        table[:, 0], table[:, 1] = math.radians(self.theta1), math.radians(self.theta2)
+        if self.rest == "stress_free":
+            table[:, 2:] = _at_rest(
+                np.ascontiguousarray(rest, float),
+                math.radians(self.theta1),
+                math.radians(self.theta2),
+            )
+        return table

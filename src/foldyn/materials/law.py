@@ -1,0 +1,84 @@
+"""What a scalar law is: the base classes of bar and hinge laws.
+
+A law is scaled: a bar law is per unit Young's modulus, a hinge law per unit stiffness, so the
+same law object serves every element of a structure. Compiled kernels never see these objects;
+they get `code`, an integer that selects the law in one compiled switch (`switch.py`), and for
+hinges four parameters per element.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+PARAMETERS = 4
+
+
+class Law(ABC):
+    """A scalar law with a name and the integer code of its compiled form."""
+
+    name: str
+    code: ClassVar[int]
+
+    @property
+    def addresses(self) -> tuple[int, int, int] | None:
+        """Addresses of the compiled (energy, response, slope) of a user's law; else None."""
+        return None
+
+
+class BarLaw(Law):
+    """Axial law of a bar in terms of the stretch lambda = l / L, per unit Young's modulus."""
+
+    def energy(self, stretch: ArrayLike) -> NDArray:
+        """Energy density W / E_y at each stretch."""
+        return self._table(stretch)[0]
+
+    def stress(self, stretch: ArrayLike) -> NDArray:
+        """Second Piola-Kirchhoff stress S / E_y at each stretch."""
+        return self._table(stretch)[1]
+
+    def slope(self, stretch: ArrayLike) -> NDArray:
+        """Slope dS/dE / E_y, E = (lambda^2 - 1)/2 the Green strain, at each stretch."""
+        return self._table(stretch)[2]
+
+    def _table(self, stretch: ArrayLike) -> NDArray:
+        from foldyn.materials import switch  # it imports the laws that subclass this
+
+        lam = np.asarray(stretch, float)
+        address = np.array(self.addresses or (0, 0, 0), np.int64)
+        return switch.bar_table(self.code, lam.ravel() - 1.0, address).reshape((3, *lam.shape))
+
+
+class HingeLaw(Law):
+    """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
+
+    def parameters(self, rest: NDArray) -> NDArray:
+        """Parameters of the compiled form, shape (n, 4), for hinges with rest angles (n,)."""
+        return np.zeros((len(rest), PARAMETERS))
+
+    def energy(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        """Energy / k (rad^2) at dihedral `theta` with rest dihedral `rest` (rad)."""
+        return self._table(theta, rest)[0]
+
+    def moment(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        """Moment / k (rad), positive where it resists an opening (theta above rest)."""
+        return self._table(theta, rest)[1]
+
+    def slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        """Slope of the moment / k at dihedral `theta`."""
+        return self._table(theta, rest)[2]
+
+    def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        from foldyn.materials import switch
+
+        theta, rest = np.broadcast_arrays(np.asarray(theta, float), np.asarray(rest, float))
+        address = np.array(self.addresses or (0, 0, 0), np.int64)
+        flat_rest = np.ascontiguousarray(rest.ravel())
+        parameters = np.ascontiguousarray(self.parameters(flat_rest))
+        flat = switch.hinge_table(
+            self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
+        )
+        return flat.reshape((3, *theta.shape))

@@ -1,0 +1,56 @@
+"""Linear laws: a bar linear in Green strain (St. Venant-Kirchhoff), a hinge linear in angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from foldyn.materials.compiled import scalar
+from foldyn.materials.law import BarLaw, HingeLaw
+
+
+@scalar
+def bar_energy(e):
+    """W / E_y = E^2 / 2 with E = e + e^2/2."""
+    green = e + 0.5 * e * e
+    return 0.5 * green * green
+
+
+@scalar
+def bar_stress(e):
+    """S / E_y = E."""
+    return e + 0.5 * e * e
+
+
+@scalar
+def bar_slope(e):
+    """(dS/dE) / E_y."""
+    return 1.0
+
+
+@scalar
+def hinge_energy(theta, rest):
+    """Energy / k."""
+    return 0.5 * (theta - rest) ** 2
+
+
+@scalar
+def hinge_moment(theta, rest):
+    """Moment / k."""
+    return theta - rest
+
+
+@dataclass(frozen=True)
+class LinearBar(BarLaw):
+    """Stress proportional to Green strain."""
+
+    code: ClassVar[int] = 0
+    name: str = "linear"
+
+
+@dataclass(frozen=True)
+class LinearHinge(HingeLaw):
+    """Moment proportional to the change of the dihedral."""
+
+    code: ClassVar[int] = 0
+    name: str = "linear"

@@ -1,0 +1,41 @@
+"""Ogden law with exponents (5, 1), as in MERLIN2.
+
+S / E_y = (lambda^3 - 1/lambda) / 4,  W / E_y = [(lambda^5 - 1)/5 - (lambda - 1)] / 4
+(Liu and Paulino, Proc. R. Soc. A 473, 2017), written in e = lambda - 1 so that nothing cancels
+near e = 0: the plain formulas lose five digits of the energy of a nearly unstretched bar.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from foldyn.materials.compiled import scalar
+from foldyn.materials.law import BarLaw
+
+
+@scalar
+def energy(e):
+    """W / E_y."""
+    return 0.25 * e * e * (2.0 + e * (2.0 + e * (1.0 + 0.2 * e)))
+
+
+@scalar
+def stress(e):
+    """S / E_y."""
+    return 0.25 * e * (4.0 + e * (6.0 + e * (4.0 + e))) / (1.0 + e)
+
+
+@scalar
+def slope(e):
+    """(dS/dE) / E_y = (3 lambda + lambda^-3) / 4."""
+    stretch = 1.0 + e
+    return 0.25 * (3.0 * stretch + 1.0 / (stretch * stretch * stretch))
+
+
+@dataclass(frozen=True)
+class Ogden(BarLaw):
+    """Hyperelastic bar law that stiffens in tension and softens in compression (MERLIN2)."""
+
+    code: ClassVar[int] = 1
+    name: str = "ogden"

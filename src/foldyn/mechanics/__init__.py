@@ -1,0 +1,20 @@
+"""Compiled mechanics of bars and hinges: energy, internal force, tangent."""
+
+from foldyn.mechanics.energy import angles, strain_energies
+from foldyn.mechanics.force import Workspace, internal_force, workspace
+from foldyn.mechanics.model import BarsHinges, Hinges, build
+from foldyn.mechanics.tangent import Sparsity, sparsity, tangent
+
+__all__ = [
+    "BarsHinges",
+    "Hinges",
+    "Sparsity",
+    "Workspace",
+    "angles",
+    "build",
+    "internal_force",
+    "sparsity",
+    "strain_energies",
+    "tangent",
+    "workspace",
+]

@@ -1,0 +1,153 @@
+"""The dihedral angle of four points, its gradient and its second derivative, in closed form.
+
+Points j, k span the axis, i and l are the wings. With b = x_k - x_j, r = x_i - x_j,
+s = x_k - x_l, m = r x b and n = b x s,
+
+    theta = atan2(|b| n.r, m.n) mod 2 pi,      theta = pi when flat.
+
+Gradient: g_i = |b| m/|m|^2, g_l = -|b| n/|n|^2, g_j = (rho-1) g_i - sigma g_l and
+g_k = (sigma-1) g_l - rho g_i, with rho = r.b/|b|^2 and sigma = s.b/|b|^2 (Liu and Paulino,
+Proc. R. Soc. A 473, 2017, appendix; the second derivative follows by differentiation).
+"""
+
+from __future__ import annotations
+
+import math
+
+from foldyn.materials.compiled import kernel, scalar
+
+PI = math.pi
+TAN_PI_8 = math.sqrt(2.0) - 1.0
+
+
+@scalar
+def branch_free_atan2(y, x):
+    """atan2(y, x) without branches, so that loops over it vectorize; exact to 2 ulp.
+
+    |t| <= tan(pi/8) after two reductions; there atan t = t + t^3 Q(t^2) with Q the Chebyshev fit
+    of degree 10 (error 3e-17). atan2(0, 0) is nan.
+    """
+    ax, ay = abs(x), abs(y)
+    steep = ay > ax
+    low = ax if steep else ay
+    high = ay if steep else ax
+    upper = low > TAN_PI_8 * high
+    t = (low - high if upper else low) / (low + high if upper else high)
+    u = t * t
+    q = -0.01917688711906226 * u + 0.03923165829558719
+    q = q * u - 0.0508544973794026
+    q = q * u + 0.0585814891280221
+    q = q * u - 0.06664511447381948
+    q = q * u + 0.07692183190826087
+    q = q * u - 0.09090904578123903
+    q = q * u + 0.11111111015256361
+    q = q * u - 0.14285714284666542
+    q = q * u + 0.1999999999999552
+    q = q * u - 0.3333333333333333
+    angle = t + t * u * q
+    angle = angle + 0.25 * PI if upper else angle
+    angle = 0.5 * PI - angle if steep else angle
+    angle = PI - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
+
+@scalar
+def dihedral_gradient(jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz):
+    """Dihedral (rad, 0..2 pi) and its gradient with respect to the points j, k, i, l."""
+    bx, by, bz = kx - jx, ky - jy, kz - jz
+    rx, ry, rz = ix - jx, iy - jy, iz - jz
+    sx, sy, sz = kx - lx, ky - ly, kz - lz
+    mx, my, mz = ry * bz - rz * by, rz * bx - rx * bz, rx * by - ry * bx
+    nx, ny, nz = by * sz - bz * sy, bz * sx - bx * sz, bx * sy - by * sx
+    bb = bx * bx + by * by + bz * bz
+    mm = mx * mx + my * my + mz * mz
+    nn = nx * nx + ny * ny + nz * nz
+    length = math.sqrt(bb)
+    # minus both arguments plus pi moves the cut of atan2 from flat to fully folded
+    theta = PI + branch_free_atan2(
+        -length * (rx * nx + ry * ny + rz * nz), -(mx * nx + my * ny + mz * nz)
+    )
+    once = 1.0 / (bb * mm * nn)
+    fi = length * (bb * nn * once)
+    fl = -length * (bb * mm * once)
+    per_bb = mm * nn * once
+    rho = (rx * bx + ry * by + rz * bz) * per_bb
+    sigma = (sx * bx + sy * by + sz * bz) * per_bb
+    gix, giy, giz = fi * mx, fi * my, fi * mz
+    glx, gly, glz = fl * nx, fl * ny, fl * nz
+    return (
+        theta,
+        (rho - 1.0) * gix - sigma * glx,
+        (rho - 1.0) * giy - sigma * gly,
+        (rho - 1.0) * giz - sigma * glz,
+        (sigma - 1.0) * glx - rho * gix,
+        (sigma - 1.0) * gly - rho * giy,
+        (sigma - 1.0) * glz - rho * giz,
+        gix,
+        giy,
+        giz,
+        glx,
+        gly,
+        glz,
+    )
+
+
+@scalar
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@scalar
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@scalar
+def _difference(points, p, q):
+    return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
+
+
+@kernel
+def add_hessian(points, gradient, moment, block):
+    """Add moment times the second derivative of the dihedral to `block`.
+
+    points and gradient are (4, 3), in the order j, k, i, l; block is (4, 3, 4, 3). Only four 3x3
+    blocks are formulas; the others follow from symmetry and translation invariance.
+    """
+    b, r, s = _difference(points, 1, 0), _difference(points, 2, 0), _difference(points, 1, 3)
+    m, n = _cross(r, b), _cross(b, s)
+    bb, mm, nn = _dot(b, b), _dot(m, m), _dot(n, n)
+    length = math.sqrt(bb)
+    rho, sigma = _dot(r, b) / bb, _dot(s, b) / bb
+    bm, rm = _cross(b, m), _cross(r, m)
+    bn, sn = _cross(b, n), _cross(s, n)
+    cm, cn = moment * length / (mm * mm), moment * length / (nn * nn)
+    dm, dn = moment / (length * mm), moment / (length * nn)
+    for p in range(3):
+        for q in range(3):
+            ii = -cm * (m[p] * bm[q] + bm[p] * m[q])
+            ik = cm * (m[p] * rm[q] + rm[p] * m[q]) + dm * m[p] * b[q]
+            ij = -ii - ik
+            ll = cn * (n[p] * bn[q] + bn[p] * n[q])
+            lj = dn * n[p] * b[q] - cn * (n[p] * sn[q] + sn[p] * n[q])
+            lk = -lj - ll
+            rho_k = moment * (r[q] - 2.0 * rho * b[q]) / bb
+            sigma_k = moment * (b[q] + s[q] - 2.0 * sigma * b[q]) / bb
+            gi, gl = gradient[2, p], gradient[3, p]
+            jk = gi * rho_k + (rho - 1.0) * ik - gl * sigma_k - sigma * lk
+            block[2, p, 2, q] += ii
+            block[3, p, 3, q] += ll
+            block[2, p, 0, q] += ij
+            block[0, q, 2, p] += ij
+            block[2, p, 1, q] += ik
+            block[1, q, 2, p] += ik
+            block[3, p, 0, q] += lj
+            block[0, q, 3, p] += lj
+            block[3, p, 1, q] += lk
+            block[1, q, 3, p] += lk
+            block[0, p, 1, q] += jk
+            block[1, q, 0, p] += jk
+            # each column of blocks sums to zero (translation)
+            block[0, q, 0, p] -= jk
+            block[0, p, 0, q] -= ij + lj
+            block[1, p, 1, q] -= jk + ik + lk

@@ -1,0 +1,97 @@
+"""Bars and hinges as plain arrays: what the compiled kernels work on.
+
+Elements stand sorted in runs of one law, so that the choice of the law is made once per block of
+elements, and within a run by their lowest node, so that neighbors in memory are neighbors in
+space.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.materials.law import BarLaw, HingeLaw
+
+BLOCK = 64
+
+
+class BarsHinges(NamedTuple):
+    """Arrays of a bar-and-hinge model, n nodes, nb bars, nh hinges (SI).
+
+    A run is a row (start, end, law code, row of `addresses`).
+    """
+
+    rest: NDArray  # (n, 3) rest position of the nodes, m
+    bars: NDArray  # (nb, 2) int32
+    bar_vector: NDArray  # (nb, 3) rest vector from the first node to the second, m
+    bar_per_length2: NDArray  # (nb,) 1 / L^2
+    bar_stiffness: NDArray  # (nb,) E A / L, N/m
+    bar_runs: NDArray  # (rb, 4) int64
+    hinges: NDArray  # (nh, 4) int32: axis j, k, wings i, l
+    hinge_stiffness: NDArray  # (nh,) N m/rad, whole hinge
+    hinge_rest: NDArray  # (nh,) rad
+    hinge_parameters: NDArray  # (nh, 4)
+    hinge_group: NDArray  # (nh,) int64: energies are summed per group
+    hinge_runs: NDArray  # (rh, 4) int64
+    addresses: NDArray  # (na, 3) int64: compiled user laws (energy, response, slope)
+
+
+class Hinges(NamedTuple):
+    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and their law."""
+
+    nodes: NDArray
+    stiffness: NDArray
+    rest: NDArray
+    law: HingeLaw
+
+
+def _order(nodes: NDArray) -> NDArray:
+    return np.argsort(nodes.min(axis=1), kind="stable") if len(nodes) else np.zeros(0, int)
+
+
+def build(
+    rest: NDArray, bars: NDArray, stiffness: NDArray, law: BarLaw, groups: tuple[Hinges, ...]
+) -> BarsHinges:
+    """Sort and pack bars (nb, 2) with stiffness E A / L and groups of hinges into a model."""
+    addresses: list[tuple[int, int, int]] = []
+
+    def run(start: int, end: int, of: BarLaw | HingeLaw) -> tuple[int, int, int, int]:
+        if of.addresses is None:
+            return start, end, of.code, 0
+        addresses.append(of.addresses)
+        return start, end, of.code, len(addresses) - 1
+
+    order = _order(bars)
+    bars = np.ascontiguousarray(bars[order], np.int32).reshape(-1, 2)
+    vector = rest[bars[:, 1]] - rest[bars[:, 0]]
+    bar_runs = [run(0, len(bars), law)]
+
+    hinge_runs, start, sorted_groups = [], 0, []
+    for number, group in enumerate(groups):
+        order_g = _order(group.nodes)
+        sorted_groups.append((number, group, order_g))
+        hinge_runs.append(run(start, start + len(order_g), group.law))
+        start += len(order_g)
+
+    def gather(column, shape, kind=float):
+        parts = [np.asarray(column(k, g))[o] for k, g, o in sorted_groups]
+        joined = np.concatenate(parts) if parts else np.zeros(0)
+        return np.ascontiguousarray(joined.reshape(shape), kind)
+
+    return BarsHinges(
+        rest=np.ascontiguousarray(rest, float),
+        bars=bars,
+        bar_vector=np.ascontiguousarray(vector),
+        bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),
+        bar_stiffness=np.ascontiguousarray(stiffness[order], float),
+        bar_runs=np.array(bar_runs, np.int64).reshape(-1, 4),
+        hinges=gather(lambda k, g: g.nodes, (-1, 4), np.int32),
+        hinge_stiffness=gather(lambda k, g: g.stiffness, -1),
+        hinge_rest=gather(lambda k, g: g.rest, -1),
+        hinge_parameters=gather(lambda k, g: g.law.parameters(g.rest), (-1, 4)),
+        hinge_group=gather(lambda k, g: np.full(len(g.rest), k), -1, np.int64),
+        hinge_runs=np.array(hinge_runs, np.int64).reshape(-1, 4),
+        addresses=np.array(addresses or [(0, 0, 0)], np.int64),
+    )

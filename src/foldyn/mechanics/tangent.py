@@ -1,0 +1,117 @@
+"""Tangent stiffness of bars and hinges, assembled into 3x3 blocks of a precomputed pattern."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.materials.compiled import kernel
+from foldyn.materials.switch import bar_slope, bar_stress, hinge_moment, hinge_slope
+from foldyn.mechanics.dihedral import add_hessian
+from foldyn.mechanics.energy import bar_extension, hinge_dihedral
+from foldyn.mechanics.model import BarsHinges
+
+
+class Sparsity(NamedTuple):
+    """Where each element's 3x3 blocks stand in the block sparse matrix (rows of node pairs)."""
+
+    indptr: NDArray  # (n + 1,)
+    indices: NDArray  # (nnz,)
+    bar_slots: NDArray  # (nb, 2, 2)
+    hinge_slots: NDArray  # (nh, 4, 4)
+
+
+def sparsity(model: BarsHinges) -> Sparsity:
+    """Block pattern of the tangent; every node has a diagonal block."""
+    n = len(model.rest)
+    keys = [np.arange(n) * (n + 1)]  # row * n + column
+    for nodes in (model.bars, model.hinges):
+        wide = nodes.astype(np.int64)
+        keys.append((wide[:, :, None] * n + wide[:, None, :]).ravel())
+    found, inverse = np.unique(np.concatenate(keys), return_inverse=True)
+    nb = len(model.bars)
+    slots = inverse[n:]
+    return Sparsity(
+        np.searchsorted(found // n, np.arange(n + 1)).astype(np.int32),
+        (found % n).astype(np.int32),
+        np.ascontiguousarray(slots[: 4 * nb].reshape(-1, 2, 2)),
+        np.ascontiguousarray(slots[4 * nb :].reshape(-1, 4, 4)),
+    )
+
+
+@kernel
+def _add_bars(model, u, slots, data):
+    d = np.empty(3)
+    for run in range(model.bar_runs.shape[0]):
+        code = model.bar_runs[run, 2]
+        stress_at = model.addresses[model.bar_runs[run, 3], 1]
+        slope_at = model.addresses[model.bar_runs[run, 3], 2]
+        for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
+            a, b = model.bars[e, 0], model.bars[e, 1]
+            for c in range(3):
+                d[c] = model.bar_vector[e, c] + u[b, c] - u[a, c]
+            x = bar_extension(model, u, e)
+            axial = model.bar_stiffness[e] * bar_stress(code, x, stress_at)
+            along = model.bar_stiffness[e] * bar_slope(code, x, slope_at)
+            along *= model.bar_per_length2[e]
+            for p in range(3):
+                for q in range(3):
+                    value = along * d[p] * d[q]
+                    if p == q:
+                        value += axial
+                    data[slots[e, 0, 0], p, q] += value
+                    data[slots[e, 1, 1], p, q] += value
+                    data[slots[e, 0, 1], p, q] -= value
+                    data[slots[e, 1, 0], p, q] -= value
+
+
+@kernel
+def _add_hinges(model, u, slots, data, floor):
+    points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
+    flat = gradient.reshape(12)
+    p = model.hinge_parameters
+    for run in range(model.hinge_runs.shape[0]):
+        code = model.hinge_runs[run, 2]
+        moment_at = model.addresses[model.hinge_runs[run, 3], 1]
+        slope_at = model.addresses[model.hinge_runs[run, 3], 2]
+        for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
+            for v in range(4):
+                for c in range(3):
+                    points[v, c] = model.rest[model.hinges[e, v], c] + u[model.hinges[e, v], c]
+            found = hinge_dihedral(model, u, e)
+            for c in range(12):
+                flat[c] = found[1 + c]
+            theta, rest, k = found[0], model.hinge_rest[e], model.hinge_stiffness[e]
+            moment = k * hinge_moment(
+                code, theta, rest, p[e, 0], p[e, 1], p[e, 2], p[e, 3], moment_at
+            )
+            slope = hinge_slope(code, theta, rest, p[e, 0], p[e, 1], slope_at)
+            slope = k * max(slope, floor)
+            block[:] = 0.0
+            add_hessian(points, gradient, moment, block)
+            for v in range(4):
+                for w in range(4):
+                    slot = slots[e, v, w]
+                    for a in range(3):
+                        for b in range(3):
+                            data[slot, a, b] += (
+                                block[v, a, w, b] + slope * gradient[v, a] * gradient[w, b]
+                            )
+
+
+def tangent(
+    model: BarsHinges, pattern: Sparsity, u: NDArray, floor: float = -np.inf
+) -> sparse.bsr_array:
+    """Tangent stiffness (3n, 3n), N/m, at displacement u (n, 3), as 3x3 blocks.
+
+    floor : hinge slopes per unit stiffness below it are raised to it. The default changes
+    nothing; 1.0 bounds the stiffness of laws that are soft at rest from above.
+    """
+    n = len(model.rest)
+    data = np.zeros((len(pattern.indices), 3, 3))
+    _add_bars(model, u, pattern.bar_slots, data)
+    _add_hinges(model, u, pattern.hinge_slots, data, floor)
+    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))

@@ -1,0 +1,163 @@
+"""Geometry of faces: areas, normals, planarity and dihedrals."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns.topology import Faces
+
+# Area over squared diameter (and edge length over diameter) below which a face has collapsed:
+# far above rounding (1e-16), far below any panel that can be made.
+_DEGENERATE = 1e-10
+
+
+class FaceGeometry(NamedTuple):
+    """Shape of each face.
+
+    Attributes
+    ----------
+    areas : ndarray, shape (m,)
+        Area (m2): of a face that is not flat, of its projection along the normal.
+    normals : ndarray, shape (m, 3)
+        Unit normals towards the front (Newell's, so any polygon has one).
+    planarity : ndarray, shape (m,)
+        Largest distance of a corner from the mean plane, over the face's diameter.
+    """
+
+    areas: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    planarity: NDArray[np.float64]
+
+
+def face_geometry(vertices: NDArray[np.float64], faces: Faces) -> FaceGeometry:
+    """Areas, normals and planarity of faces.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m).
+    faces : tuple of tuple of int
+        Faces as vertex numbers.
+
+    Returns
+    -------
+    FaceGeometry
+        One row a face.
+
+    Raises
+    ------
+    InputError
+        A face without area, with two corners in one place, or whose outline crosses itself.
+    """
+    count = len(faces)
+    areas, planarity, shortest = np.empty(count), np.empty(count), np.empty(count)
+    diameter, normals = np.empty(count), np.empty((count, 3))
+    crossed = np.zeros(count, dtype=bool)
+    sizes = np.array([len(face) for face in faces])
+    for size in np.unique(sizes):
+        which = np.flatnonzero(sizes == size)
+        corners = vertices[np.array([faces[f] for f in which])]
+        # About the mean corner, so that a pattern far from the origin loses nothing.
+        corners = corners - corners.mean(axis=1, keepdims=True)
+        newell = 0.5 * np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
+        areas[which] = np.linalg.norm(newell, axis=1)
+        # sqrt of the smallest normal number: an area of zero must not divide by zero here.
+        normals[which] = newell / np.maximum(areas[which], 1e-154)[:, None]
+        diameter[which] = 0.0
+        shortest[which] = np.inf
+        for shift in range(1, size // 2 + 1):
+            distance = np.linalg.norm(np.roll(corners, -shift, axis=1) - corners, axis=2)
+            diameter[which] = np.maximum(diameter[which], distance.max(axis=1))
+            shortest[which] = np.minimum(shortest[which], distance.min(axis=1))
+        height = np.einsum("fvc,fc->fv", corners, normals[which])
+        planarity[which] = np.abs(height).max(axis=1)
+        crossed[which] = _crosses_itself(corners, normals[which], diameter[which])
+    bad = np.flatnonzero(~(shortest > _DEGENERATE * diameter))
+    if len(bad):
+        f = int(bad[0])
+        raise InputError(
+            f"faces[{f}] = {list(faces[f])}: two of its corners lie in the same place "
+            f"({shortest[f]:.3g} m apart in a face of {diameter[f]:.3g} m); merge them into one "
+            "vertex or move one."
+        )
+    bad = np.flatnonzero(~(areas > _DEGENERATE * diameter**2))
+    if len(bad):
+        f = int(bad[0])
+        raise InputError(
+            f"faces[{f}] = {list(faces[f])}: has no area ({areas[f]:.3g} m2 in a face of "
+            f"{diameter[f]:.3g} m): its corners lie on a line or are not listed in order around "
+            "it; reorder them or leave the face out."
+        )
+    bad = np.flatnonzero(crossed)
+    if len(bad):
+        f = int(bad[0])
+        raise InputError(
+            f"faces[{f}] = {list(faces[f])}: its outline crosses itself; list its corners in order "
+            "around it."
+        )
+    return FaceGeometry(areas, normals, planarity / diameter)
+
+
+def _crosses_itself(
+    corners: NDArray[np.float64], normals: NDArray[np.float64], diameter: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether two edges of a face, seen along its normal, cross (touching does not count)."""
+    size = corners.shape[1]
+    after = np.roll(corners, -1, axis=1)
+    least = _DEGENERATE * diameter[:, None] ** 2
+    result = np.zeros(len(corners), dtype=bool)
+
+    def side(
+        a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
+    ) -> NDArray[np.int8]:
+        turn = np.einsum("fvc,fc->fv", np.cross(b - a, c - a), normals)
+        return np.where(np.abs(turn) > least, np.sign(turn), 0).astype(np.int8)
+
+    for shift in range(2, size // 2 + 1):
+        other, other_after = np.roll(corners, -shift, axis=1), np.roll(after, -shift, axis=1)
+        parted = side(corners, after, other) * side(corners, after, other_after) < 0
+        parts = side(other, other_after, corners) * side(other, other_after, after) < 0
+        result |= (parted & parts).any(axis=1)
+    return result
+
+
+def crease_dihedrals(
+    vertices: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    creases: NDArray[np.int64],
+    crease_faces: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Dihedral of each crease, by `atan2` of the two normals about the crease.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m).
+    normals : ndarray, shape (m, 3)
+        Unit normals of the faces towards the front.
+    creases, crease_faces : ndarray of int, shape (nc, 2)
+        As in `Topology`.
+
+    Returns
+    -------
+    dihedral : ndarray, shape (nc,)
+        Radians in [0, 2 pi]: pi when flat, below on a valley, above on a mountain.
+    closed : ndarray of bool, shape (nc,)
+        True where the panels coincide to rounding, so that the geometry cannot tell 0
+        (reported) from 2 pi.
+    """
+    axis = vertices[creases[:, 1]] - vertices[creases[:, 0]]
+    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    front, back = normals[crease_faces[:, 0]], normals[crease_faces[:, 1]]
+    # Normals of faces that are not flat may lean along the crease: only their parts across count.
+    front = front - np.einsum("ij,ij->i", front, axis)[:, None] * axis
+    back = back - np.einsum("ij,ij->i", back, axis)[:, None] * axis
+    sine = np.einsum("ij,ij->i", np.cross(front, back), axis)
+    cosine = np.einsum("ij,ij->i", front, back)
+    closed = (np.abs(sine) < 1e-12 * np.abs(cosine)) & (cosine < 0)
+    dihedral = np.where(closed, 0.0, np.pi + np.arctan2(sine, cosine))
+    return dihedral, closed

@@ -1,0 +1,267 @@
+"""`Pattern`: the geometry of an origami structure at rest."""
+
+from __future__ import annotations
+
+import operator
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.patterns.geometry import crease_dihedrals, face_geometry
+from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
+
+_FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
+_CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
+_LETTERS = ("M", "V", "F", "U")
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Pattern:
+    """Vertices, panels and creases of an origami structure at rest, flat or folded.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3) or (n, 2)
+        Coordinates (m); two columns mean z = 0. Stored read-only with three.
+    faces : sequence of sequences of int
+        Panels of any number of corners, each as vertex numbers in order around it,
+        counter-clockwise seen from the front. The winding is made consistent: in each
+        connected part the lowest-numbered face decides where the front is.
+    assignments : mapping, sequence or None
+        "M" (mountain), "V" (valley), "F" (flat) or "U" (unassigned), either for each crease in
+        the order of `creases` or as a mapping from vertex pairs, {(a, b): "M"}. A mapping may
+        also hold "B" for boundary edges; creases that it leaves out, and all of them for None,
+        get the letter of their dihedral.
+    name : str
+        What to call the pattern.
+
+    Attributes
+    ----------
+    assignments : tuple of str
+        The letter of each crease.
+    flipped : tuple of bool
+        For each face, whether its winding was reversed. A reversed face keeps its first
+        vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
+    edges, creases, boundary : ndarray of int, shape (m, 2)
+        All edges, those shared by two faces, and those of one face, as (low, high) vertex
+        pairs in lexicographic order.
+    crease_faces : ndarray of int, shape (nc, 2)
+        The face that runs along the crease from low to high, and the one from high to low.
+    dihedrals : ndarray, shape (nc,)
+        Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
+        pi when flat, below pi on a valley, above on a mountain. Where panels coincide the
+        letter decides between 0 and 2 pi (0 without one).
+    face_areas : ndarray, shape (m,)
+        Areas (m2).
+    face_normals : ndarray, shape (m, 3)
+        Unit normals towards the front.
+    face_planarity : ndarray, shape (m,)
+        Largest distance of a corner from the face's mean plane over the face's diameter.
+    size : float
+        Diagonal of the bounding box of all vertices (m).
+
+    Raises
+    ------
+    InputError
+        Bad vertices, faces or assignments; an edge of more than two faces; a one-sided surface.
+
+    Warns
+    -----
+    FoldynWarning
+        A given "M" or "V" contradicts the geometry by more than 1e-3 rad.
+
+    Notes
+    -----
+    A vertex that no face uses is kept.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: tuple[tuple[int, ...], ...]
+    assignments: tuple[str, ...]
+    name: str
+    flipped: tuple[bool, ...] = field(init=False)
+    edges: NDArray[np.int64] = field(init=False)
+    creases: NDArray[np.int64] = field(init=False)
+    boundary: NDArray[np.int64] = field(init=False)
+    crease_faces: NDArray[np.int64] = field(init=False)
+    dihedrals: NDArray[np.float64] = field(init=False)
+    face_areas: NDArray[np.float64] = field(init=False)
+    face_normals: NDArray[np.float64] = field(init=False)
+    face_planarity: NDArray[np.float64] = field(init=False)
+    size: float = field(init=False)
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: Sequence[Sequence[int]] | NDArray[np.integer],
+        assignments: Mapping[tuple[int, int], str] | Sequence[str] | None = None,
+        name: str = "",
+    ) -> None:
+        if not isinstance(name, str):
+            raise InputError(f"name = {name!r}: give a string.")
+        points = _checked_vertices(vertices)
+        topology = build_topology(checked_faces(faces, len(points)), len(points))
+        geometry = face_geometry(points, topology.faces)
+        dihedrals, closed = crease_dihedrals(
+            points, geometry.normals, topology.creases, topology.crease_faces
+        )
+        given = _given_letters(assignments, topology.creases, topology.boundary)
+        dihedrals[closed & (given == "M")] = 2 * np.pi
+        _warn_of_contradictions(given, topology.creases, dihedrals)
+        values: dict[str, Any] = {
+            "vertices": points,
+            "faces": topology.faces,
+            "assignments": tuple(np.where(given == "", _letters(dihedrals), given).tolist()),
+            "name": name,
+            "flipped": topology.flipped,
+            "edges": topology.edges,
+            "creases": topology.creases,
+            "boundary": topology.boundary,
+            "crease_faces": topology.crease_faces,
+            "dihedrals": dihedrals,
+            "face_areas": geometry.areas,
+            "face_normals": geometry.normals,
+            "face_planarity": geometry.planarity,
+            "size": float(np.linalg.norm(np.ptp(points, axis=0))),
+        }
+        for key, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, key, value)
+
+    def __repr__(self) -> str:
+        """One line: name and counts."""
+        label = f"{self.name!r}: " if self.name else ""
+        return (
+            f"<Pattern {label}{len(self.vertices)} vertices, {len(self.faces)} faces, "
+            f"{len(self.creases)} creases>"
+        )
+
+
+def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
+    try:
+        points = np.array(vertices)
+    except ValueError:
+        raise InputError(
+            "vertices: the rows have different lengths; give 3 coordinates for each vertex "
+            "(or 2, for z = 0)."
+        ) from None
+    if points.dtype.kind not in "iuf":
+        raise InputError("vertices: not all entries are real numbers; give coordinates in meters.")
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) < 3:
+        raise InputError(
+            f"vertices has shape {points.shape}: give at least 3 rows of 3 coordinates each "
+            "(or 2, for z = 0)."
+        )
+    if not np.isfinite(points).all():
+        v = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise InputError(
+            f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
+        )
+    result = np.zeros((len(points), 3))
+    result[:, : points.shape[1]] = points
+    return result
+
+
+def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
+    """Return the letter that the geometry gives each crease."""
+    return np.select([dihedrals < np.pi - _FLAT, dihedrals > np.pi + _FLAT], ["V", "M"], "F")
+
+
+def _given_letters(
+    assignments: Any, creases: NDArray[np.int64], boundary: NDArray[np.int64]
+) -> NDArray[np.str_]:
+    """Letter given for each crease, "" where there is none."""
+    given = np.full(len(creases), "", dtype="<U1")
+    if assignments is None:
+        return given
+    if isinstance(assignments, Mapping):
+        row, rim = edge_lookup(creases), edge_lookup(boundary)
+        before: dict[tuple[int, int], Any] = {}
+        for key, letter in assignments.items():
+            pair = _vertex_pair(key)
+            if before.setdefault(pair, letter) != letter:
+                raise InputError(
+                    f"assignments: edge {pair} is given both {before[pair]!r} and {letter!r}; "
+                    "give it once."
+                )
+            if pair in row:
+                given[row[pair]] = _checked_letter(letter, pair)
+            elif pair not in rim:
+                raise InputError(
+                    f"assignments: {pair} is not an edge of any face; name the two vertices of "
+                    "a crease."
+                )
+            elif letter != "B":
+                raise InputError(
+                    f'assignments: edge {pair} is {letter!r} but only one face has it; give "B" '
+                    "or leave it out."
+                )
+        return given
+    if not isinstance(assignments, Sequence | np.ndarray):
+        raise InputError(
+            f"assignments = {assignments!r}: give a mapping from vertex pairs, a letter for each "
+            "crease, or None."
+        )
+    if len(assignments) != len(creases):
+        raise InputError(
+            f"assignments has {len(assignments)} letters for {len(creases)} creases: give one for "
+            "each, or a mapping from vertex pairs."
+        )
+    for k, letter in enumerate(assignments):
+        given[k] = _checked_letter(letter, (int(creases[k, 0]), int(creases[k, 1])))
+    return given
+
+
+def _vertex_pair(key: Any) -> tuple[int, int]:
+    try:
+        if isinstance(key, str):
+            raise TypeError
+        a, b = (operator.index(v) for v in key)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"assignments: key {key!r} is not a pair of vertex numbers; write {{(0, 1): 'M'}}."
+        ) from None
+    return (a, b) if a < b else (b, a)
+
+
+def _checked_letter(letter: Any, pair: tuple[int, int]) -> str:
+    if letter in _LETTERS:
+        return str(letter)
+    remedy = 'give "M", "V", "F" or "U"'
+    if letter == "B":
+        raise InputError(
+            f'assignments: edge {pair} is "B" (boundary) but two faces share it; {remedy}.'
+        )
+    if letter in ("C", "J"):
+        what = "a cut" if letter == "C" else "a join of cut edges"
+        raise InputError(
+            f'assignments: edge {pair} is "{letter}" ({what}) but two faces share it; give the '
+            f"faces vertices of their own there, or {remedy}."
+        )
+    raise InputError(f"assignments: edge {pair} is {letter!r}; {remedy}.")
+
+
+def _warn_of_contradictions(
+    given: NDArray[np.str_], creases: NDArray[np.int64], dihedrals: NDArray[np.float64]
+) -> None:
+    wrong = np.flatnonzero(
+        ((given == "M") & (dihedrals < np.pi - _CONTRADICTION))
+        | ((given == "V") & (dihedrals > np.pi + _CONTRADICTION))
+    )
+    if len(wrong):
+        k = int(wrong[0])
+        a, b = creases[k].tolist()
+        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        warnings.warn(
+            f'assignments: crease ({a}, {b}){more} is given as "{given[k]}", but its dihedral '
+            f"is {np.degrees(dihedrals[k]):.1f} degrees seen from the front (valleys are below "
+            "180, mountains above): the letter is kept; turn the faces over or correct it.",
+            FoldynWarning,
+            stacklevel=3,
+        )

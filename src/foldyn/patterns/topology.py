@@ -1,0 +1,213 @@
+"""Faces as a graph: checked indices, edges, creases and a consistent winding."""
+
+from __future__ import annotations
+
+import operator
+from collections import deque
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+
+Faces = tuple[tuple[int, ...], ...]
+
+
+class Topology(NamedTuple):
+    """How the faces of a pattern hang together.
+
+    Attributes
+    ----------
+    faces : tuple of tuple of int
+        The faces, consistently wound.
+    flipped : tuple of bool
+        For each face, whether the winding given was reversed.
+    edges, creases, boundary : ndarray of int, shape (m, 2)
+        Vertex pairs (low, high) in lexicographic order: all edges, those of two faces, of one.
+    crease_faces : ndarray of int, shape (nc, 2)
+        For each crease the face that runs low to high and the face that runs high to low.
+    """
+
+    faces: Faces
+    flipped: tuple[bool, ...]
+    edges: NDArray[np.int64]
+    creases: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    crease_faces: NDArray[np.int64]
+
+
+def checked_faces(faces: Any, n_vertices: int) -> Faces:
+    """Faces as tuples of Python integers, each face checked on its own and against the others.
+
+    Parameters
+    ----------
+    faces : iterable of sequences of int
+        Vertex numbers of each face, in order around it.
+    n_vertices : int
+        Number of vertices the faces may refer to.
+
+    Returns
+    -------
+    tuple of tuple of int
+        The same faces.
+
+    Raises
+    ------
+    InputError
+        No face at all; a face that is not a sequence of integers, is too short, repeats a
+        vertex, refers to a vertex that does not exist, or has the vertices of another face.
+    """
+    if isinstance(faces, (str, bytes)) or not isinstance(faces, Iterable):
+        raise InputError(f"faces = {faces!r}: give a sequence of faces, each a sequence of ints.")
+    result: list[tuple[int, ...]] = []
+    seen: dict[tuple[int, ...], int] = {}
+    for f, face in enumerate(faces):
+        checked = _checked_face(f, face, n_vertices)
+        first = seen.setdefault(tuple(sorted(checked)), f)
+        if first != f:
+            raise InputError(
+                f"faces[{f}] = {list(checked)}: has the same vertices as faces[{first}]; "
+                "keep only one of the two."
+            )
+        result.append(checked)
+    if not result:
+        raise InputError("faces is empty: a pattern needs at least one face.")
+    return tuple(result)
+
+
+def _checked_face(f: int, face: Any, n_vertices: int) -> tuple[int, ...]:
+    if isinstance(face, (str, bytes)) or not isinstance(face, Iterable):
+        raise InputError(f"faces[{f}] = {face!r}: give a sequence of vertex numbers.")
+    corners = list(face)
+    numbers: list[int] = []
+    for v in corners:
+        try:
+            if isinstance(v, (bool, np.bool_)):
+                raise TypeError
+            numbers.append(operator.index(v))
+        except TypeError:
+            raise InputError(
+                f"faces[{f}]: vertex number {v!r} is not an integer; "
+                f"give integers from 0 to {n_vertices - 1}."
+            ) from None
+    for v in numbers:
+        if not 0 <= v < n_vertices:
+            raise InputError(
+                f"faces[{f}] = {numbers}: vertex {v} does not exist; "
+                f"with {n_vertices} vertices the numbers run from 0 to {n_vertices - 1}."
+            )
+    distinct = len(set(numbers))
+    if distinct < 3:
+        raise InputError(
+            f"faces[{f}] = {numbers}: a face needs at least 3 distinct vertices, this has "
+            f"{distinct}."
+        )
+    if distinct < len(numbers):
+        twice = next(v for v in numbers if numbers.count(v) > 1)
+        raise InputError(
+            f"faces[{f}] = {numbers}: vertex {twice} occurs twice; list each corner once "
+            "(the first is not repeated at the end)."
+        )
+    return tuple(numbers)
+
+
+def build_topology(faces: Faces, n_vertices: int) -> Topology:
+    """Edges, creases and a consistent winding of checked faces.
+
+    Each connected component is walked from its lowest-numbered face, whose winding stays;
+    a neighbor that runs along the shared edge in the same direction is reversed. A reversed
+    face keeps its first vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
+
+    Parameters
+    ----------
+    faces : tuple of tuple of int
+        Faces that passed `checked_faces`.
+    n_vertices : int
+        Number of vertices.
+
+    Returns
+    -------
+    Topology
+        The wound faces and their edges.
+
+    Raises
+    ------
+    InputError
+        An edge of more than two faces, or a surface with only one side.
+    """
+    sizes = np.array([len(face) for face in faces])
+    owner = np.repeat(np.arange(len(faces)), sizes)
+    start = np.concatenate([np.asarray(face, dtype=np.int64) for face in faces])
+    end = np.concatenate([np.roll(np.asarray(face, dtype=np.int64), -1) for face in faces])
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    # Sorted by edge, equal edges side by side and the lower face first.
+    order = np.argsort(low * n_vertices + high, kind="stable")
+    low, high, owner, start = low[order], high[order], owner[order], start[order]
+    first = np.flatnonzero(np.r_[True, (np.diff(low) != 0) | (np.diff(high) != 0)])
+    count = np.diff(np.r_[first, len(low)])
+    crowded = np.flatnonzero(count > 2)
+    if len(crowded):
+        k = first[crowded[0]]
+        around = owner[k : k + count[crowded[0]]].tolist()
+        raise InputError(
+            f"faces: edge ({low[k]}, {high[k]}) is shared by {len(around)} faces {around}; at "
+            "most two may meet at an edge: give the others vertices of their own there."
+        )
+    edges = np.column_stack([low[first], high[first]])
+    shared = first[count == 2]
+    forward = start == low
+    pairs = np.column_stack([owner[shared], owner[shared + 1]])
+    creases = edges[count == 2]
+    reverse = _reversals(len(faces), pairs, forward[shared] == forward[shared + 1], creases)
+    wound = tuple(
+        (face[0], *face[:0:-1]) if turn else face for face, turn in zip(faces, reverse, strict=True)
+    )
+    lower_runs_forward = forward[shared] ^ reverse[pairs[:, 0]]
+    crease_faces = np.where(lower_runs_forward[:, None], pairs, pairs[:, ::-1])
+    flipped = tuple(bool(turn) for turn in reverse)
+    return Topology(wound, flipped, edges, creases, edges[count == 1], crease_faces)
+
+
+def _reversals(
+    n_faces: int,
+    pairs: NDArray[np.int64],
+    clash: NDArray[np.bool_],
+    creases: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Which faces to reverse so that no two run along a crease in the same direction."""
+    reverse = np.zeros(n_faces, dtype=bool)
+    if not clash.any():
+        return reverse
+    neighbors: list[list[tuple[int, bool]]] = [[] for _ in range(n_faces)]
+    for (f, g), differs in zip(pairs.tolist(), clash.tolist(), strict=True):
+        neighbors[f].append((g, differs))
+        neighbors[g].append((f, differs))
+    reached = np.zeros(n_faces, dtype=bool)
+    for seed in range(n_faces):
+        if reached[seed]:
+            continue
+        reached[seed] = True
+        queue = deque([seed])
+        while queue:
+            f = queue.popleft()
+            for g, differs in neighbors[f]:
+                if not reached[g]:
+                    reached[g] = True
+                    reverse[g] = reverse[f] ^ differs
+                    queue.append(g)
+    wrong = np.flatnonzero((reverse[pairs[:, 0]] ^ reverse[pairs[:, 1]]) != clash)
+    if len(wrong):
+        (a, b), (f, g) = creases[wrong[0]].tolist(), pairs[wrong[0]].tolist()
+        raise InputError(
+            f"faces: the surface has only one side (as a Moebius strip): no winding agrees on "
+            f"both sides of edge ({a}, {b}) between faces {f} and {g}; cut it open along an "
+            "edge by giving one of its faces vertices of its own."
+        )
+    return reverse
+
+
+def edge_lookup(edges: Sequence[Sequence[int]] | NDArray[np.int64]) -> dict[tuple[int, int], int]:
+    """Row number of each (low, high) vertex pair."""
+    return {(int(a), int(b)): k for k, (a, b) in enumerate(edges)}

@@ -1,0 +1,46 @@
+"""Figures of structures, laws, loads and motions.
+
+Every function returns a `matplotlib.figure.Figure`, ready for ``figure.savefig(path)``; `animate`
+writes a GIF. Matplotlib is imported on first use, and its global state is never touched.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from foldyn.plots.animation import animate
+    from foldyn.plots.energies import plot_energies
+    from foldyn.plots.history import plot_history
+    from foldyn.plots.laws import plot_laws
+    from foldyn.plots.loads import plot_load_history
+    from foldyn.plots.structure import draw_structure
+
+__all__ = [
+    "animate",
+    "draw_structure",
+    "plot_energies",
+    "plot_history",
+    "plot_laws",
+    "plot_load_history",
+]
+
+_HOMES = {
+    "animate": "animation",
+    "draw_structure": "structure",
+    "plot_energies": "energies",
+    "plot_history": "history",
+    "plot_laws": "laws",
+    "plot_load_history": "loads",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,95 @@
+"""Energies of a motion over time, with the audit of their balance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from foldyn.errors import InputError
+from foldyn.plots import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NAMES = {
+    "kinetic": "kinetic",
+    "strain_bars": "strain, bars",
+    "strain_folds": "strain, folds",
+    "strain_bends": "strain, bends",
+    "dissipated": "dissipated",
+    "work": "work of the loads",
+}
+STRAIN = ("strain_bars", "strain_folds", "strain_bends")
+
+
+def energy_error(trajectory: xr.Dataset) -> np.ndarray:
+    """Return kinetic + strain + dissipated - work, less its value at the start.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        With the six energies (J) over time.
+
+    Returns
+    -------
+    ndarray, shape (time,)
+        The imbalance (J): zero for an exact motion.
+    """
+    total = trajectory["kinetic"].values + trajectory["dissipated"].values
+    total = total + sum(trajectory[name].values for name in STRAIN) - trajectory["work"].values
+    return total - total[0]
+
+
+def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
+    """Draw all energies of a motion, and below them the error of their balance.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        With ``kinetic``, ``strain_bars``, ``strain_folds``, ``strain_bends``, ``dissipated`` and
+        ``work`` (J) over ``time`` (s).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two axes: the energies; the balance error.
+
+    Raises
+    ------
+    InputError
+        Where an energy is missing from the trajectory.
+    """
+    missing = [name for name in NAMES if name not in trajectory]
+    if missing:
+        raise InputError(f"trajectory: no {', '.join(missing)}; give a dataset of foldyn.simulate")
+    time = trajectory["time"].values
+    figure = style.new_figure(7.5, 5.0)
+    style.title_above(figure, title)
+    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1.0]})
+    style.frame(upper, "", "energy (J)")
+    style.frame(lower, "time (s)", "balance error (J)")
+    largest = 0.0
+    handles = []
+    for index, (name, label) in enumerate(NAMES.items()):
+        values = trajectory[name].values
+        (line,) = upper.plot(time, values, label=label, **style.line_style(index))
+        handles.append(line)
+        largest = max(largest, float(np.nanmax(np.abs(values))))
+    error = energy_error(trajectory)
+    worst = float(np.nanmax(np.abs(error)))
+    lower.plot(time, error, color=style.BLACK, linewidth=1.0, label="balance error")
+    lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+    note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
+    if largest > 0.0:
+        note += f", {worst / largest:.2g} of the largest energy"
+    lower.set_title(note, fontsize=style.NOTE, color=style.BLACK, loc="right", y=1.0, pad=4.0)
+    upper.margins(x=0.0)
+    style.exponents(upper)
+    style.exponents(lower, ticks=4)
+    style.legend_below(figure, handles, columns=3)
+    figure.align_ylabels()
+    return style.finish(figure)

@@ -1,0 +1,153 @@
+"""Displacement histories and their frequency content, several motions in one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from foldyn.errors import InputError
+from foldyn.plots import style
+from foldyn.signals import sampling_interval, spectrum
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+AXES = ("x", "y", "z")
+
+
+def plot_history(
+    trajectories: Mapping[str, xr.Dataset],
+    nodes: Sequence[int],
+    axes: str | Sequence[str] | None = None,
+    max_frequency: float | None = None,
+    title: str = "",
+    window: str | None = None,
+    detrend: str | None = None,
+) -> Figure:
+    """Draw the motion of chosen nodes: history on the left, frequency content on the right.
+
+    One row per node; every trajectory is one curve in each frame.
+
+    Parameters
+    ----------
+    trajectories : mapping of str to xarray.Dataset
+        Label and trajectory, for example one per mass rule; each with ``displacement`` (time,
+        node, axis) in m at evenly spaced times. Intervals and lengths may differ between them.
+    nodes : sequence of int
+        Nodes to show, one row each.
+    axes : str, sequence of str, or None
+        Direction shown: one of "x", "y", "z" for all nodes, or one for each node (a sequence of
+        length one serves all). None: the direction in which each node moves most.
+    max_frequency : float or None
+        Upper end of the frequency axis (Hz). None: half the smallest sampling frequency.
+    title : str
+        Title of the figure.
+    window, detrend : str or None
+        Passed to `foldyn.signals.spectrum`; by default the record is transformed as it is.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Axes in the order history, content, history, content ... from the first node down.
+
+    Raises
+    ------
+    InputError
+        No trajectory or node, a node or direction that a trajectory does not have, uneven times,
+        or NaN in a displacement.
+    """
+    if not trajectories:
+        raise InputError("trajectories: empty; give at least one {label: dataset}")
+    numbers = [int(node) for node in nodes]
+    if not numbers:
+        raise InputError("nodes: empty; name at least one node to show")
+    for label, dataset in trajectories.items():
+        count = dataset["displacement"].sizes["node"]
+        for node in numbers:
+            if not 0 <= node < count:
+                raise InputError(
+                    f"nodes: {node} is not in {label!r}, whose nodes are 0..{count - 1}"
+                )
+    directions = _directions(trajectories, numbers, axes)
+    intervals = {
+        label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
+    }
+    if max_frequency is None:
+        max_frequency = 0.5 / max(intervals.values())
+    elif not (np.isfinite(max_frequency) and max_frequency > 0.0):
+        raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
+
+    rows = len(numbers)
+    figure = style.new_figure(9.0, 1.15 + 1.75 * rows)
+    style.title_above(figure, title)
+    grid = figure.subplots(
+        rows, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [1.45, 1.0]}
+    )
+    handles = []
+    for row, (node, direction) in enumerate(zip(numbers, directions, strict=True)):
+        left, right = grid[row]
+        last = row == rows - 1
+        style.frame(
+            left,
+            "time (s)" if last else "",
+            f"{direction} displacement (m)",
+            f"node {node}",
+        )
+        style.frame(right, "frequency (Hz)" if last else "", "amplitude (m)", f"node {node}")
+        for index, (label, dataset) in enumerate(trajectories.items()):
+            time = dataset["time"].values
+            motion = _component(dataset, node, direction)
+            frequencies, amplitude = spectrum(
+                motion, intervals[label], window=window, detrend=detrend
+            )
+            shown = frequencies <= max_frequency * (1.0 + 1e-9)
+            look = style.line_style(index) | {"label": label}
+            (line,) = left.plot(time, motion, **look)
+            right.plot(frequencies[shown], amplitude[shown], **look)
+            if row == 0:
+                handles.append(line)
+        left.margins(x=0.0)
+        right.set_xlim(0.0, max_frequency)
+        right.set_ylim(bottom=0.0)
+        for frame in (left, right):
+            style.exponents(frame, ticks=5)
+    style.legend_below(figure, handles, columns=5)
+    figure.align_ylabels(grid[:, 0])
+    figure.align_ylabels(grid[:, 1])
+    return style.finish(figure)
+
+
+def _component(dataset: xr.Dataset, node: int, direction: str) -> np.ndarray:
+    """Return one displacement component over time, by position of the node."""
+    return dataset["displacement"].isel(node=node).sel(axis=direction).values
+
+
+def _directions(
+    trajectories: Mapping[str, xr.Dataset],
+    nodes: Sequence[int],
+    axes: str | Sequence[str] | None,
+) -> list[str]:
+    """Return one direction per node."""
+    if axes is None:
+        largest = np.max(
+            [
+                np.abs(d["displacement"].isel(node=list(nodes)).sel(axis=list(AXES)).values).max(0)
+                for d in trajectories.values()
+            ],
+            axis=0,
+        )
+        return [AXES[k] for k in largest.argmax(axis=1)]
+    chosen = [axes] if isinstance(axes, str) else list(axes)
+    for direction in chosen:
+        if direction not in AXES:
+            raise InputError(f'axes: {direction!r} is no direction; use "x", "y" or "z"')
+    if len(chosen) == 1:
+        return chosen * len(nodes)
+    if len(chosen) != len(nodes):
+        raise InputError(
+            f"axes: {len(chosen)} directions for {len(nodes)} nodes; give one, or one per node"
+        )
+    return chosen

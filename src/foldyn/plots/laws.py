@@ -1,0 +1,140 @@
+"""Constitutive curves of a structure's folds, bends and bars."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from foldyn.errors import InputError
+from foldyn.materials import bar_law, hinge_law
+from foldyn.plots import style
+
+if TYPE_CHECKING:
+    from foldyn.structures import Structure
+
+MOST_CURVES = 4
+# A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from
+# what lies between these.
+_FRAMED = (20.0, 340.0)
+
+
+def plot_laws(
+    structure: Structure, stretch: tuple[float, float] = (0.8, 1.2), title: str = ""
+) -> Figure:
+    """Draw moment against dihedral of folds and bends, and stress against stretch of bars.
+
+    Hinges of equal stiffness and rest angle share a curve; of each kind at most four different
+    curves are shown, those of the most hinges. A dot and a dotted line mark the rest angle.
+
+    Parameters
+    ----------
+    structure : Structure
+        Its laws, stiffnesses and rest angles are drawn as they are used.
+    stretch : tuple of float
+        Range of the bars' stretch.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One axes per kind of element that the structure has, in the order fold, bend, bar.
+
+    Raises
+    ------
+    InputError
+        Where the stretches are not positive and increasing.
+    """
+    low, high = stretch
+    if not (0.0 < low < high < np.inf):
+        raise InputError(f"stretch: {stretch!r}; give two positive, increasing stretches")
+    options = structure.options
+    kinds = [
+        ("fold", options.fold_law, structure.folds, structure.fold_stiffness, structure.fold_rest),
+        ("bend", options.bend_law, structure.bends, structure.bend_stiffness, structure.bend_rest),
+    ]
+    kinds = [kind for kind in kinds if len(kind[2])]
+    columns = len(kinds) + 1
+    figure = style.new_figure(3.5 * columns, 3.9)
+    style.title_above(figure, title)
+    frames = figure.subplots(1, columns, squeeze=False)[0]
+    for axes, (kind, spec, hinges, stiffness, rest) in zip(frames, kinds, strict=False):
+        _draw_hinges(axes, kind, hinge_law(spec), hinges, stiffness, rest)
+    _draw_bar(frames[-1], bar_law(options.bar_law), structure.sheet.youngs_modulus, low, high)
+    return style.finish(figure)
+
+
+def _draw_hinges(
+    axes: Axes, kind: str, law: Any, hinges: np.ndarray, stiffness: np.ndarray, rest: np.ndarray
+) -> None:
+    """Draw the moment curves of one kind of hinge."""
+    style.frame(axes, "dihedral (degrees)", "moment (N m)", f"{kind}s: {law.name}")
+    degrees = np.linspace(1.0, 359.0, 1433)
+    framed = (degrees >= _FRAMED[0]) & (degrees <= _FRAMED[1])
+    groups = _distinct(stiffness, rest)
+    reach = 0.0
+    for index, (first, count) in enumerate(groups[:MOST_CURVES]):
+        k, theta0 = float(stiffness[first]), float(rest[first])
+        moment = k * np.asarray(law.moment(np.radians(degrees), theta0))
+        look = style.line_style(index)
+        j, m = hinges[first][:2]
+        label = f"{kind} {j}-{m}"
+        label += f" and {count - 1} more" if count > 1 else ""
+        label += f": k {k:.4g} N m/rad, rest {np.degrees(theta0):.4g}°"
+        axes.plot(degrees, moment, label=label, **look)
+        at_rest = k * float(law.moment(theta0, theta0))
+        axes.plot([np.degrees(theta0)], [at_rest], "o", color=look["color"], markersize=5, zorder=4)
+        axes.axvline(
+            np.degrees(theta0), color=look["color"], linewidth=0.8, linestyle=":", zorder=1
+        )
+        reach = max(reach, float(np.abs(moment[framed]).max()))
+    axes.set_xlim(0.0, 360.0)
+    axes.set_xticks(np.arange(0, 361, 60))
+    if reach > 0.0:
+        axes.set_ylim(-1.08 * reach, 1.08 * reach)
+    axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    style.exponents(axes)
+    hidden = len(groups) - MOST_CURVES
+    _legend_below(axes, f"{hidden} other pairs of k and rest not shown" if hidden > 0 else "")
+
+
+def _draw_bar(axes: Axes, law: Any, modulus: float, low: float, high: float) -> None:
+    """Draw the stress of the bars' law."""
+    style.frame(axes, "stretch (-)", "second Piola-Kirchhoff stress (Pa)", f"bars: {law.name}")
+    stretch = np.linspace(low, high, 401)
+    stress = modulus * np.asarray(law.stress(stretch))
+    axes.plot(stretch, stress, label=f"bar: E {modulus:.4g} Pa", **style.line_style(0))
+    axes.plot([1.0], [0.0], "o", color=style.CYCLE[0], markersize=5, zorder=4)
+    axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    axes.set_xlim(low, high)
+    axes.locator_params(axis="x", nbins=5)
+    style.exponents(axes)
+    _legend_below(axes, "")
+
+
+def _legend_below(axes: Axes, note: str) -> None:
+    legend = axes.legend(
+        loc="upper left",
+        bbox_to_anchor=(-0.2, -0.19),
+        borderaxespad=0.0,
+        frameon=False,
+        labelcolor=style.BLACK,
+        labelspacing=0.5,
+        fontsize=style.NOTE,
+        handlelength=2.2,
+        title=note or None,
+        title_fontsize=style.NOTE,
+    )
+    legend.set_in_layout(True)
+
+
+def _distinct(stiffness: np.ndarray, rest: np.ndarray) -> list[tuple[int, int]]:
+    """Return (first index, count) of hinges with equal stiffness and rest, most frequent first."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for index, (k, theta0) in enumerate(zip(stiffness, rest, strict=True)):
+        groups.setdefault((f"{k:.6e}", f"{theta0:.6f}"), []).append(index)
+    found = [(members[0], len(members)) for members in groups.values()]
+    return sorted(found, key=lambda pair: -pair[1])

@@ -1,0 +1,171 @@
+"""Marks on a sheet: supports, load arrows, and numbers that keep clear of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.patheffects import withStroke
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+
+from foldyn.plots.scene import View
+
+_DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
+
+
+def _billboard(
+    tip: NDArray[np.float64], along: NDArray[np.float64], length: float, half: float, view: View
+) -> NDArray[np.float64]:
+    """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
+    across = np.cross(view.basis[2], along)
+    size = np.linalg.norm(across)
+    # Seen end-on there is no sideways direction left: any in the screen will do.
+    across = across / size if size > 1e-6 else view.basis[0]
+    base = tip - length * along
+    return np.array([tip, base + half * across, base - half * across])
+
+
+def support_triangles(
+    points: NDArray[np.float64], fixed: NDArray[np.bool_], size: float, view: View
+) -> tuple[NDArray[np.float64], list[tuple[int, str]]]:
+    """Return one triangle per held direction, its tip at the node, and each node's axes.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Node positions (m).
+    fixed : ndarray of bool, shape (n, 3)
+    size : float
+        Length of a triangle (m).
+    view : View
+
+    Returns
+    -------
+    triangles : ndarray, shape (count, 3, 3)
+    axes : list of (node, axes)
+        For example ``(4, "xz")``.
+    """
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    triangles, held = [], []
+    for node in np.flatnonzero(fixed.any(axis=1)):
+        held.append((int(node), "".join("xyz"[k] for k in np.flatnonzero(fixed[node]))))
+        for k in np.flatnonzero(fixed[node]):
+            along = np.zeros(3)
+            # The triangle stands outside the sheet; on the middle plane, below or before it.
+            along[k] = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
+            triangles.append(_billboard(points[node], along, size, 0.38 * size, view))
+    return np.array(triangles).reshape(-1, 3, 3), held
+
+
+def load_arrows(
+    points: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    longest: float,
+    length: float,
+    view: View,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return shafts and heads of arrows that start at the loaded nodes.
+
+    Parameters
+    ----------
+    points, vectors : ndarray, shape (n, 3)
+        Node positions (m) and forces (N).
+    longest : float
+        The force (N) whose arrow has the full length; smaller ones are shorter, down to a third.
+    length : float
+        Full length (m).
+    view : View
+
+    Returns
+    -------
+    shafts : ndarray, shape (count, 2, 3)
+    heads : ndarray, shape (count, 3, 3)
+    """
+    shafts, heads = [], []
+    size = np.linalg.norm(vectors, axis=1)
+    for node in np.flatnonzero(size > 0.0):
+        along = vectors[node] / size[node]
+        tip = points[node] + length * max(size[node] / longest, 1.0 / 3.0) * along
+        head = _billboard(tip, along, 0.3 * length, 0.11 * length, view)
+        shafts.append([points[node], 0.5 * (head[1] + head[2])])
+        heads.append(head)
+    return np.array(shafts).reshape(-1, 2, 3), np.array(heads).reshape(-1, 3, 3)
+
+
+def add_triangles(
+    axes: Axes3D, triangles: NDArray[np.float64], color: str, zorder: float
+) -> Poly3DCollection:
+    """Fill mark triangles (count, 3, 3) in one color."""
+    marks = Poly3DCollection(
+        triangles, facecolors=color, edgecolors="white", linewidths=0.4, zorder=zorder
+    )
+    axes.add_collection3d(marks, autolim=False)
+    return marks
+
+
+class Labels:
+    """Places short texts beside points, each where the picture is emptiest.
+
+    Parameters
+    ----------
+    axes : Axes3D
+    view : View
+    distance : float
+        From the point to the middle of its text (m).
+    obstacles : ndarray, shape (p, 3)
+        Points to keep away from: samples of lines and marks.
+    """
+
+    def __init__(
+        self, axes: Axes3D, view: View, distance: float, obstacles: NDArray[np.float64]
+    ) -> None:
+        self._axes, self._view, self._distance = axes, view, distance
+        self._taken = view.flat(obstacles.reshape(-1, 3))
+
+    def add(self, point: NDArray[np.float64], text: str, color: str, size: float) -> None:
+        """Write a text beside a point (3,)."""
+        anchor = self._view.flat(point)
+        # A wide text needs more room to the left and right than above and below.
+        stretch = np.array([1.0 + 0.3 * max(len(text) - 1, 0), 1.0])
+        ring = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=1) * stretch
+        spots = anchor + self._distance * ring
+        near = np.abs(self._taken - anchor).max(axis=1) < 6.0 * self._distance
+        gaps = np.full(len(spots), np.inf)
+        if near.any():
+            between = (spots[:, None] - self._taken[near][None]) / stretch
+            gaps = np.linalg.norm(between, axis=2).min(axis=1)
+        # Equal gaps count as equal, so that like nodes get their texts on the like side.
+        best = int(np.argmax(np.round(gaps / self._distance, 1)))
+        shift = spots[best] - anchor
+        place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]
+        written = self._axes.text(
+            *place,
+            text,
+            fontsize=size,
+            color=color,
+            ha="center",
+            va="center",
+            zorder=20,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        )
+        written.set_gid(f"label {text}")
+        around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
+        self._taken = np.vstack(
+            [self._taken, spots[best] + 0.9 * self._distance * around * stretch]
+        )
+
+
+def along_lines(segments: NDArray[np.float64], samples: int = 9) -> NDArray[np.float64]:
+    """Return points along segments (k, 2, 3), shape (k * samples, 3)."""
+    t = np.linspace(0.0, 1.0, samples)[None, :, None]
+    return (segments[:, None, 0] * (1.0 - t) + segments[:, None, 1] * t).reshape(-1, 3)
+
+
+def outline(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points along the outlines of triangles (k, 3, 3)."""
+    sides: Sequence[tuple[int, int]] = ((0, 1), (1, 2), (2, 0))
+    return np.concatenate(
+        [along_lines(triangles[:, list(side)], 4) for side in sides] or [np.zeros((0, 3))]
+    )

@@ -1,0 +1,255 @@
+"""A three-dimensional view of a sheet: axes, panels and creases, in orthographic projection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+from numpy.typing import NDArray
+
+from foldyn.plots import style
+
+PAPER = "#F2DFB8"
+# Margins around the seen box, and its largest height, in inches.
+_LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
+_LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
+
+
+@dataclass(frozen=True)
+class Sheet3D:
+    """What is drawn of a case, a structure or a pattern.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    structure : Structure or None
+    case : Case or None
+    nodes : ndarray, shape (n, 3)
+        Positions at rest (m); the pattern's vertices come first.
+    triangles : ndarray, shape (nt, 3)
+        Triangles that fill the panels.
+    """
+
+    pattern: Any
+    structure: Any
+    case: Any
+    nodes: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, thing: Any) -> Sheet3D:
+        """Take a case, a structure or a pattern apart."""
+        case = thing if hasattr(thing, "structure") else None
+        structure = case.structure if case is not None else thing
+        if not hasattr(structure, "pattern"):
+            pattern = structure
+            fans = [
+                (face[0], face[k], face[k + 1])
+                for face in pattern.faces
+                for k in range(1, len(face) - 1)
+            ]
+            return cls(pattern, None, None, pattern.vertices, np.array(fans))
+        return cls(
+            structure.pattern,
+            structure,
+            case,
+            np.asarray(structure.nodes, dtype=np.float64),
+            np.asarray(structure.triangles, dtype=np.int64),
+        )
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box (m)."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+
+    @cached_property
+    def boundary(self) -> NDArray[np.int64]:
+        """Edges of one panel only, shape (nb, 2)."""
+        return np.asarray(self.pattern.boundary, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """All edges of the pattern, shape (ne, 2)."""
+        return np.asarray(self.pattern.edges, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
+    def inner_bars(self) -> NDArray[np.int64]:
+        """Bars of the structure that are no edges of the pattern, shape (k, 2)."""
+        if self.structure is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        edges = {tuple(edge) for edge in np.sort(self.edges, axis=1).tolist()}
+        bars = np.sort(np.asarray(self.structure.bars, dtype=np.int64), axis=1).tolist()
+        return np.array([bar for bar in bars if tuple(bar) not in edges]).reshape(-1, 2)
+
+    def creases(self) -> dict[str, NDArray[np.int64]]:
+        """Return the creases (k, 2) of each assignment that occurs."""
+        creases = np.asarray(self.pattern.creases, dtype=np.int64).reshape(-1, 2)
+        kinds = np.array(self.pattern.assignments, dtype=str)
+        return {
+            kind: creases[kinds == kind]
+            for kind in style.CREASES
+            if np.count_nonzero(kinds == kind)
+        }
+
+
+@dataclass(frozen=True)
+class View:
+    """Direction of sight, in degrees above the xy plane and around z."""
+
+    elevation: float = 28.0
+    azimuth: float = -60.0
+
+    @cached_property
+    def basis(self) -> NDArray[np.float64]:
+        """Unit vectors to the right, up and towards the viewer, shape (3, 3)."""
+        e, a = np.radians([self.elevation, self.azimuth])
+        toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        return np.array([right, np.cross(toward, right), toward])
+
+    def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points as seen on the screen, shape (..., 2)."""
+        return points @ self.basis[:2].T
+
+
+def view_figure(
+    points: NDArray[np.float64],
+    view: View,
+    title: str = "",
+    legend_rows: int = 0,
+    width: float = 7.0,
+) -> tuple[Figure, Axes3D]:
+    """Return a figure with orthographic axes of equal scale that hold all the points (p, 3).
+
+    Three-dimensional axes are square and mostly empty around a flat sheet, so the figure is cut to
+    the box as it is seen: its height follows from the points, at most 5 inches and the margins.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    # A flat sheet still gets a box of some height, or its ticks would fall on each other.
+    box = np.maximum(high - low, 0.15 * (high - low).max()) * 1.04
+    middle = 0.5 * (low + high)
+    corners = middle + 0.5 * box * np.array(list(product((-1, 1), repeat=3)))
+    seen = np.ptp(view.flat(corners), axis=0)
+    scale = min((width - _LEFT - _RIGHT) / seen[0], _TALLEST / seen[1])  # inches per meter
+    top = 0.42 if title else 0.12
+    bottom = _TICKS + (0.1 + 0.19 * legend_rows if legend_rows else 0.0)
+    height = top + seen[1] * scale + bottom
+
+    figure = style.new_figure(width, height, layout=None)
+    if title:
+        figure.suptitle(
+            title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
+        )
+    side = 1.1 * seen.max() * scale  # of the square axes, which clip what they draw
+    center = _LEFT + 0.5 * (width - _LEFT - _RIGHT), bottom + 0.5 * seen[1] * scale
+    axes = figure.add_axes(
+        (
+            (center[0] - 0.5 * side) / width,
+            (center[1] - 0.5 * side) / height,
+            side / width,
+            side / height,
+        ),
+        projection="3d",
+        proj_type="ortho",
+        computed_zorder=False,
+    )
+    axes.view_init(elev=view.elevation, azim=view.azimuth)
+    for axis, name in enumerate("xyz"):
+        reach = (middle[axis] - 0.5 * box[axis], middle[axis] + 0.5 * box[axis])
+        getattr(axes, f"set_{name}lim")(*reach, view_margin=0)
+    axes.set_box_aspect(box, zoom=1.0)
+    flat = np.array(proj_transform(*corners.T, axes.get_proj())[:2])
+    axes.set_box_aspect(box, zoom=seen[0] * scale / (side * np.ptp(flat[0]) / _span(axes)))
+    _frame(axes, box)
+    return figure, axes
+
+
+def _span(axes: Axes3D) -> float:
+    """Return the width of the axes in the units of the projection."""
+    pixels = axes.get_window_extent().width
+    return pixels / (axes.transData.transform((1.0, 0.0)) - axes.transData.transform((0.0, 0.0)))[0]
+
+
+def _frame(axes: Axes3D, box: NDArray[np.float64]) -> None:
+    """Set ticks, grid, panes and labels."""
+    axes.patch.set_visible(False)
+    for axis, length in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
+        axis.set_major_locator(MaxNLocator(max(2, round(5 * length / box.max()))))
+        axis.set_pane_color((0.975, 0.975, 0.975, 1.0))
+        axis.line.set_color(style.LIGHT)
+        # The grid of three-dimensional axes has no public setting of its own; without this one it
+        # would only be darker.
+        getattr(axis, "_axinfo", {}).get("grid", {}).update(color="#E2E2E2", linewidth=0.5)
+    axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
+    for name in "xyz":
+        label = getattr(axes, f"set_{name}label")
+        label(f"{name} (m)", fontsize=style.LABEL, color=style.BLACK)
+
+
+def shades(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], color: str = PAPER
+) -> NDArray[np.float64]:
+    """Return a color per triangle, darker where it faces away from the light, shape (nt, 3)."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    normals /= np.where(length > 0.0, length, 1.0)[:, None]
+    # Both faces of paper reflect, so the sign of the normal must not matter.
+    bright = 0.62 + 0.38 * np.abs(normals @ _LIGHT)
+    return np.clip(bright[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
+
+
+def add_panels(
+    axes: Axes3D,
+    vertices: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    color: str = PAPER,
+    alpha: float = 0.8,
+    zorder: float = 1.0,
+) -> Poly3DCollection:
+    """Fill the panels, triangle by triangle, so that their bending shows."""
+    # Antialiased neighbors would leave a light seam inside every panel.
+    panels = Poly3DCollection(
+        vertices[triangles],
+        facecolors=shades(vertices, triangles, color),
+        edgecolors="none",
+        linewidths=0.0,
+        antialiaseds=False,
+        zsort="average",
+        zorder=zorder,
+    )
+    panels.set_alpha(alpha)
+    axes.add_collection3d(panels, autolim=False)
+    return panels
+
+
+def add_segments(
+    axes: Axes3D,
+    segments: NDArray[np.float64],
+    color: str,
+    width: float,
+    linestyle: Any = "solid",
+    zorder: float = 2.0,
+    alpha: float = 1.0,
+) -> Line3DCollection:
+    """Draw straight segments (k, 2, 3)."""
+    lines = Line3DCollection(
+        segments,
+        colors=color,
+        linewidths=width,
+        linestyles=[linestyle],
+        zorder=zorder,
+        alpha=alpha,
+        capstyle="butt",
+    )
+    axes.add_collection3d(lines, autolim=False)
+    return lines

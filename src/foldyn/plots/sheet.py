@@ -1,0 +1,102 @@
+"""The drawn sheet: panels and edges that can be moved without drawing them anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d import Axes3D
+from numpy.typing import NDArray
+
+from foldyn.plots import scene, style
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.visibility import split_edges
+
+_HIDDEN = 0.3  # opacity of what lies behind a panel
+
+
+def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
+    """Draw the sheet at rest in gray."""
+    scene.add_panels(axes, sheet.nodes, sheet.triangles, "#D0D0D0", alpha=0.25, zorder=0.5)
+    scene.add_segments(axes, sheet.nodes[sheet.edges], style.LIGHT, 0.9, zorder=0.6)
+
+
+@dataclass(frozen=True)
+class EdgeKind:
+    """Edges that look alike: their node pairs (k, 2), look and name."""
+
+    name: str
+    edges: NDArray[np.int64]
+    color: str
+    width: float
+    dashes: Any
+
+
+def edge_kinds(sheet: Sheet3D, elements: bool) -> list[EdgeKind]:
+    """Return the kinds of edges that a sheet has; with its inner bars where `elements`."""
+    kinds = []
+    if elements and len(sheet.inner_bars):
+        kinds.append(EdgeKind("bar inside a panel", sheet.inner_bars, style.GRAY, 0.7, "solid"))
+    kinds.append(EdgeKind("boundary", sheet.boundary, style.BLACK, 1.1, "solid"))
+    for kind, edges in sheet.creases().items():
+        name = f"{style.CREASE_NAMES[kind]} crease"
+        kinds.append(EdgeKind(name, edges, style.CREASES[kind], 1.7, style.CREASE_DASHES[kind]))
+    return kinds
+
+
+def edge_keys(sheet: Sheet3D, elements: bool = False) -> list[Line2D]:
+    """Return legend entries of a sheet's edges."""
+    return [
+        Line2D([], [], color=k.color, linewidth=k.width, linestyle=k.dashes, label=k.name)
+        for k in edge_kinds(sheet, elements)
+    ]
+
+
+class DrawnSheet:
+    """Panels, creases and boundary of a sheet in one position.
+
+    Parameters
+    ----------
+    axes : Axes3D
+    sheet : Sheet3D
+    points : ndarray, shape (n, 3)
+        Positions of the nodes (m).
+    view : View
+    elements : bool
+        Draw the bars inside the panels too.
+    """
+
+    def __init__(
+        self,
+        axes: Axes3D,
+        sheet: Sheet3D,
+        points: NDArray[np.float64],
+        view: View,
+        elements: bool = False,
+    ) -> None:
+        self._sheet, self._view = sheet, view
+        self._panels = scene.add_panels(axes, points, sheet.triangles)
+        self._lines: list[tuple[Any, Any, NDArray[np.int64]]] = []
+        for kind in edge_kinds(sheet, elements):
+            visible, hidden = self._split(kind.edges, points)
+            look = kind.color, 0.7 * kind.width, kind.dashes
+            behind = scene.add_segments(axes, hidden, *look, zorder=1.5, alpha=_HIDDEN)
+            front = scene.add_segments(axes, visible, kind.color, kind.width, kind.dashes)
+            front.set_label(kind.name)
+            self._lines.append((front, behind, kind.edges))
+
+    def move(self, points: NDArray[np.float64]) -> None:
+        """Put the nodes in other positions (n, 3)."""
+        self._panels.set_verts(points[self._sheet.triangles])
+        self._panels.set_facecolor(scene.shades(points, self._sheet.triangles))
+        for front, behind, edges in self._lines:
+            visible, hidden = self._split(edges, points)
+            front.set_segments(visible)
+            behind.set_segments(hidden)
+
+    def _split(
+        self, edges: NDArray[np.int64], points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return split_edges(edges, points, self._sheet.triangles, self._view, self._sheet.size)

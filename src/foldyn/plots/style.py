@@ -1,0 +1,125 @@
+"""Look of all figures: colors, fonts and frames, set on each figure and nowhere else.
+
+Nothing here changes matplotlib's global settings, so the caller's own figures are left alone; and
+fonts, colors and widths are set one by one, so the caller's usual settings do not leak in here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+
+# Okabe and Ito's palette: told apart with every common kind of color blindness.
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+SKY = "#56B4E9"
+ORANGE = "#E69F00"
+YELLOW = "#F0E442"
+BLACK = "#1A1A1A"
+GRAY = "#767676"
+LIGHT = "#C8C8C8"
+
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
+# Line kinds change with the color, so curves are told apart in gray print too.
+DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)))
+
+CREASES = {"M": VERMILLION, "V": BLUE, "F": GRAY, "U": PURPLE}
+CREASE_NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned"}
+CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
+SUPPORT = GREEN
+LOAD = PURPLE
+
+DPI = 150
+FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
+TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
+
+
+def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:
+    """Return an empty white figure on an Agg canvas.
+
+    Parameters
+    ----------
+    width, height : float
+        Size in inches.
+    layout : str or None
+        Matplotlib's layout engine; None leaves axes where they are put.
+    """
+    figure = Figure(
+        figsize=(width, height),
+        dpi=DPI,
+        layout=layout or "none",
+        facecolor="white",
+        edgecolor="white",
+    )
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> None:
+    """Give axes their labels, grid and colors."""
+    axes.set_xlabel(xlabel, fontsize=LABEL, color=BLACK)
+    axes.set_ylabel(ylabel, fontsize=LABEL, color=BLACK)
+    if title:
+        # A fixed height: left to itself, a title moves above the exponent of the axis.
+        axes.set_title(title, fontsize=LABEL, y=1.0, pad=4.0, color=BLACK)
+    axes.set_facecolor("white")
+    axes.grid(True, color="#E4E4E4", linewidth=0.6, linestyle="solid")
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=TICK, color=GRAY, labelcolor=BLACK, direction="out")
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color(GRAY)
+        spine.set_linewidth(0.8)
+
+
+def line_style(index: int) -> dict:
+    """Return color, dashes and width of the curve number `index`."""
+    return {
+        "color": CYCLE[index % len(CYCLE)],
+        "linestyle": DASHES[(index + index // len(CYCLE)) % len(DASHES)],
+        "linewidth": 1.1,
+    }
+
+
+def exponents(axes: Axes, ticks: int = 6) -> None:
+    """Write small and large values of the vertical axis with one common exponent."""
+    axes.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
+    axes.yaxis.get_offset_text().set(fontsize=TICK, color=BLACK)
+    axes.locator_params(axis="y", nbins=ticks)
+
+
+def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:
+    """Put one legend for the whole figure below its axes, where it hides no data."""
+    return figure.legend(
+        handles=list(handles),
+        # "outside" makes room, which only a layout engine can do.
+        loc="lower center" if figure.get_layout_engine() is None else "outside lower center",
+        ncols=max(1, min(columns, len(handles))),
+        fontsize=TICK,
+        labelcolor=BLACK,
+        labelspacing=0.5,
+        frameon=False,
+        handlelength=2.6,
+    )
+
+
+def title_above(figure: Figure, title: str) -> None:
+    """Set the figure's title, if there is one."""
+    if title:
+        figure.suptitle(title, fontsize=TITLE, color=BLACK)
+
+
+def finish(figure: Figure) -> Figure:
+    """Set family and weight of every text in the figure, and return it."""
+    for text in figure.findobj(Text):
+        text.set(fontfamily=FAMILY, fontweight="normal")
+    for axes in figure.axes:
+        axes.tick_params(labelfontfamily=FAMILY)
+    return figure

@@ -1,0 +1,8 @@
+"""Reports: one self-contained HTML page of text, tables and pictures."""
+
+from __future__ import annotations
+
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
+
+__all__ = ["Heading", "Picture", "Section", "Table", "Text", "write_report"]

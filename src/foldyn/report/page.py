@@ -1,0 +1,95 @@
+"""The page of a report: one HTML file that needs no other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from os import PathLike
+from pathlib import Path
+
+from foldyn.errors import InputError
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
+
+_CSS = """
+:root { color-scheme: light; }
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 62rem; background: #fff;
+  color: #1a1a1a; font: 1rem/1.55 system-ui, "Segoe UI", Roboto, Helvetica, Arial, sans-serif;
+  overflow-wrap: break-word; }
+h1 { font-size: 1.9rem; line-height: 1.2; margin: 0.5rem 0 1rem; }
+h2 { font-size: 1.4rem; line-height: 1.25; margin: 2.5rem 0 0.75rem; padding-top: 0.75rem;
+  border-top: 1px solid #d8d8d8; }
+h3 { font-size: 1.1rem; margin: 1.75rem 0 0.5rem; }
+p { max-width: 46rem; margin: 0.6rem 0; }
+a { color: #0072b2; }
+nav ul { margin: 0; padding-left: 1.2rem; }
+figure { margin: 1.25rem 0; }
+img { display: block; max-width: 100%; height: auto; margin: 0 auto; }
+figcaption, caption { color: #444; font-size: 0.92rem; text-align: left; }
+figcaption { margin-top: 0.4rem; max-width: 46rem; }
+caption { padding-bottom: 0.4rem; }
+.table { overflow-x: auto; margin: 1.25rem 0; }
+table { border-collapse: collapse; font-size: 0.95rem; }
+th, td { padding: 0.35rem 0.8rem; text-align: left; vertical-align: top; }
+th { border-bottom: 2px solid #1a1a1a; }
+td { border-bottom: 1px solid #e2e2e2; }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+@media (max-width: 40rem) {
+  body { padding: 1rem 0.8rem 3rem; }
+  h1 { font-size: 1.5rem; }
+  h2 { font-size: 1.2rem; }
+  th, td { padding: 0.3rem 0.5rem; }
+}
+@media print { h2 { break-after: avoid; } figure, tr { break-inside: avoid; } }
+"""
+
+
+def write_report(path: str | PathLike[str], title: str, sections: Iterable[Section]) -> Path:
+    """Write a report as one HTML page, pictures inside.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, in an existing directory.
+    title : str
+        Title of the page.
+    sections : iterable of Heading, Text, Table or Picture
+        In the order of the page. With two or more headings of level 2 the page begins with a list
+        of them.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written; nothing is written where a section is wrong.
+
+    Raises
+    ------
+    InputError
+        A section of another type, a picture that cannot be read, or no such directory.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"path: there is no directory {path.parent}; make it first")
+    body, contents = [], []
+    for number, section in enumerate(sections):
+        if isinstance(section, Heading) and section.level == 2:
+            contents.append((f"part-{len(contents) + 1}", section.text))
+            body.append(section.html(contents[-1][0]))
+        elif isinstance(section, Heading | Text | Table | Picture):
+            body.append(section.html())
+        else:
+            raise InputError(
+                f"sections[{number}]: {type(section).__name__}; use Heading, Text, Table or Picture"
+            )
+    listed = ""
+    if len(contents) > 1:
+        items = "\n".join(f'<li><a href="#{a}">{escape(text)}</a></li>' for a, text in contents)
+        listed = f'<nav aria-label="Contents"><ul>\n{items}\n</ul></nav>\n'
+    page = (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{_CSS}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{escape(title)}</h1>\n{listed}" + "\n".join(body) + "\n</main>\n</body>\n</html>\n"
+    )
+    path.write_text(page, encoding="utf-8")
+    return path

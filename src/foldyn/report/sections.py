@@ -1,0 +1,180 @@
+"""What a report is made of: headings, text, tables and pictures, each written as HTML."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from io import BytesIO
+from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from foldyn.errors import InputError
+
+_SIGNATURES = (
+    (b"\x89PNG\r\n\x1a\n", "image/png"),
+    (b"GIF87a", "image/gif"),
+    (b"GIF89a", "image/gif"),
+    (b"\xff\xd8\xff", "image/jpeg"),
+)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading of a part (level 2) or of what is in it (level 3).
+
+    Headings of level 2 are listed at the top of the page.
+    """
+
+    text: str
+    level: int = 2
+
+    def __post_init__(self) -> None:
+        """Check the level."""
+        if self.level not in (2, 3):
+            raise InputError(f"level: {self.level!r}; a heading in a report has level 2 or 3")
+
+    def html(self, anchor: str = "") -> str:
+        """Write as HTML, with an anchor to jump to."""
+        name = f' id="{escape(anchor)}"' if anchor else ""
+        return f"<h{self.level}{name}>{escape(self.text)}</h{self.level}>"
+
+
+@dataclass(frozen=True)
+class Text:
+    """Plain text; an empty line starts a new paragraph."""
+
+    text: str
+
+    def html(self) -> str:
+        """Write as HTML."""
+        paragraphs = re.split(r"\n\s*\n", self.text.strip())
+        return "\n".join(f"<p>{escape(paragraph.strip())}</p>" for paragraph in paragraphs)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a header row.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Titles of the columns, with units.
+    rows : sequence of sequences
+        Cells: text as it is, numbers to `digits` digits, None as an empty cell, True and False as
+        yes and no.
+    caption : str
+        Written above the table.
+    digits : int
+        Significant digits of numbers that are not integers.
+    """
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    caption: str = ""
+    digits: int = 4
+
+    def __post_init__(self) -> None:
+        """Check that rows fit the header."""
+        for number, row in enumerate(self.rows):
+            if len(row) != len(self.header):
+                raise InputError(
+                    f"rows[{number}]: {len(row)} cells under {len(self.header)} column titles; "
+                    "use None for an empty cell"
+                )
+
+    def html(self) -> str:
+        """Write as HTML."""
+        caption = f"<caption>{escape(self.caption)}</caption>" if self.caption else ""
+        numeric = [
+            any(_is_number(row[k]) for row in self.rows)
+            and all(_is_number(row[k]) or row[k] is None for row in self.rows)
+            for k in range(len(self.header))
+        ]
+        kind = [' class="number"' if right else "" for right in numeric]
+        titles = "".join(
+            f'<th scope="col"{k}>{escape(title)}</th>'
+            for title, k in zip(self.header, kind, strict=True)
+        )
+        body = "\n".join(
+            "<tr>"
+            + "".join(
+                f"<td{k}>{escape(self._cell(cell))}</td>" for cell, k in zip(row, kind, strict=True)
+            )
+            + "</tr>"
+            for row in self.rows
+        )
+        return (
+            f'<div class="table"><table>{caption}\n<thead><tr>{titles}</tr></thead>\n'
+            f"<tbody>\n{body}\n</tbody></table></div>"
+        )
+
+    def _cell(self, value: Any) -> str:
+        if value is None:
+            return ""
+        if isinstance(value, bool) or type(value).__name__ == "bool":  # numpy's too
+            return "yes" if value else "no"
+        if isinstance(value, Integral):
+            return str(int(value))
+        if isinstance(value, Real):
+            return f"{float(value):.{self.digits}g}"
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure or an animation, stored inside the page.
+
+    Parameters
+    ----------
+    source : path-like, bytes, or a matplotlib Figure
+        A PNG, GIF or JPEG file, its bytes, or anything with ``savefig(file, format="png")``.
+    caption : str
+        Written below the picture.
+    alt : str
+        What the picture shows, for who cannot see it; the caption where empty.
+    """
+
+    source: Any
+    caption: str = ""
+    alt: str = ""
+
+    def html(self) -> str:
+        """Write as HTML."""
+        content = self._bytes()
+        kinds = [kind for start, kind in _SIGNATURES if content.startswith(start)]
+        if not kinds:
+            raise InputError(f"source: {self._name()} is no PNG, GIF or JPEG picture")
+        data = base64.b64encode(content).decode("ascii")
+        alt = escape(self.alt or self.caption)
+        caption = f"<figcaption>{escape(self.caption)}</figcaption>" if self.caption else ""
+        return f'<figure><img alt="{alt}" src="data:{kinds[0]};base64,{data}">{caption}</figure>'
+
+    def _bytes(self) -> bytes:
+        if isinstance(self.source, bytes | bytearray):
+            return bytes(self.source)
+        if isinstance(self.source, str | PathLike):
+            path = Path(self.source)
+            if not path.is_file():
+                raise InputError(f"source: there is no picture {path}")
+            return path.read_bytes()
+        if hasattr(self.source, "savefig"):
+            buffer = BytesIO()
+            self.source.savefig(buffer, format="png")
+            return buffer.getvalue()
+        raise InputError(f"source: {self._name()}; give a path, bytes or a matplotlib Figure")
+
+    def _name(self) -> str:
+        is_path = isinstance(self.source, str | PathLike)
+        return str(self.source) if is_path else f"an object of type {type(self.source).__name__}"
+
+
+Section = Heading | Text | Table | Picture
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

@@ -1,0 +1,7 @@
+"""Results: datasets that carry their own case, in memory and in files."""
+
+from foldyn.results.dataset import trajectory_dataset
+from foldyn.results.origin import case_of, check_result
+from foldyn.results.store import load, save
+
+__all__ = ["case_of", "check_result", "load", "save", "trajectory_dataset"]

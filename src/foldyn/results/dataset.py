@@ -1,0 +1,166 @@
+"""Result datasets: labelled arrays that carry their own case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.cases import Case
+from foldyn.cases.document import Document, to_document
+
+FORMAT = 1
+"""Number of the layout of results, raised when older programs could not read a new one."""
+
+AXIS = np.array(["x", "y", "z"])
+
+ENERGIES: Mapping[str, str] = {
+    "kinetic": "kinetic energy",
+    "strain_bars": "strain energy of the bars",
+    "strain_folds": "strain energy of the folds",
+    "strain_bends": "strain energy of the bends",
+    "dissipated": "energy dissipated by damping since the start",
+    "work": "work of the loads since the start",
+}
+_OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
+
+
+def trajectory_dataset(
+    case: Case,
+    time: ArrayLike,
+    displacement: ArrayLike,
+    velocity: ArrayLike,
+    reaction: ArrayLike,
+    energies: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any],
+) -> xr.Dataset:
+    """Dataset of a motion, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What moved.
+    time : array_like, shape (nt,)
+        Times of the samples (s).
+    displacement, velocity : array_like, shape (nt, n, 3)
+        Displacement (m) and velocity (m/s) of every node.
+    reaction : array_like, shape (nt, ns)
+        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+    energies : mapping of str to array_like, shape (nt,)
+        kinetic, strain_bars, strain_folds, strain_bends, dissipated, work (J).
+    statistics : mapping
+        Facts about the run, each stored as an attribute. `dt` (s) and `steps` give the stage
+        times t_n and t_n + dt/2 at which functions of time are sampled.
+
+    Returns
+    -------
+    xarray.Dataset
+        `displacement`, `velocity` (time, node, axis), `reaction` (time, support) with the
+        coordinates `support_node` and `support_axis`, the energies (time), `rest_position`
+        (node, axis), and the case: `case` (TOML), `vertices`, `faces` (vertex numbers of all
+        faces in a row) with `face_offsets` (face i is faces[face_offsets[i]:face_offsets[i+1]]),
+        `assignments`, and tables. The attribute `rerunnable` is 1 when `case_of` can rebuild the
+        case, else 0, and `not_rerunnable_because` says why.
+    """
+    time = np.array(time, dtype=np.float64)
+    node_axis = ("node", "axis")
+    support = case.supported_dofs
+    data: dict[str, Any] = {
+        "displacement": _variable(
+            ("time", *node_axis), displacement, "m", "displacement from the rest position"
+        ),
+        "velocity": _variable(("time", *node_axis), velocity, "m/s", "velocity"),
+        "reaction": _variable(("time", "support"), reaction, "N", "force of the support"),
+    }
+    for name, text in ENERGIES.items():
+        data[name] = _variable(("time",), energies[name], "J", text)
+    document = to_document(case, stage_times(statistics))
+    data.update(_case_variables(document))
+    attributes: dict[str, Any] = {
+        "foldyn_result": "trajectory",
+        "foldyn_format": FORMAT,
+        "foldyn_version": _version(),
+        "rerunnable": 0 if document.obstacles else 1,
+    }
+    if document.obstacles:
+        attributes["not_rerunnable_because"] = "; ".join(document.obstacles)
+    attributes.update(_attributes(statistics))
+    coordinates = {
+        "time": ("time", time, {"units": "s", "long_name": "time"}),
+        "node": np.arange(len(case.structure.nodes)),
+        "axis": AXIS,
+        "support_node": ("support", support // 3),
+        "support_axis": ("support", AXIS[support % 3]),
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
+    """Return the times n dt and n dt + dt/2 of a run from its `dt` (s) and `steps`, else None."""
+    dt, steps = statistics.get("dt"), statistics.get("steps")
+    if dt is None or steps is None or int(steps) < 1:
+        return None
+    steps = int(steps)
+    times = np.empty(2 * steps + 1)
+    times[::2] = np.arange(steps + 1) * float(dt)
+    times[1::2] = np.arange(steps) * float(dt) + 0.5 * float(dt)
+    return times
+
+
+def _case_variables(document: Document) -> dict[str, Any]:
+    dimensions = {
+        "rest_position": ("node", "axis"),
+        "vertices": ("vertex", "axis"),
+        "faces": ("face_corner",),
+        "face_offsets": ("face_bound",),
+        "assignments": ("crease",),
+        "tables_crease_stiffness": ("crease",),
+        "tables_crease_rest": ("crease",),
+    }
+    variables: dict[str, Any] = {
+        "case": ((), tomli_w.dumps(document.sections), {"long_name": "the case (TOML)"})
+    }
+    for name, array in document.arrays.items():
+        # the times and values of one table share a dimension
+        own = (f"{name.rsplit('_', 1)[0]}_point",)
+        attributes = {"units": "m"} if name in ("rest_position", "vertices") else {}
+        variables[name] = (dimensions.get(name, own), array, attributes)
+    return variables
+
+
+def _variable(dimensions: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
+    return dimensions, np.asarray(values), {"units": units, "long_name": text}
+
+
+def _attributes(statistics: Mapping[str, Any]) -> dict[str, Any]:
+    """Statistics as NetCDF holds them: numbers, text and lists of numbers."""
+    attributes: dict[str, Any] = {}
+    for name, value in statistics.items():
+        if name in _OWN:
+            raise ValueError(f"statistics: {name} is an attribute of every result")
+        if value is None:
+            continue
+        if isinstance(value, bool | np.bool_):
+            attributes[name] = int(value)
+        elif isinstance(value, Integral):
+            attributes[name] = int(value)
+        elif isinstance(value, Real):
+            attributes[name] = float(value)
+        elif isinstance(value, list | tuple | np.ndarray):
+            attributes[name] = np.asarray(value)
+        else:
+            attributes[name] = str(value)
+    return attributes
+
+
+def _version() -> str:
+    try:
+        return version("foldyn")
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,80 @@
+"""Results in files (NetCDF)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from foldyn.errors import InputError
+from foldyn.results.dataset import FORMAT
+from foldyn.results.origin import check_result
+
+ENGINE = "h5netcdf"
+
+
+def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a result to a NetCDF file.
+
+    The file appears only when it is complete; one of the same name is replaced.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result.
+    path : path
+        The file, usually ``*.nc``; its folder must exist.
+
+    Raises
+    ------
+    InputError
+        Not a result, or the path cannot be written.
+    """
+    check_result(ds, "cannot save: the dataset ")
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        ds.to_netcdf(partial, engine=ENGINE)
+        os.replace(partial, path)
+    except PermissionError:
+        raise InputError(f"{path}: may not be written; choose another folder") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result from a NetCDF file, whole into memory.
+
+    Parameters
+    ----------
+    path : path
+        A file that `save` wrote.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is not a Foldyn result.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    try:
+        ds = xr.load_dataset(path, engine=ENGINE, decode_times=False)
+    except (OSError, ValueError, KeyError):
+        raise InputError(f"{path}: is not a Foldyn result (it cannot be read as NetCDF)") from None
+    check_result(ds, f"{path}: ")
+    if int(ds.attrs.get("foldyn_format", 0)) > FORMAT:
+        raise InputError(
+            f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
+            "version does not know; update Foldyn"
+        )
+    return ds

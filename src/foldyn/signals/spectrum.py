@@ -1,0 +1,139 @@
+"""Amplitude spectrum of a uniformly sampled record."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+import scipy.signal
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+
+MINIMUM_SAMPLES = 4
+_DETRENDS = (None, "constant", "linear")
+
+
+def spectrum(
+    x: ArrayLike,
+    dt: float,
+    axis: int = 0,
+    window: str | tuple | ArrayLike | None = None,
+    detrend: str | None = None,
+    pad: int = 1,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """One-sided amplitude spectrum: a sine of amplitude A on a bin gives a peak of height A.
+
+    The transform is divided by the sum of the window (its coherent gain) and doubled for the
+    negative frequencies; zero and, for an even length, the Nyquist frequency stand for themselves
+    and are not doubled. Without window and padding Parseval's identity reads
+    ``mean(x**2) == a[0]**2 + sum(a[1:]**2)/2``, the Nyquist term (even length) counted whole.
+
+    Parameters
+    ----------
+    x : array_like
+        Real samples, in any unit; evenly spaced along `axis`.
+    dt : float
+        Sampling interval (s); `foldyn.signals.sampling_interval` finds and checks it.
+    axis : int
+        Axis of time.
+    window : str, tuple, array_like of shape (n,), or None
+        None leaves the record as it is; a name or a (name, parameter) tuple as
+        `scipy.signal.get_window` takes it (its periodic form); or the window's own samples.
+    detrend : {None, "constant", "linear"}
+        What is taken off before windowing: nothing, the mean, or the straight line of best fit.
+    pad : int
+        Zeros are appended up to `pad` times the length: a finer grid, not a finer resolution,
+        which stays 1/(n dt).
+
+    Returns
+    -------
+    frequencies : ndarray, shape (m,)
+        0 ... 1/(2 dt) (Hz), m = pad*n//2 + 1.
+    amplitude : ndarray
+        In the unit of `x`; the shape of `x` with m in place of n along `axis`.
+
+    Raises
+    ------
+    InputError
+        Fewer than 4 samples, NaN or infinity in the record, complex samples, an interval that is
+        not positive, an unknown window or detrend, or a padding factor below 1.
+    """
+    samples = _checked_samples(x, axis)
+    n = samples.shape[0]
+    interval = _checked_interval(dt)
+    if detrend not in _DETRENDS:
+        raise InputError(f'detrend: {detrend!r} is unknown; use None, "constant" or "linear"')
+    if isinstance(pad, bool) or not isinstance(pad, int | np.integer) or pad < 1:
+        raise InputError(f"pad: {pad!r}; the padding factor is a whole number from 1 up")
+
+    if detrend is not None:
+        samples = scipy.signal.detrend(samples, axis=0, type=detrend)
+    gain = float(n)
+    if window is not None:
+        weights = _window(window, n)
+        gain = float(weights.sum())
+        samples = samples * weights.reshape((n,) + (1,) * (samples.ndim - 1))
+
+    length = n * int(pad)
+    amplitude = np.abs(scipy.fft.rfft(samples, n=length, axis=0)) / gain
+    doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)
+    amplitude[doubled] *= 2.0
+    return scipy.fft.rfftfreq(length, interval), np.moveaxis(amplitude, 0, axis)
+
+
+def _checked_samples(x: ArrayLike, axis: int) -> NDArray[np.float64]:
+    """Return the samples as float64 with time along axis 0."""
+    try:
+        samples = np.asarray(x)
+        if np.iscomplexobj(samples):
+            raise InputError("x: complex samples; a one-sided spectrum needs a real record")
+        samples = samples.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"x: not an array of numbers ({error})") from error
+    if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
+        raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
+    samples = np.moveaxis(samples, axis, 0)
+    if samples.shape[0] < MINIMUM_SAMPLES:
+        raise InputError(
+            f"x: {samples.shape[0]} samples along axis {axis}; a spectrum needs at least "
+            f"{MINIMUM_SAMPLES}: run longer or store more often"
+        )
+    bad = ~np.isfinite(samples)
+    if bad.any():
+        first = int(np.argwhere(bad)[0][0])
+        raise InputError(
+            f"x: {int(bad.sum())} samples are NaN or infinite, the first at index {first} in "
+            "time; cut the record or fill the gap first"
+        )
+    return samples
+
+
+def _checked_interval(dt: float) -> float:
+    """Return the sampling interval as a positive float."""
+    try:
+        interval = float(dt)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"dt: {dt!r} is not one number; for sample times use signals.sampling_interval(time)"
+        ) from error
+    if not (np.isfinite(interval) and interval > 0.0):
+        raise InputError(f"dt: {dt!r}; the sampling interval is a positive number of seconds")
+    return interval
+
+
+def _window(window: str | tuple | ArrayLike, n: int) -> NDArray[np.float64]:
+    """Return the window's samples, by name or as given."""
+    if isinstance(window, str | tuple):
+        try:
+            weights = np.asarray(scipy.signal.get_window(window, n), dtype=np.float64)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"window: {window!r} is not known to scipy ({error})") from error
+    else:
+        weights = np.asarray(window, dtype=np.float64)
+        if weights.shape != (n,):
+            raise InputError(f"window: shape {weights.shape}, but the record has {n} samples")
+    if not np.isfinite(weights).all() or weights.sum() <= 0.0:
+        raise InputError("window: its samples must be finite and their sum positive")
+    return weights

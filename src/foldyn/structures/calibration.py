@@ -1,0 +1,141 @@
+"""Stiffness of folds, bends and bars from the sheet (MERLIN2's calibration).
+
+With G = E t^3 / (12 (1 - nu^2)) and Ls the length-scale ratio:
+fold of length Lf            1/kf = Ls/G + 1/(0.55 G (Lf/t)^(1/3)), whole crease;
+bend on a spoke (N5B8)       G (D/t)^(1/3)/D times the spoke's length, D = spoke + opposite spoke;
+bend on a diagonal (N4B5)    the same with D the diagonal, times D;
+bars of an N5B8 quad         t |H^2 - nu W^2| / (2 H (1 - nu^2)) for edges 1 and 3, H and W
+                             exchanged for edges 2 and 4, t nu (H^2 + W^2)^1.5 / (2 H W (1 - nu^2))
+                             for spokes; W, H the mean lengths of edges 1, 3 and of edges 2, 4;
+bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars alike.
+
+Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
+assigns two of these in another order than their formulas say; `calibration="merlin2"` reproduces
+that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results contain it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+from foldyn.structures.mesh import Mesh
+from foldyn.structures.sheet import Sheet
+
+
+def fold_stiffness(length: NDArray, sheet: Sheet) -> NDArray:
+    """Stiffness of whole creases (N m/rad) of the given lengths (m)."""
+    g = sheet.bending_modulus
+    slender = 0.55 * g * (length / sheet.thickness) ** (1.0 / 3.0)
+    return 1.0 / (sheet.length_scale_ratio / g + 1.0 / slender)
+
+
+def bend_stiffness_per_length(d: NDArray, sheet: Sheet) -> NDArray:
+    """Stiffness per length of bend (N/rad) for a panel diagonal d (m)."""
+    return sheet.bending_modulus * (d / sheet.thickness) ** (1.0 / 3.0) / d
+
+
+def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool) -> NDArray:
+    """Stiffness of each whole bend (N m/rad), in the mesh's order."""
+    vector = mesh.nodes[mesh.inner[:, 1]] - mesh.nodes[mesh.inner[:, 0]]
+    length = np.linalg.norm(vector, axis=1)
+    if not len(length):
+        return length
+    on_diagonal = mesh.centers[mesh.inner_panel] < 0
+    if on_diagonal.all():
+        return bend_stiffness_per_length(length, sheet) * length
+    per_length = np.empty(len(length))
+    _, first, count = np.unique(mesh.inner_panel, return_index=True, return_counts=True)
+    for size in np.unique(count):
+        rows = first[count == size][:, None] + np.arange(size)  # spokes of each panel, by corner
+        if size == 4:
+            opposite = np.roll(length[rows], -2, axis=1)
+        else:
+            unit = vector[rows] / length[rows][:, :, None]
+            alignment = np.einsum("pic,pjc->pij", unit, unit)
+            opposite = np.take_along_axis(length[rows], alignment.argmin(axis=2), axis=1)
+        kb = bend_stiffness_per_length(length[rows] + opposite, sheet)
+        if merlin2:
+            kb = _merlin2_corners(kb, rows, mesh, pattern)
+        per_length[rows] = kb
+    return per_length * length
+
+
+def _merlin2_corners(kb: NDArray, rows: NDArray, mesh: Mesh, pattern: Pattern) -> NDArray:
+    """kb (p, m) by corner as MERLIN2 assigns it.
+
+    The corner with the i-th smallest node number gets the value of the i-th listed corner.
+    """
+    out = np.empty_like(kb)
+    for p, spokes in enumerate(rows):
+        panel = int(mesh.inner_panel[spokes[0]])
+        listed = _listed_corners(pattern, panel)
+        rank = np.argsort(np.array(pattern.faces[panel])[listed])
+        out[p, np.array(listed)[rank]] = kb[p, listed]
+    return out
+
+
+def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
+    """Positions of a face's corners in the order in which the face was given."""
+    m = len(pattern.faces[panel])
+    return [0, *range(m - 1, 0, -1)] if pattern.flipped[panel] else list(range(m))
+
+
+def bar_areas(
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool
+) -> tuple[NDArray, dict[tuple[int, int], float]]:
+    """Cross-section areas (m2): of the inner bars (nh,), and of the edges by (low, high) pair."""
+    t, nu = sheet.thickness, sheet.poissons_ratio
+    x = mesh.nodes
+    inner = np.zeros(len(mesh.inner))
+    inner_length = np.linalg.norm(x[mesh.inner[:, 1]] - x[mesh.inner[:, 0]], axis=1)
+    inner_sum = np.bincount(mesh.inner_panel, inner_length, minlength=len(pattern.faces))
+    panel_area = np.bincount(mesh.triangle_panel, mesh.triangle_areas(), len(pattern.faces))
+    inner_first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    creases = set(map(tuple, pattern.creases.tolist()))
+    edges: dict[tuple[int, int], float] = {}
+    for panel, face in enumerate(pattern.faces):
+        inside = slice(inner_first[panel], inner_first[panel + 1])
+        ends = [tuple(sorted(e)) for e in zip(face, face[1:] + face[:1], strict=True)]
+        length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
+        if len(face) == 4 and mesh.centers[panel] >= 0:
+            w, h = 0.5 * (length[0] + length[2]), 0.5 * (length[1] + length[3])
+            scale = t / (2.0 * (1.0 - nu**2))
+            along = scale * abs(h**2 - nu * w**2) / h
+            across = scale * abs(w**2 - nu * h**2) / w
+            area = np.array([along, across, along, across])
+            inner[inside] = scale * nu * (h**2 + w**2) ** 1.5 / (h * w)
+            if merlin2 and all(e in creases for e in ends):
+                area = _merlin2_edges(area, ends, pattern, panel)
+        else:
+            area = np.full(
+                len(face),
+                2.0 * panel_area[panel] * t / ((1.0 - nu) * (length.sum() + inner_sum[panel])),
+            )
+            inner[inside] = area[0]
+        for pair, value in zip(ends, area.tolist(), strict=True):
+            edges[pair] = edges.get(pair, 0.0) + value
+    return inner, edges
+
+
+def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> NDArray:
+    """Areas of a quad with four folds as MERLIN2 assigns them.
+
+    The i-th edge in lexicographic order of its node numbers gets the area of the i-th listed one.
+    """
+    listed = [3, 2, 1, 0] if pattern.flipped[panel] else [0, 1, 2, 3]
+    out = np.empty(4)
+    out[sorted(range(4), key=lambda k: ends[k])] = area[listed]
+    return out
+
+
+def check_poisson(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> None:
+    """Refuse a Poisson's ratio that leaves N5B8 spokes without area."""
+    quads = [p for p, f in enumerate(pattern.faces) if len(f) == 4 and mesh.centers[p] >= 0]
+    if quads and sheet.poissons_ratio <= 0.0:
+        raise InputError(
+            f"sheet: poissons_ratio = {sheet.poissons_ratio}: N5B8 quadrilaterals need it above 0 "
+            '(the area of their spokes is proportional to it); use scheme = "n4b5"'
+        )

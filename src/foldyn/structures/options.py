@@ -1,0 +1,33 @@
+"""The choices that turn a pattern into a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from foldyn.errors import InputError
+from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
+
+SCHEMES = ("n5b8", "n4b5")
+CALIBRATIONS = ("standard", "merlin2")
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """Arguments of `discretize` beside pattern and sheet; see there."""
+
+    scheme: Literal["n5b8", "n4b5"] = "n5b8"
+    mass: str = "mixed_voronoi"
+    bar_law: str | BarLaw = "ogden"
+    fold_law: str | HingeLaw = EnhancedLinear()
+    bend_law: str | HingeLaw = "superlinear"
+    calibration: Literal["standard", "merlin2"] = "standard"
+    crease_stiffness: float | Sequence[float] | None = None
+    crease_rest: float | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for field, known in (("scheme", SCHEMES), ("calibration", CALIBRATIONS)):
+            value = getattr(self, field)
+            if value not in known:
+                raise InputError(f"{field} = {value!r}: choose one of {', '.join(known)}")

@@ -1,0 +1,204 @@
+"""`Structure`: nodes, bars, hinges and mass; its energy, internal force and tangent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from foldyn import mechanics
+from foldyn.errors import InputError
+from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
+from foldyn.patterns import Pattern
+from foldyn.structures.mass import MASS_RULES, Surface
+from foldyn.structures.options import ModelOptions
+from foldyn.structures.sheet import Sheet
+
+GROUPS = ("strain_bars", "strain_folds", "strain_bends")
+
+
+def _none(width: int, kind: type = np.int64) -> NDArray:
+    return np.zeros((0, width), kind) if width > 1 else np.zeros(0, kind)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Structure:
+    """A discretized pattern; usually made by `discretize`.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        Rest positions (m): the pattern's vertices, then panel centers in panel order.
+    bars, bar_length, bar_area : (nb, 2), (nb,), (nb,)
+        Inner bars, then creases, then boundary edges; m and m2.
+    folds, fold_stiffness, fold_rest : (nf, 4), (nf,), (nf,)
+        Hinge rows (axis j, k, wings i, l) in the order of `pattern.creases`; stiffness of the
+        whole crease (N m/rad); rest dihedral (rad).
+    bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
+        The same for the hinges inside panels.
+    triangles, triangle_panel : (nt, 3), (nt,)
+        Triangles, counter-clockwise from the front, and the panel of each.
+    centers : (np,)
+        Node number of each panel's center, -1 without one.
+    pattern, sheet, options
+        What it was made of.
+    """
+
+    nodes: NDArray
+    bars: NDArray
+    bar_area: NDArray
+    sheet: Sheet
+    options: ModelOptions = field(default_factory=ModelOptions)
+    pattern: Pattern | None = None
+    folds: NDArray = field(default_factory=lambda: _none(4))
+    fold_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
+    fold_rest: NDArray = field(default_factory=lambda: _none(1, float))
+    bends: NDArray = field(default_factory=lambda: _none(4))
+    bend_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
+    bend_rest: NDArray = field(default_factory=lambda: _none(1, float))
+    triangles: NDArray = field(default_factory=lambda: _none(3))
+    triangle_panel: NDArray = field(default_factory=lambda: _none(1))
+    centers: NDArray = field(default_factory=lambda: _none(1))
+    node_mass: NDArray | None = None
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                frozen = np.array(value)
+                frozen.setflags(write=False)
+                object.__setattr__(self, item.name, frozen)
+
+    def __repr__(self) -> str:
+        """One line with the counts."""
+        return (
+            f"<Structure {self.options.scheme}: {len(self.nodes)} nodes, {len(self.bars)} bars, "
+            f"{len(self.folds)} folds, {len(self.bends)} bends, mass {self.options.mass}>"
+        )
+
+    @cached_property
+    def bar_length(self) -> NDArray:
+        """Rest lengths of the bars (nb,), m."""
+        length = np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
+        length.setflags(write=False)
+        return length
+
+    @cached_property
+    def bar_law(self) -> BarLaw:
+        """Law of the bars."""
+        return bar_law(self.options.bar_law)
+
+    @cached_property
+    def fold_law(self) -> HingeLaw:
+        """Law of the folds."""
+        return hinge_law(self.options.fold_law, "fold_law")
+
+    @cached_property
+    def bend_law(self) -> HingeLaw:
+        """Law of the bends."""
+        return hinge_law(self.options.bend_law, "bend_law")
+
+    @cached_property
+    def model(self) -> mechanics.BarsHinges:
+        """The arrays that the compiled kernels work on."""
+        folds = (self.folds, self.fold_stiffness, self.fold_rest, self.fold_law)
+        bends = (self.bends, self.bend_stiffness, self.bend_rest, self.bend_law)
+        return mechanics.build(
+            self.nodes,
+            self.bars,
+            self.sheet.youngs_modulus * self.bar_area / self.bar_length,
+            self.bar_law,
+            (mechanics.Hinges(*folds), mechanics.Hinges(*bends)),
+        )
+
+    @cached_property
+    def sparsity(self) -> mechanics.Sparsity:
+        """Pattern of the tangent."""
+        return mechanics.sparsity(self.model)
+
+    @cached_property
+    def mass(self) -> sparse.csr_array:
+        """Nodal mass matrix (n, n), kg; one value serves the three axes.
+
+        Raises
+        ------
+        InputError
+            The sheet has no density, or the rule does not suit the structure.
+        """
+        if self.node_mass is not None:
+            return sparse.csr_array(sparse.diags_array(self.node_mass))
+        return MASS_RULES[self.options.mass](self.surface)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Triangles with their masses: what a mass rule distributes."""
+        if self.sheet.density is None:
+            raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
+        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return Surface(
+            nodes=self.nodes,
+            faces=self.pattern.faces if self.pattern is not None else (),
+            centers=self.centers,
+            triangles=self.triangles,
+            triangle_panel=self.triangle_panel,
+            triangle_area=area,
+            areal_density=self.sheet.density * self.sheet.thickness,
+        )
+
+    def energies(self, u: ArrayLike) -> Mapping[str, float]:
+        """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
+        out = np.empty(len(GROUPS))
+        mechanics.strain_energies(self.model, self._displacement(u), out)
+        return dict(zip(GROUPS, out.tolist(), strict=True))
+
+    def energy(self, u: ArrayLike) -> float:
+        """Strain energy (J) at displacement u (n, 3), m."""
+        return sum(self.energies(u).values())
+
+    def internal_force(self, u: ArrayLike) -> NDArray:
+        """Internal force (n, 3), N, at displacement u (n, 3), m: the gradient of the energy."""
+        force = np.empty((len(self.nodes), 3))
+        displacement = self._displacement(u)
+        mechanics.internal_force(
+            self.model, displacement, force, mechanics.workspace(self.model)
+        )
+        return force
+
+    def tangent(self, u: ArrayLike, floor: float = -np.inf) -> sparse.csr_array:
+        """Tangent stiffness (3n, 3n), N/m, at displacement u (n, 3), m; dof = 3 node + axis.
+
+        Parameters
+        ----------
+        u : (n, 3)
+            Displacement.
+        floor : float, optional
+            Hinge slopes below floor times the hinge's stiffness are raised to it. Without it
+            the tangent is the exact second derivative of the energy: singular at rest where
+            superlinear bends have no slope.
+        """
+        return mechanics.tangent(
+            self.model, self.sparsity, self._displacement(u), floor
+        ).tocsr()
+
+    def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
+        """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
+        x = self.nodes + self._displacement(u)
+        return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
+
+    def _displacement(self, u: ArrayLike) -> NDArray:
+        array = np.ascontiguousarray(u, float)
+        if array.size != self.nodes.size:
+            raise InputError(
+                f"displacement of shape {np.shape(u)}: give {self.nodes.shape} (nodes, axes)"
+            )
+        return array.reshape(self.nodes.shape)
+
+
+def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
+    """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
+    return mechanics.angles(np.ascontiguousarray(x), np.ascontiguousarray(hinges, np.int32))

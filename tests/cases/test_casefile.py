@@ -1,0 +1,144 @@
+"""Case files: what a good one gives, and the one message that a bad one gets."""
+
+from __future__ import annotations
+
+import textwrap
+
+import numpy as np
+import pytest
+
+from foldyn.cases import Constant, Pulse, Rayleigh, Table, read_case_file
+from foldyn.errors import InputError
+from foldyn.formats import write_pattern
+from foldyn.materials import EnhancedLinear
+from foldyn.patterns import miura
+from foldyn.structures import MASS_RULES, ModelOptions, Sheet
+
+
+def test_the_example_of_the_design(read, example, tmp_path) -> None:
+    found = read(example)
+    assert found.path == tmp_path / "case2.toml"
+    assert found.title == "an example"
+    assert found.masses == ["circumcenter"]
+    assert found.sheet == Sheet(1e6, 0.25, 0.01, 1000.0, 1.0)
+    np.testing.assert_array_equal(found.pattern.vertices, miura(dihedral=60).vertices)
+    case = found.case()
+    assert case.structure.options == ModelOptions(
+        mass="circumcenter", fold_law=EnhancedLinear(45, 315, "stress_free")
+    )
+    assert case.damping == Rayleigh(0.02, 0.0)
+    np.testing.assert_array_equal(case.supported_dofs, range(9))
+    ((forces, history),) = case.load_terms
+    np.testing.assert_array_equal(np.argwhere(forces), [[6, 0], [7, 0], [8, 0]])
+    assert forces[7, 0] == 0.01
+    assert history == Pulse(1.0)
+    assert found.analysis.kind == "dynamics"
+    assert found.analysis.arguments == {
+        "method": "rk4",
+        "duration": 20.0,
+        "dt": None,
+        "every": 0.01,
+        "force": False,
+    }
+    np.testing.assert_array_equal(found.output.nodes, [6, 7])
+    assert found.output.every == 0.01
+
+
+def test_what_is_left_out_has_its_default(read, short) -> None:
+    found = read(short)
+    assert found.title == ""
+    assert found.masses == [ModelOptions().mass]
+    case = found.case()
+    assert case.structure.options == ModelOptions()
+    assert case.damping == Rayleigh()
+    assert case.load_terms[0][1] == Constant()
+    np.testing.assert_array_equal(found.output.nodes, [6, 7])  # the loaded ones
+    assert found.output.every == found.analysis.arguments["every"] == 10.0 / 2000
+    assert isinstance(found.output.every, float)
+    assert found.analysis.arguments["method"] == "rk4"
+
+
+def test_every_counts_steps_when_it_is_whole(read, short) -> None:
+    found = read(short + "[output]\nevery = 5\nnodes = 'zmax'")
+    assert found.output.every == 5
+    assert isinstance(found.output.every, int)
+    height = found.pattern.vertices[:, 2]
+    np.testing.assert_array_equal(found.output.nodes, np.flatnonzero(height > 0.1))
+
+
+def test_without_loads_the_movable_vertices_are_shown(read, short) -> None:
+    text = short.replace("[[loads]]\nnodes = [7, 6]\nforce = [1, 0, 0]\n", "")
+    np.testing.assert_array_equal(read(text).output.nodes, [3, 4, 5, 6, 7, 8])
+
+
+def test_a_list_of_mass_rules_makes_a_case_each(read, short) -> None:
+    rules = list(MASS_RULES)
+    found = read(short.replace("[[supports]]", f"[model]\nmass = {rules}\n[[supports]]"))
+    assert found.masses == rules
+    assert [found.case(rule).structure.options.mass for rule in rules] == rules
+    assert found.case() is found.case(rules[0])
+    assert found.case("panel").structure.mass.sum() == pytest.approx(
+        found.case("consistent").structure.mass.sum(), rel=1e-14
+    )
+    with pytest.raises(InputError, match="did you mean 'centroid'"):
+        found.case("centroids")
+
+
+def test_model_values_per_crease_and_laws_by_name(read, short) -> None:
+    model = """
+    [model]
+    bar_law = "linear"
+    fold_law = "linear"
+    bend_law = { kind = "linear" }
+    crease_stiffness = [0.1, 0.2, 0.3, 0.4]
+    crease_rest = 120
+    [[supports]]"""
+    structure = read(short.replace("[[supports]]", textwrap.dedent(model))).case().structure
+    assert structure.bar_law.name == structure.fold_law.name == structure.bend_law.name == "linear"
+    np.testing.assert_allclose(structure.fold_rest, np.radians(120.0), rtol=1e-15)
+    np.testing.assert_allclose(structure.fold_stiffness, [0.1, 0.2, 0.3, 0.4], rtol=1e-12)
+
+
+def test_an_inline_table_as_history(read, short) -> None:
+    text = short + "[damping]\nalpha = 1"
+    history = 'history = { kind = "table", times = [0, 1], values = [0, 2.5] }'
+    found = read(text.replace("force = [1, 0, 0]", f"force = [1, 0, 0]\n{history}"))
+    assert found.case().loads[0].history == Table([0.0, 1.0], [0.0, 2.5])
+
+
+def test_patterns_inline_and_from_a_file(read, short, tmp_path) -> None:
+    inline = """
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]]
+    faces = [[0, 1, 3], [1, 2, 3]]
+    assignments = ["U"]
+    """
+    text = short.replace('kind = "miura"', textwrap.dedent(inline)).replace("[7, 6]", "[2]")
+    pattern = read(text).pattern
+    assert pattern.assignments == ("U",)
+    write_pattern(tmp_path / "sheet.fold", pattern)
+    found = read(text.replace(textwrap.dedent(inline), 'file = "sheet.fold"\n'))
+    np.testing.assert_array_equal(found.pattern.vertices, pattern.vertices)
+    assert found.pattern.faces == pattern.faces
+    assert found.pattern.assignments == ("U",)
+
+
+def test_files_that_cannot_be_read(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"none\.toml: there is no such file"):
+        read_case_file(tmp_path / "none.toml")
+    with pytest.raises(InputError, match=r"is a folder; give a case file"):
+        read_case_file(tmp_path)
+    path = tmp_path / "broken.toml"
+    path.write_text("[sheet]\nthickness = \n")
+    with pytest.raises(InputError, match=r"broken\.toml: is not valid TOML: .*line 2"):
+        read_case_file(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"broken\.toml: is not a text file in UTF-8"):
+        read_case_file(path)
+
+
+def test_the_package_does_not_import_pydantic() -> None:
+    import subprocess
+    import sys
+
+    code = "import sys, foldyn.cases; assert 'pydantic' not in sys.modules; foldyn.cases.CaseFile"
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})

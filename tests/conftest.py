@@ -1,0 +1,30 @@
+"""Fixtures for all tests, and the removal of stale compiled code."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from stale_caches import remove_stale_caches
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+# before anything imports them: figures need no screen, and the oracle needs no accelerator
+os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("JAX_ENABLE_X64", "1")
+
+
+def pytest_configure() -> None:
+    remove_stale_caches()
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Folder of reference data beside the repository; tests that need it skip without it."""
+    folder = REPOSITORY.parent / "shared"
+    if not folder.is_dir():
+        pytest.skip("needs the reference data in ../shared")
+    return folder

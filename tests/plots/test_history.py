@@ -1,0 +1,92 @@
+"""Histories and frequency content in one figure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foldyn.errors import InputError
+from foldyn.plots import plot_history
+
+
+def _lines(axes):
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+def test_one_row_per_node_one_curve_per_trajectory(two_rules):
+    figure = plot_history(two_rules, [6, 7, 8], axes="x", max_frequency=5.0)
+    assert len(figure.axes) == 6
+    for row, node in enumerate((6, 7, 8)):
+        left, right = figure.axes[2 * row : 2 * row + 2]
+        assert left.get_title() == right.get_title() == f"node {node}"
+        assert left.get_ylabel() == "x displacement (m)"
+        assert right.get_ylabel() == "amplitude (m)"
+        for label, dataset in two_rules.items():
+            line = _lines(left)[label]
+            np.testing.assert_array_equal(line.get_xdata(), dataset["time"])
+            np.testing.assert_array_equal(line.get_ydata(), dataset["displacement"][:, node, 0])
+        assert right.get_xlim() == (0.0, 5.0)
+    assert [a.get_xlabel() for a in figure.axes[-2:]] == ["time (s)", "frequency (Hz)"]
+
+
+def test_content_peaks_at_frequency_and_amplitude(two_rules):
+    figure = plot_history(two_rules, [7], axes=["x"], max_frequency=5.0)
+    for label, frequency, amplitude in (("panel", 2.0, 0.014), ("consistent", 1.5, 0.021)):
+        line = _lines(figure.axes[1])[label]
+        peak = np.argmax(line.get_ydata())
+        assert line.get_xdata()[peak] == pytest.approx(frequency, rel=1e-12)
+        assert line.get_ydata()[peak] == pytest.approx(amplitude, rel=1e-12)
+        assert line.get_xdata().max() == pytest.approx(5.0)
+
+
+def test_legend_holds_the_labels_once_outside_the_axes(two_rules):
+    figure = plot_history(two_rules, [6, 7], axes="x")
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == list(two_rules)
+    assert all(axes.get_legend() is None for axes in figure.axes)
+    figure.canvas.draw()
+    box = legend.get_window_extent()
+    assert not any(box.overlaps(axes.get_tightbbox()) for axes in figure.axes)
+
+
+def test_curves_differ_in_color_and_dashes(two_rules):
+    figure = plot_history(two_rules, [6])
+    first, second = figure.axes[0].get_lines()
+    assert first.get_color() != second.get_color()
+    assert first.get_linestyle() != second.get_linestyle()
+
+
+def test_direction_of_largest_motion_is_the_default(two_rules):
+    figure = plot_history(two_rules, [4, 6])
+    assert [a.get_ylabel()[0] for a in figure.axes[::2]] == ["z", "x"]
+    figure = plot_history(two_rules, [4, 6], axes=["y", "x"])
+    assert [a.get_ylabel()[0] for a in figure.axes[::2]] == ["y", "x"]
+
+
+def test_frequency_axis_ends_at_half_the_slowest_sampling(two_rules):
+    two_rules["panel"] = two_rules["panel"].isel(time=slice(None, None, 4))
+    figure = plot_history(two_rules, [6])
+    assert figure.axes[1].get_xlim()[1] == pytest.approx(12.5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"nodes": []}, "nodes"),
+        ({"nodes": [13]}, "0..12"),
+        ({"nodes": [-1]}, "nodes"),
+        ({"axes": "w"}, "axes"),
+        ({"axes": ["x", "y", "z"]}, "3 directions for 1 nodes"),
+        ({"max_frequency": 0.0}, "max_frequency"),
+        ({"trajectories": {}}, "trajectories"),
+    ],
+)
+def test_bad_input(two_rules, arguments, words):
+    with pytest.raises(InputError, match=words):
+        plot_history(**({"trajectories": two_rules, "nodes": [6]} | arguments))
+
+
+def test_uneven_times_are_refused(trajectory):
+    uneven = trajectory.isel(time=[0, 1, 2, 3, 5, 8])
+    with pytest.raises(InputError, match="not evenly spaced"):
+        plot_history({"run": uneven}, [6])

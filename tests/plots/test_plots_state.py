@@ -1,0 +1,65 @@
+"""Plots leave matplotlib's global state alone and are imported on demand."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from foldyn import plots
+
+
+def test_matplotlib_is_imported_on_first_use():
+    code = (
+        "import sys, foldyn, foldyn.plots, foldyn.report\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "foldyn.plots.plot_history, foldyn.plots.animate, foldyn.plots.draw_structure\n"
+        "assert 'matplotlib' in sys.modules and 'matplotlib.pyplot' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_every_public_name_is_there():
+    assert set(plots.__all__) <= set(dir(plots))
+    for name in plots.__all__:
+        assert callable(getattr(plots, name))
+    with pytest.raises(AttributeError, match="no_such"):
+        plots.no_such  # noqa: B018
+
+
+def _figures(case, trajectory):
+    yield plots.draw_structure(case)
+    yield plots.plot_history({"run": trajectory}, [6])
+    yield plots.plot_load_history(case, 1.0)
+    yield plots.plot_laws(case.structure)
+    yield plots.plot_energies(trajectory)
+
+
+def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
+    before = dict(matplotlib.rcParams)
+    usual = [_pixels(figure) for figure in _figures(case, trajectory)]
+    assert dict(matplotlib.rcParams) == before
+    odd = {"font.family": "monospace", "font.size": 20}
+    odd |= {
+        "lines.linewidth": 9.0,
+        "lines.markersize": 1.0,
+        "axes.grid": False,
+        "grid.color": "red",
+    }
+    odd |= {"figure.facecolor": "red", "axes.facecolor": "yellow", "text.color": "green"}
+    odd |= {"axes.labelcolor": "green", "axes.edgecolor": "red", "legend.labelcolor": "red"}
+    with matplotlib.rc_context(odd):
+        unusual = [_pixels(figure) for figure in _figures(case, trajectory)]
+    assert [a == b for a, b in zip(usual, unusual, strict=True)] == [True] * 5
+
+
+def _pixels(figure):
+    assert isinstance(figure, Figure)
+    assert isinstance(figure.canvas, FigureCanvasAgg)
+    assert figure.dpi == 150
+    figure.canvas.draw()
+    return bytes(figure.canvas.buffer_rgba())

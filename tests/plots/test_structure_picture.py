@@ -1,0 +1,174 @@
+"""The picture of a structure: what is drawn, and where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+from foldyn import cases, patterns, structures
+from foldyn.errors import InputError
+from foldyn.plots import draw_structure, style
+from foldyn.plots.scene import View
+from foldyn.plots.visibility import hidden_points, split_edges
+
+
+def _texts(figure):
+    return [text.get_text() for text in figure.axes[0].texts]
+
+
+def _keys(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def _segments(figure, name):
+    """The visible segments of one kind of edge, in space."""
+    (lines,) = [c for c in figure.axes[0].collections if c.get_label() == name]
+    return np.array(lines._segments3d)
+
+
+def test_numbers_of_vertices_and_inner_nodes(structure):
+    assert _texts(draw_structure(structure)) == [str(k) for k in range(9)]
+    assert _texts(draw_structure(structure, numbers="all")) == [str(k) for k in range(13)]
+    assert _texts(draw_structure(structure, numbers=False)) == []
+
+
+def test_axes_have_units_and_equal_scale(case):
+    figure = draw_structure(case, title="Miura cell")
+    (axes,) = figure.axes
+    assert [axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()] == ["x (m)", "y (m)", "z (m)"]
+    assert figure.get_suptitle() == "Miura cell"
+    figure.canvas.draw()
+    # A meter is as long on the screen as the orthographic view says, along each axis.
+    pixels = []
+    for direction, seen in zip(np.eye(3), View().flat(np.eye(3)), strict=True):
+        flat = np.array(
+            [proj_transform(*p, axes.get_proj())[:2] for p in (0 * direction, direction)]
+        )
+        a, b = axes.transData.transform(flat)
+        pixels.append(np.linalg.norm(b - a) / np.linalg.norm(seen))
+    np.testing.assert_allclose(pixels, pixels[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("view", [(28.0, -60.0), (5.0, 20.0), (80.0, -135.0)])
+def test_nothing_is_cut_off(case, view):
+    figure = draw_structure(case, title="Miura cell", numbers="all", view=view)
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+    border = [pixels[:3], pixels[-3:], pixels[:, :3], pixels[:, -3:]]
+    assert all((strip == 255).all() for strip in border)
+    assert (pixels < 255).any(axis=2).mean() > 0.2
+
+
+def test_creases_are_drawn_by_assignment(structure):
+    figure = draw_structure(structure)
+    pattern = structure.pattern
+    for letter, name in (("M", "mountain crease"), ("V", "valley crease")):
+        of_kind = [
+            c for c, k in zip(pattern.creases, pattern.assignments, strict=True) if k == letter
+        ]
+        assert of_kind  # a Miura cell has both
+        drawn = [c for c in figure.axes[0].collections if c.get_label() == name]
+        assert len(drawn) == 1
+        visible = _segments(figure, name)
+        ends = structure.nodes[np.array(of_kind)]
+        # Every visible piece lies on a crease of this kind.
+        for p, q in visible:
+            on = [
+                np.allclose(np.linalg.norm(a - x) + np.linalg.norm(x - b), np.linalg.norm(b - a))
+                for a, b in ends
+                for x in (0.5 * (p + q),)
+            ]
+            assert any(on)
+        assert name in _keys(figure)
+    assert style.CREASES["M"] != style.CREASES["V"]
+
+
+def test_supports_name_the_held_directions(case):
+    figure = draw_structure(case, numbers=False)
+    assert sorted(_texts(figure)) == sorted(["xz", "xy", "xz", "z", "z"])
+    assert "support (directions held)" in _keys(figure)
+    assert "0.01 N along +x on node 7" in _keys(figure)
+    bare = draw_structure(case, numbers=False, supports=False, loads=False)
+    assert _texts(bare) == []
+    assert not any("support" in key or " N " in key for key in _keys(bare))
+
+
+def test_load_arrow_points_along_the_force(structure):
+    force = np.array([0.0, 3.0, 4.0])
+    case = cases.Case(structure, loads=[cases.Force([4], tuple(force))])
+    figure = draw_structure(case)
+    shafts = [
+        np.array(c._segments3d)
+        for c in figure.axes[0].collections
+        if hasattr(c, "_segments3d") and c.get_zorder() == 7.0
+    ]
+    ((start, end),) = shafts[0]
+    np.testing.assert_allclose(start, structure.nodes[4])
+    np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), force / 5.0, atol=1e-12)
+
+
+def test_deformed_sheet_over_the_undeformed(structure):
+    u = np.zeros_like(structure.nodes)
+    u[6:9, 0] = 0.1
+    figure = draw_structure(structure, displacement=u, scale=2.0)
+    assert _keys(figure)[:2] == ["undeformed", "displacement times 2"]
+    boundary = _segments(figure, "boundary").reshape(-1, 3)
+    assert boundary[:, 0].max() == pytest.approx(structure.nodes[:, 0].max() + 0.2)
+
+
+def test_elements_adds_the_inner_bars(structure):
+    assert "bar inside a panel" not in _keys(draw_structure(structure))
+    figure = draw_structure(structure, elements=True)
+    assert "bar inside a panel" in _keys(figure)
+
+
+def test_a_pattern_alone_can_be_drawn():
+    figure = draw_structure(patterns.simple_fold(a=1.0, b=1.0, dihedral=60))
+    assert _texts(figure) == [str(k) for k in range(6)]
+    assert _keys(figure) == ["boundary", "mountain crease"]
+
+
+def test_flat_sheet():
+    flat = patterns.Pattern([(0, 0), (2, 0), (2, 1), (0, 1)], [(0, 1, 2, 3)])
+    figure = draw_structure(structures.discretize(flat, structures.Sheet(1e6, 0.25, 0.01)))
+    low, high = figure.axes[0].get_zlim()
+    assert low < 0.0 < high
+    assert _keys(figure) == ["boundary"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"displacement": np.zeros((9, 3))}, "13 nodes"),
+        ({"displacement": np.full((13, 3), np.nan)}, "NaN"),
+        ({"numbers": "some"}, "numbers"),
+    ],
+)
+def test_bad_input(structure, arguments, words):
+    with pytest.raises(InputError, match=words):
+        draw_structure(structure, **arguments)
+
+
+def test_panels_hide_what_is_behind_them():
+    above = View(elevation=90.0, azimuth=-90.0)  # from +z: x to the right, y up
+    np.testing.assert_allclose(above.basis, np.eye(3), atol=1e-15)
+    square = np.array([(0.0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+    triangles = np.array([(0, 1, 2), (0, 2, 3)])
+    points = np.array([(0.4, 0.5, 0.0), (0.4, 0.5, 2.0), (0.4, 0.5, 1.0), (1.5, 0.5, 0.0)])
+    np.testing.assert_array_equal(
+        hidden_points(points, square, triangles, above, 1.0), [True, False, False, False]
+    )
+
+
+def test_edges_are_cut_where_a_panel_begins():
+    above = View(elevation=90.0, azimuth=-90.0)
+    vertices = np.array([(0.0, 0, 1), (1, 0, 1), (0, 1, 1), (-1, 0.25, 0), (1, 0.25, 0)])
+    visible, hidden = split_edges(
+        np.array([(3, 4), (0, 1)]), vertices, np.array([(0, 1, 2)]), above, 1.0
+    )
+    # Along y = 0.25 the triangle covers 0 < x < 0.75; cut to 1/24 of the edge's 2 m.
+    assert len(hidden) == 1
+    np.testing.assert_allclose(np.sort(hidden[0, :, 0]), [0.0, 0.75], atol=2 / 24)
+    length = np.linalg.norm(np.ptp(np.concatenate([visible, hidden]), axis=1), axis=1).sum()
+    assert length == pytest.approx(3.0, rel=1e-12)

@@ -1,0 +1,185 @@
+"""The report page holds everything it shows."""
+
+from __future__ import annotations
+
+import base64
+import struct
+import zlib
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from foldyn.errors import InputError
+from foldyn.report import Heading, Picture, Table, Text, write_report
+
+_VOID = {"meta", "img", "br", "link"}
+
+
+class _Page(HTMLParser):
+    """Checks nesting and collects what the page holds."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.images, self.links, self.anchors, self.rows = [], [], [], [], []
+        self.texts = {}
+        self.tags = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.tags.append((tag, attrs))
+        if tag not in _VOID:
+            self.open.append(tag)
+        if tag == "img":
+            self.images.append(attrs)
+        if tag == "a":
+            self.links.append(attrs["href"])
+        if "id" in attrs:
+            self.anchors.append(attrs["id"])
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+        elif self.open:
+            self.texts.setdefault(self.open[-1], []).append(data)
+
+
+def _png(width=2, height=2):
+    def chunk(kind, data):
+        body = kind + data
+        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
+
+    rows = b"".join(b"\0" + b"\x40" * width for _ in range(height))
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    parts = (b"IHDR", header), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
+
+
+def _write(tmp_path, *sections, title="Report"):
+    path = write_report(tmp_path / "report.html", title, sections)
+    return _Page(path.read_text(encoding="utf-8"))
+
+
+def test_pictures_are_inside_and_unchanged(tmp_path):
+    png, gif = _png(), b"GIF89a" + bytes(20)
+    (tmp_path / "a.png").write_bytes(png)
+    page = _write(
+        tmp_path,
+        Picture(tmp_path / "a.png", caption="A sheet", alt="gray square"),
+        Picture(gif, caption="It moves"),
+    )
+    first, second = page.images
+    assert first["src"] == "data:image/png;base64," + base64.b64encode(png).decode()
+    assert first["alt"] == "gray square"
+    assert second["src"].startswith("data:image/gif;base64,")
+    assert base64.b64decode(second["src"].split(",")[1]) == gif
+    assert second["alt"] == "It moves"
+    assert page.texts["figcaption"] == ["A sheet", "It moves"]
+
+
+def test_figures_are_drawn_as_png(tmp_path):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(2, 1), dpi=50)
+    page = _write(tmp_path, Picture(figure))
+    data = base64.b64decode(page.images[0]["src"].split(",")[1])
+    assert struct.unpack(">II", data[16:24]) == (100, 50)
+
+
+def test_page_refers_to_nothing_outside(tmp_path):
+    path = write_report(tmp_path / "r.html", "R", [Heading("A"), Heading("B"), Picture(_png())])
+    text = path.read_text(encoding="utf-8")
+    page = _Page(text)
+    assert all(link.startswith("#") for link in page.links)
+    assert all(image["src"].startswith("data:") for image in page.images)
+    assert {tag for tag, _ in page.tags}.isdisjoint({"script", "link", "iframe"})
+    assert "url(" not in text and "@import" not in text
+    assert ("meta", {"charset": "utf-8"}) in page.tags
+    assert any(attrs.get("name") == "viewport" for tag, attrs in page.tags if tag == "meta")
+
+
+def test_table_cells(tmp_path):
+    table = Table(
+        header=["rule", "error (-)", "steps", "holds"],
+        rows=[
+            ["centroid", 0.062034567, 1000, True],
+            ["panel", np.float64(1.25), np.int64(7), np.bool_(False)],
+            ["none", None, None, None],
+        ],
+        caption="Errors",
+        digits=3,
+    )
+    page = _write(tmp_path, table)
+    assert page.rows == [
+        ["rule", "error (-)", "steps", "holds"],
+        ["centroid", "0.062", "1000", "yes"],
+        ["panel", "1.25", "7", "no"],
+        ["none", "", "", ""],
+    ]
+    aligned = [attrs.get("class") for tag, attrs in page.tags if tag == "th"]
+    assert aligned == [None, "number", "number", None]
+    assert page.texts["caption"] == ["Errors"]
+
+
+def test_everything_is_escaped(tmp_path):
+    bad = '<script>alert("x")</script> & more'
+    page = _write(
+        tmp_path,
+        Heading(bad),
+        Text(bad),
+        Table([bad], [[bad]], caption=bad),
+        Picture(_png(), caption=bad),
+        title=bad,
+    )
+    assert "script" not in {tag for tag, _ in page.tags}
+    assert page.rows == [[bad], [bad]]
+    assert page.images[0]["alt"] == bad
+    for tag in ("title", "h1", "h2", "p", "caption", "figcaption"):
+        assert "".join(page.texts[tag]).strip() == bad
+
+
+def test_contents_link_to_the_parts(tmp_path):
+    page = _write(tmp_path, Heading("One"), Heading("inside", level=3), Heading("Two"))
+    assert page.links == ["#part-1", "#part-2"]
+    assert page.anchors == ["part-1", "part-2"]
+    alone = _write(tmp_path, Heading("One"))
+    assert alone.links == []
+
+
+def test_empty_lines_part_paragraphs(tmp_path):
+    page = _write(tmp_path, Text("one\nline\n\n two \n \n\nthree"))
+    assert [text for text in page.texts["p"] if text.strip()] == ["one\nline", "two", "three"]
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        (Picture("missing.png"), "no picture missing.png"),
+        (Picture(b"not a picture"), "PNG, GIF or JPEG"),
+        (Picture(3), "path, bytes or a matplotlib Figure"),
+        ("just text", r"sections\[0\]: str"),
+    ],
+)
+def test_wrong_sections_write_nothing(tmp_path, section, words):
+    with pytest.raises(InputError, match=words):
+        write_report(tmp_path / "r.html", "R", [section])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_wrong_arguments(tmp_path):
+    with pytest.raises(InputError, match="no directory"):
+        write_report(tmp_path / "missing" / "r.html", "R", [])
+    with pytest.raises(InputError, match="level"):
+        Heading("x", level=1)
+    with pytest.raises(InputError, match=r"rows\[1\]: 1 cells under 2"):
+        Table(["a", "b"], [[1, 2], [3]])

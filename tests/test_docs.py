@@ -1,0 +1,73 @@
+"""What the documentation shows works, and every key of a case file is described."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from foldyn.cases import read_case_file
+from foldyn.cases.schema import CaseSchema
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (DOCS / page).read_text("utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S)
+
+
+def test_quickstart_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    for block in blocks("quickstart.md", "python"):
+        exec(compile(block, "quickstart.md", "exec"), names)
+    assert float(abs(names["trajectory"].displacement).max()) > 1e-3
+    assert (tmp_path / "miura.nc").exists()
+
+
+def test_the_case_file_page_shows_a_case_file(tmp_path):
+    (block,) = blocks("case-file.md", "toml")
+    (tmp_path / "case.toml").write_text(block, "utf-8")
+    case_file = read_case_file(tmp_path / "case.toml")
+    assert case_file.masses == ["circumcenter", "consistent"]
+
+
+def sections() -> list[tuple[str, str]]:
+    """(section, key) of the case file."""
+    found = []
+    for name, field in CaseSchema.model_fields.items():
+        kinds = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        models = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)]
+        found += [(name, key) for model in models for key in model.model_fields]
+    return found
+
+
+@pytest.mark.parametrize(("section", "key"), sections())
+def test_every_key_of_a_case_file_is_described(section, key):
+    text = (DOCS / "case-file.md").read_text("utf-8")
+    (part,) = re.findall(rf"^## `\[+{section}\]+`.*?(?=^## |\Z)", text, re.M | re.S)
+    assert re.search(rf"^\| [^|]*`{key}`", part, re.M), f"docs/case-file.md: no row for {key}"
+
+
+def test_sections_are_found():
+    assert {section for section, _ in sections()} >= {"sheet", "model", "loads", "analysis"}
+
+
+def test_inertia_table_is_what_the_code_gives():
+    script = runpy.run_path(str(DOCS / "inertia_table.py"))
+    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    assert script["with_table"](page) == page
+    assert script["table"]() in page
+
+
+def test_inertia_table_knows_the_rhombus():
+    # by hand: m h^2/3 exactly; corners at 0, 0, h, h and the center at h/2
+    script = runpy.run_path(str(DOCS / "inertia_table.py"))
+    rhombus = script["parallelogram"](1, 1, 60)
+    for rule, corner, center in (("panel", 1 / 5, 1 / 5), ("circumcenter", 1 / 8, 1 / 2)):
+        by_hand = 3 * (2 * corner + center / 4) - 1
+        assert script["errors"](rule, rhombus, "n5b8") == pytest.approx([by_hand] * 4)

@@ -1,0 +1,129 @@
+"""What must hold of the repository as a whole."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import foldyn as fd
+from foldyn.cases import schema
+from stale_caches import remove_stale_caches
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = sorted((ROOT / "src").glob("**/*.py"))
+MOST_LINES = 400
+
+# a home folder, a workplace, a temporary folder: of one machine, not of the project
+MACHINE_PATHS = re.compile(
+    r"(?:/root|/home/\w+|/Users/\w+|/work|/mnt/\w+|/opt/\w+|/tmp|C:\\Users)/"
+)
+TEXT = {".py", ".md", ".toml", ".cff", ".yaml", ".yml", ".lock", ".txt", ".cfg", ".json", ""}
+
+
+def tracked_files() -> list[Path]:
+    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+        pytest.skip("not a git checkout")
+    listing = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    return [ROOT / name for name in listing.split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_layers_contract():
+    script = Path(sys.executable).with_name("lint-imports")
+    if not script.exists():
+        pytest.skip("import-linter is not installed")
+    done = subprocess.run(
+        [script, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_stay_short(path):
+    assert len(path.read_text("utf-8").splitlines()) <= MOST_LINES
+
+
+def test_no_paths_of_a_machine():
+    found = []
+    for path in tracked_files():
+        if path.suffix not in TEXT or path == Path(__file__).resolve():
+            continue
+        for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+            if MACHINE_PATHS.search(line):
+                found.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()[:80]}")
+    assert not found, "\n".join(found)
+
+
+def test_lock_names_versions_only():
+    lines = (ROOT / "requirements.lock").read_text("utf-8").splitlines()
+    pins = [line for line in lines if line and not line.lstrip().startswith("#")]
+    assert len(pins) > 50
+    assert [line for line in pins if not re.match(r"^[a-z0-9-]+==[\w.]+( ;.*)?$", line)] == []
+
+
+def test_shipped_cases_are_in_the_package():
+    names = {path.name for path in (ROOT / "src/foldyn/studies/herkal/cases").glob("*.toml")}
+    assert {"case1.toml", "case2.toml", "case3.toml", "case4.toml"} <= names
+
+
+@pytest.mark.parametrize(
+    ("page", "registry"),
+    [
+        ("patterns.md", "patterns.GENERATORS"),
+        ("laws.md", "materials.BAR_LAWS"),
+        ("laws.md", "materials.HINGE_LAWS"),
+        ("mass-rules.md", "structures.MASS_RULES"),
+        ("integrators.md", "dynamics.METHODS"),
+        ("formats.md", "formats.FORMATS"),
+        ("histories.md", "cases.HISTORIES"),
+    ],
+)
+def test_every_registry_row_has_a_docs_row(page, registry):
+    module, name = registry.split(".")
+    __import__(f"foldyn.{module}")
+    text = (ROOT / "docs" / page).read_text("utf-8")
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    missing = [key for key in getattr(getattr(fd, module), name) if f"`{key}`" not in "".join(rows)]
+    assert not missing, f"docs/{page} has no row for {missing}"
+
+
+def test_case_files_may_name_every_integrator():
+    assert set(schema.METHODS) == set(fd.dynamics.METHODS)
+
+
+def test_every_top_level_name_is_in_the_api_page():
+    text = (ROOT / "docs/api.md").read_text("utf-8")
+    public = [name for name in fd.__all__ if not name.startswith("_")]
+    missing = [name for name in public if not re.search(rf"\b{name}\b", text)]
+    assert not missing, f"docs/api.md does not show {missing}"
+
+
+def test_stale_caches_are_removed(tmp_path):
+    layer = tmp_path / "mechanics"
+    (layer / "__pycache__").mkdir(parents=True)
+    source, index, data = (
+        layer / "force.py",
+        layer / "__pycache__" / "force.f-1.py311.nbi",
+        layer / "__pycache__" / "force.f-1.py311.1.nbc",
+    )
+    for path in (source, index, data):
+        path.write_text("", "utf-8")
+    os.utime(source, (100, 100))
+    os.utime(index, (200, 200))
+    assert remove_stale_caches(tmp_path) == 0
+    assert index.exists()
+    os.utime(source, (300, 300))
+    assert remove_stale_caches(tmp_path) == 2
+    assert not index.exists()
+    assert not data.exists()
