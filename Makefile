@@ -51,7 +51,8 @@ demo: $(STAMP)  ## run the four shipped case studies; pictures in demo-results/
 	  echo "== $$name"; \
 	  $(BIN)/foldyn run $(CASES)/$$name.toml --out $(DEMO_OUT)/$$name $(DEMO_FLAGS); \
 	done
-	@echo; echo 'The pictures:'; find $(DEMO_OUT) -name '*.png' | sort | sed 's/^/  /'
+	@echo; echo 'The pictures, and a page with all of each case:'
+	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
 test: $(STAMP)  ## run the tests
 	@$(BIN)/python -m pytest $(PYTEST_FLAGS)

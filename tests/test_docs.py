@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from foldyn.cases import read_case_file
+from foldyn.cases import read_case
 from foldyn.cases.schema import CaseSchema
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -32,7 +32,7 @@ def test_quickstart_runs(tmp_path, monkeypatch):
 def test_the_case_file_page_shows_a_case_file(tmp_path):
     (block,) = blocks("case-file.md", "toml")
     (tmp_path / "case.toml").write_text(block, "utf-8")
-    case_file = read_case_file(tmp_path / "case.toml")
+    case_file = read_case(tmp_path / "case.toml")
     assert case_file.masses == ["circumcenter", "consistent"]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from foldyn.cases import read_case_file
+from foldyn.cases import read_case
 
 # the example of the design, section 4, with loads that its supports leave free
 EXAMPLE = """
@@ -77,7 +77,7 @@ def read(tmp_path: Path):
     def read_text(text: str):
         path = tmp_path / "case2.toml"
         path.write_text(textwrap.dedent(text))
-        return read_case_file(path)
+        return read_case(path)
 
     return read_text
 

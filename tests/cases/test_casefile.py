@@ -7,7 +7,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from foldyn.cases import Constant, Pulse, Rayleigh, Table, read_case_file
+from foldyn.cases import Constant, Pulse, Rayleigh, Table, read_case
 from foldyn.errors import InputError
 from foldyn.formats import write_pattern
 from foldyn.materials import EnhancedLinear
@@ -124,16 +124,16 @@ def test_patterns_inline_and_from_a_file(read, short, tmp_path) -> None:
 
 def test_files_that_cannot_be_read(tmp_path) -> None:
     with pytest.raises(InputError, match=r"none\.toml: there is no such file"):
-        read_case_file(tmp_path / "none.toml")
+        read_case(tmp_path / "none.toml")
     with pytest.raises(InputError, match=r"is a folder; give a case file"):
-        read_case_file(tmp_path)
+        read_case(tmp_path)
     path = tmp_path / "broken.toml"
     path.write_text("[sheet]\nthickness = \n")
     with pytest.raises(InputError, match=r"broken\.toml: is not valid TOML: .*line 2"):
-        read_case_file(path)
+        read_case(path)
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=r"broken\.toml: is not a text file in UTF-8"):
-        read_case_file(path)
+        read_case(path)
 
 
 def test_the_package_does_not_import_pydantic() -> None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from foldyn import cases, patterns, structures
-
-FREQUENCY, AMPLITUDE = 2.0, 0.02
+from foldyn.results import trajectory_dataset
 
 
 @pytest.fixture(scope="session")
@@ -36,32 +34,33 @@ def case(structure):
     )
 
 
-def motion(amplitude=AMPLITUDE, frequency=FREQUENCY, dt=0.01, samples=1000, nodes=13):
+def motion(case, amplitude=0.02, frequency=2.0, dt=0.01, samples=1000):
     """Nodes 6, 7, 8 swing along x with 1, 0.7 and 0.4 of the amplitude, node 4 along z."""
     t = np.arange(samples) * dt
     wave = amplitude * np.sin(2 * np.pi * frequency * t)
-    u = np.zeros((samples, nodes, 3))
+    u = np.zeros((samples, len(case.structure.nodes), 3))
     u[:, 6:9, 0] = wave[:, None] * [1.0, 0.7, 0.4]
     u[:, 4, 2] = 0.5 * wave
     u[:, 4, 1] = 0.1 * wave
     kinetic = np.cos(2 * np.pi * frequency * t) ** 2
-    variables = {
-        "displacement": (("time", "node", "axis"), u),
-        "kinetic": ("time", kinetic),
-        "strain_bars": ("time", 0.1 * (1 - kinetic)),
-        "strain_folds": ("time", 0.6 * (1 - kinetic)),
-        "strain_bends": ("time", 0.3 * (1 - kinetic)),
-        "dissipated": ("time", 0.05 * t + 1e-6 * t),
-        "work": ("time", 0.05 * t),
+    energies = {
+        "kinetic": kinetic,
+        "strain_bars": 0.1 * (1 - kinetic),
+        "strain_folds": 0.6 * (1 - kinetic),
+        "strain_bends": 0.3 * (1 - kinetic),
+        "dissipated": 0.05 * t + 1e-6 * t,  # a balance that drifts by 1e-6 J per second
+        "work": 0.05 * t,
     }
-    return xr.Dataset(variables, coords={"time": t, "axis": ["x", "y", "z"]})
+    reaction = np.zeros((samples, len(case.supported_dofs)))
+    statistics = {"dt": dt, "steps": samples - 1}
+    return trajectory_dataset(case, t, u, np.zeros_like(u), reaction, energies, statistics)
 
 
 @pytest.fixture
-def trajectory():
-    return motion()
+def trajectory(case):
+    return motion(case)
 
 
 @pytest.fixture
-def two_rules():
-    return {"panel": motion(), "consistent": motion(amplitude=0.03, frequency=1.5)}
+def two_rules(case):
+    return {"panel": motion(case), "consistent": motion(case, amplitude=0.03, frequency=1.5)}

@@ -149,6 +149,12 @@ def test_energies_and_their_balance(trajectory):
     assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "work of the loads"
 
 
+def test_prestress_does_not_flatter_the_balance(trajectory):
+    strained = trajectory.assign(strain_bars=trajectory["strain_bars"] + 1e6)
+    title = plot_energies(strained).axes[1].get_title(loc="right")
+    assert title.endswith("1e-05 of the energy at play")  # 1e-5 J of 1 J
+
+
 def test_missing_energy_is_named(trajectory):
     with pytest.raises(InputError, match="no work"):
         plot_energies(trajectory.drop_vars("work"))

@@ -69,11 +69,19 @@ def test_frequency_axis_ends_at_half_the_slowest_sampling(two_rules):
     assert figure.axes[1].get_xlim()[1] == pytest.approx(12.5)
 
 
+def test_nodes_are_known_by_number_not_by_place(trajectory):
+    some = trajectory.isel(node=[7, 8])
+    line = plot_history({"run": some}, [8], axes="x").axes[0].get_lines()[0]
+    np.testing.assert_array_equal(line.get_ydata(), trajectory["displacement"][:, 8, 0])
+    with pytest.raises(InputError, match=r"7\.\.8"):
+        plot_history({"run": some}, [6])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ({"nodes": []}, "nodes"),
-        ({"nodes": [13]}, "0..12"),
+        ({"nodes": [13]}, r"0\.\.12"),
         ({"nodes": [-1]}, "nodes"),
         ({"axes": "w"}, "axes"),
         ({"axes": ["x", "y", "z"]}, "3 directions for 1 nodes"),

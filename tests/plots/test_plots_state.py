@@ -50,7 +50,12 @@ def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
         "axes.grid": False,
         "grid.color": "red",
     }
-    odd |= {"figure.facecolor": "red", "axes.facecolor": "yellow", "text.color": "green"}
+    odd |= {
+        "figure.facecolor": "red",
+        "axes.facecolor": "yellow",
+        "figure.autolayout": True,
+        "text.color": "green",
+    }
     odd |= {"axes.labelcolor": "green", "axes.edgecolor": "red", "legend.labelcolor": "red"}
     with matplotlib.rc_context(odd):
         unusual = [_pixels(figure) for figure in _figures(case, trajectory)]

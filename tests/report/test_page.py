@@ -87,6 +87,15 @@ def test_pictures_are_inside_and_unchanged(tmp_path):
     assert page.texts["figcaption"] == ["A sheet", "It moves"]
 
 
+def test_wide_pictures_are_scrolled_on_a_phone(tmp_path):
+    gif = b"GIF89a" + struct.pack("<HH", 300, 200)
+    page = _write(tmp_path, Picture(_png(1350, 3)), Picture(_png(900, 3)), Picture(gif))
+    frames = [attrs.get("class") for tag, attrs in page.tags if tag == "div"]
+    assert frames == ["wide", None, None]
+    sizes = [(image["width"], image["height"]) for image in page.images]
+    assert sizes == [("1350", "3"), ("900", "3"), ("300", "200")]
+
+
 def test_figures_are_drawn_as_png(tmp_path):
     from matplotlib.figure import Figure
 

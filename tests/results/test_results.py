@@ -291,6 +291,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch) -> None:
     ("change", "text"),
     [
         (lambda ds: ds.drop_vars("face_offsets"), "lacks its variable face_offsets"),
+        (lambda ds: ds.isel(node=[1, 2]), "use the whole result"),
         (lambda ds: ds.assign(case=((), "[pattern")), "damaged"),
         (lambda ds: ds.assign(case=((), "title = 1")), "damaged"),
         (lambda ds: ds.assign(faces=ds["faces"] + 1000), "vert"),

@@ -25,7 +25,7 @@ from foldyn.cases.state import State
 from foldyn.cases.supports import Fix
 
 if TYPE_CHECKING:
-    from foldyn.cases.casefile import CaseFile, read_case_file
+    from foldyn.cases.casefile import CaseFile, read_case
 
 __all__ = [
     "HISTORIES",
@@ -45,14 +45,14 @@ __all__ = [
     "Step",
     "Table",
     "as_history",
-    "read_case_file",
+    "read_case",
     "resolve_nodes",
     "select",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("CaseFile", "read_case_file"):  # they need pydantic, which is slow to import
+    if name in ("CaseFile", "read_case"):  # they need pydantic, which is slow to import
         from foldyn.cases import casefile
 
         return getattr(casefile, name)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.damping import Rayleigh
-from foldyn.cases.histories import History
+from foldyn.cases.histories import History, as_history
 from foldyn.cases.loads import Force
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import Fix
@@ -102,10 +102,11 @@ class Case:
         terms: list[tuple[NDArray[np.float64], History]] = []
         for i, load in enumerate(self.loads):
             nodes = resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")
-            forces = next((forces for forces, history in terms if history == load.history), None)
+            history = as_history(load.history)
+            forces = next((forces for forces, other in terms if other == history), None)
             if forces is None:
                 forces = np.zeros((len(self.structure.nodes), 3))
-                terms.append((forces, load.history))
+                terms.append((forces, history))
             forces[nodes] += load.vector
         for forces, _ in terms:
             forces.flags.writeable = False

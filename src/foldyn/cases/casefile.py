@@ -59,10 +59,16 @@ class Output:
         Nodes that figures and spectra show.
     every : int or float
         Interval between samples: steps (int) or seconds (float).
+    axis : str or None
+        Component that figures show, "x", "y" or "z"; None: the one in which a node moves most.
+    max_frequency : float or None
+        Where the axes of spectra end (Hz); None: at half the sampling rate.
     """
 
     nodes: NDArray[np.int64]
     every: int | float
+    axis: str | None = None
+    max_frequency: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +107,7 @@ class CaseFile:
         return self._cases[rule]
 
 
-def read_case_file(path: str | os.PathLike[str]) -> CaseFile:
+def read_case(path: str | os.PathLike[str]) -> CaseFile:
     """Read a case file and check it whole.
 
     Parameters
@@ -162,7 +168,7 @@ def read_case_file(path: str | os.PathLike[str]) -> CaseFile:
         sheet=sheet,
         masses=masses,
         analysis=Analysis(analysis.pop("kind"), {**analysis, "every": every}),
-        output=Output(nodes, every),
+        output=Output(nodes, every, schema.output.axis, schema.output.max_frequency),
         _parts=parts,
         _cases=cases,
     )

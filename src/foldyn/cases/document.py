@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import history_from, law_from
-from foldyn.cases.histories import HISTORIES, Constant, History, Table
+from foldyn.cases.histories import HISTORIES, Constant, History, Table, as_history
 from foldyn.cases.loads import Force
 from foldyn.cases.supports import Fix
 from foldyn.errors import FoldynWarning, InputError
@@ -172,8 +172,9 @@ class _Writer:
 
     def _load(self, load: Force) -> dict[str, Any]:
         section: dict[str, Any] = {"nodes": _nodes(load.nodes), "force": list(load.vector)}
-        if load.history != Constant():
-            section["history"] = self._history(load.history)
+        history = as_history(load.history)
+        if history != Constant():
+            section["history"] = self._history(history)
         return section
 
     def _history(self, history: History) -> dict[str, Any]:
@@ -193,7 +194,7 @@ class _Writer:
                 return {"kind": "user"}
             history = Table(self.stage_times, history(self.stage_times))
         table: dict[str, Any] = {"kind": history.kind}
-        for item in dataclasses.fields(history):
+        for item in dataclasses.fields(cast(Any, history)):
             value = getattr(history, item.name)
             if isinstance(value, np.ndarray):
                 value = self._store(f"tables_{len(self.histories)}_{item.name}", value)
@@ -232,7 +233,12 @@ def _structure(sections: Mapping[str, Any]) -> Structure:
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
         sheet = Sheet(**sections["sheet"])
         structure = discretize(pattern, sheet, **model)
-        if nodes.shape == structure.nodes.shape and not np.array_equal(nodes, structure.nodes):
+        if nodes.shape != structure.nodes.shape:
+            raise InputError(
+                f"the result holds rest positions of shape {nodes.shape}, its structure has "
+                f"{structure.nodes.shape}: use the whole result, not a selection of its nodes"
+            )
+        if not np.array_equal(nodes, structure.nodes):
             # panel centers given by hand, or found to other last digits on another machine
             centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
             structure = discretize(pattern, sheet, **model, centers=centers)

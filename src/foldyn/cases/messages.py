@@ -64,7 +64,7 @@ def _line(item: Mapping[str, Any], schema: type[BaseModel]) -> str:
         is_table = bool(get_args(schema.model_fields[location[0]].annotation))
         text = f"must be a list of tables, written [[{place}]]" if is_table else "must be a list"
     else:
-        text = _TEXTS.get(kind, item["msg"]).format(**context)
+        text = _TEXTS[kind].format(**context) if kind in _TEXTS else item["msg"]
     return f"{place} = {show(value)}: {text}"
 
 
@@ -76,7 +76,6 @@ def _section(schema: type[BaseModel], location: Sequence[str | int]) -> type[Bas
     for part in location:
         if isinstance(part, int):
             continue
-        annotation = schema.model_fields[part].annotation
-        inner = get_args(annotation)
-        schema = inner[0] if inner else annotation
+        annotation: Any = schema.model_fields[part].annotation
+        schema = next(iter(get_args(annotation)), annotation)
     return schema

@@ -8,7 +8,7 @@ continues the key's path (" = -1: must be ...", ".kind: missing ...").
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
 
@@ -187,7 +187,9 @@ class OutputSection(Section):
     """[output]: what is kept and shown."""
 
     nodes: Nodes = None
+    axis: Literal["x", "y", "z"] | None = None
     every: Annotated[Any, PlainValidator(_every)] = None
+    max_frequency: Annotated[float, Field(gt=0.0)] | None = None
 
 
 class CaseSchema(Section):

@@ -2,15 +2,18 @@
 
 from foldyn.dynamics.critical_step import critical_step, largest_frequency
 from foldyn.dynamics.initial import initial_state
-from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.methods import METHODS, compiled
 from foldyn.dynamics.progress import Progress
-from foldyn.dynamics.simulate import simulate
+from foldyn.dynamics.motion import Motion, prepare, simulate
 
 __all__ = [
     "METHODS",
+    "Motion",
     "Progress",
+    "compiled",
     "critical_step",
     "initial_state",
     "largest_frequency",
+    "prepare",
     "simulate",
 ]

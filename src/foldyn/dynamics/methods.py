@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from numpy.typing import NDArray
@@ -36,3 +37,12 @@ def method_of(name: str) -> Method:
     if name not in METHODS:
         raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
     return METHODS[name]
+
+
+def compiled(name: str) -> bool:
+    """Whether a method's kernels are in Numba's cache on disk (else its first use compiles)."""
+    advance = method_of(name).advance
+    folder = Path(advance.stats.cache_path)  # type: ignore[attr-defined]
+    function = advance.py_func  # type: ignore[attr-defined]
+    stem = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-"
+    return any(folder.glob(f"{stem}*.nbi"))

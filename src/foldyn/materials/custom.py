@@ -23,11 +23,14 @@ CUSTOM = -1
 
 def _compile(law: str, function: str, signature: str, source: Callable[..., float]) -> Any:
     try:
-        return cfunc(signature)(source)
-    except NumbaError as error:
+        # as in the built-in kernels, a division by zero gives inf or nan: an exception cannot
+        # leave compiled code through an address
+        return cfunc(signature, error_model="numpy")(source)
+    except (NumbaError, TypeError, AttributeError) as error:
         raise InputError(
-            f"law {law!r}: {function} cannot be compiled by Numba; write it with plain arithmetic "
-            f"and the math module. Numba says: {str(error).strip().splitlines()[-1]}"
+            f"law {law!r}: {function} cannot be compiled by Numba; write it as a Python function "
+            f"{signature.replace('float64', 'float')} with plain arithmetic and the math module. "
+            f"Numba says: {str(error).strip().splitlines()[-1]}"
         ) from error
 
 

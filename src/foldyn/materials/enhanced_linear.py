@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -23,33 +24,33 @@ from foldyn.materials.compiled import kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
 
 TWO_PI = 2.0 * math.pi
+HALF_PI = 0.5 * math.pi
+
+# How far a fold is into its locking range goes from 0 (at theta1 or theta2) to exactly 1 (closed):
+# an angle of more than pi/2, even by rounding, would turn the sign of the tangent.
 
 
 @scalar
 def energy(theta, rest, theta1, theta2):
     """Energy / k as published: not zero at rest where rest lies beyond theta1 or theta2."""
     if theta < theta1:
-        p = math.pi / theta1
-        d = rest - theta1
-        lnc = math.log(math.cos(0.5 * p * (theta1 - theta)))
-        return 0.5 * d * d + d * (theta1 - theta) - 4.0 / (p * p) * lnc
-    if theta > theta2:
-        p = math.pi / (TWO_PI - theta2)
-        d = theta2 - rest
-        lnc = math.log(math.cos(0.5 * p * (theta - theta2)))
-        return 0.5 * d * d + d * (theta - theta2) - 4.0 / (p * p) * lnc
-    return 0.5 * (theta - rest) ** 2
+        d, r, span = rest - theta1, theta1 - theta, theta1
+    elif theta > theta2:
+        d, r, span = theta2 - rest, theta - theta2, TWO_PI - theta2
+    else:
+        return 0.5 * (theta - rest) ** 2
+    p = math.pi / span
+    return 0.5 * d * d + d * r - 4.0 / (p * p) * math.log(math.cos(HALF_PI * (r / span)))
 
 
 @scalar
 def moment(theta, rest, theta1, theta2):
     """Moment / k as published."""
     if theta < theta1:
-        half = 0.5 * math.pi / theta1
-        return theta1 - rest + math.tan(half * (theta - theta1)) / half
+        return theta1 - rest - math.tan(HALF_PI * ((theta1 - theta) / theta1)) * theta1 / HALF_PI
     if theta > theta2:
-        half = 0.5 * math.pi / (TWO_PI - theta2)
-        return theta2 - rest + math.tan(half * (theta - theta2)) / half
+        span = TWO_PI - theta2
+        return theta2 - rest + math.tan(HALF_PI * ((theta - theta2) / span)) * span / HALF_PI
     return theta - rest
 
 
@@ -57,9 +58,9 @@ def moment(theta, rest, theta1, theta2):
 def slope(theta, theta1, theta2):
     """Slope / k: 1 between theta1 and theta2, 1/cos^2 beyond."""
     if theta < theta1:
-        return 1.0 / math.cos(0.5 * math.pi / theta1 * (theta - theta1)) ** 2
+        return 1.0 / math.cos(HALF_PI * ((theta1 - theta) / theta1)) ** 2
     if theta > theta2:
-        return 1.0 / math.cos(0.5 * math.pi / (TWO_PI - theta2) * (theta - theta2)) ** 2
+        return 1.0 / math.cos(HALF_PI * ((theta - theta2) / (TWO_PI - theta2))) ** 2
     return 1.0
 
 
@@ -98,6 +99,10 @@ class EnhancedLinear(HingeLaw):
     name: str = "enhanced"
 
     def __post_init__(self) -> None:
+        for field in ("theta1", "theta2"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise InputError(f"EnhancedLinear: {field} = {value!r}: give a number (degrees)")
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
                 f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "

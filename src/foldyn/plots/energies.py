@@ -72,20 +72,19 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1.0]})
     style.frame(upper, "", "energy (J)")
     style.frame(lower, "time (s)", "balance error (J)")
-    largest = 0.0
     handles = []
     for index, (name, label) in enumerate(NAMES.items()):
         values = trajectory[name].values
         (line,) = upper.plot(time, values, label=label, **style.line_style(index))
         handles.append(line)
-        largest = max(largest, float(np.nanmax(np.abs(values))))
     error = energy_error(trajectory)
     worst = float(np.nanmax(np.abs(error)))
+    largest = _energy_at_play(trajectory)
     lower.plot(time, error, color=style.BLACK, linewidth=1.0, label="balance error")
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
     if largest > 0.0:
-        note += f", {worst / largest:.2g} of the largest energy"
+        note += f", {worst / largest:.2g} of the energy at play"
     lower.set_title(note, fontsize=style.NOTE, color=style.BLACK, loc="right", y=1.0, pad=4.0)
     upper.margins(x=0.0)
     style.exponents(upper)
@@ -93,3 +92,11 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     style.legend_below(figure, handles, columns=3)
     figure.align_ylabels()
     return style.finish(figure)
+
+
+def _energy_at_play(trajectory: xr.Dataset) -> float:
+    """Return the largest of kinetic energy, change of strain energy, dissipated and work (J)."""
+    strain = np.sum([trajectory[name].values for name in STRAIN], axis=0)
+    moving = [strain - strain[0]]
+    moving += [trajectory[name].values for name in NAMES if name not in STRAIN]
+    return float(np.nanmax(np.abs(moving)))

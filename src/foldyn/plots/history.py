@@ -65,11 +65,12 @@ def plot_history(
     if not numbers:
         raise InputError("nodes: empty; name at least one node to show")
     for label, dataset in trajectories.items():
-        count = dataset["displacement"].sizes["node"]
+        stored = dataset["node"].values
         for node in numbers:
-            if not 0 <= node < count:
+            if node not in stored:
                 raise InputError(
-                    f"nodes: {node} is not in {label!r}, whose nodes are 0..{count - 1}"
+                    f"nodes: {node} is not in {label!r}, whose nodes are "
+                    f"{stored.min()}..{stored.max()}"
                 )
     directions = _directions(trajectories, numbers, axes)
     intervals = {
@@ -121,8 +122,8 @@ def plot_history(
 
 
 def _component(dataset: xr.Dataset, node: int, direction: str) -> np.ndarray:
-    """Return one displacement component over time, by position of the node."""
-    return dataset["displacement"].isel(node=node).sel(axis=direction).values
+    """Return one displacement component over time."""
+    return dataset["displacement"].sel(node=node, axis=direction).values
 
 
 def _directions(
@@ -134,7 +135,7 @@ def _directions(
     if axes is None:
         largest = np.max(
             [
-                np.abs(d["displacement"].isel(node=list(nodes)).sel(axis=list(AXES)).values).max(0)
+                np.abs(d["displacement"].sel(node=list(nodes), axis=list(AXES)).values).max(0)
                 for d in trajectories.values()
             ],
             axis=0,

@@ -144,24 +144,21 @@ def view_figure(
     bottom = _TICKS + (0.1 + 0.19 * legend_rows if legend_rows else 0.0)
     height = top + seen[1] * scale + bottom
 
-    figure = style.new_figure(width, height, layout=None)
+    figure = style.new_figure(width, height, constrained=False)
     if title:
         figure.suptitle(
             title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
         )
     side = 1.1 * seen.max() * scale  # of the square axes, which clip what they draw
     center = _LEFT + 0.5 * (width - _LEFT - _RIGHT), bottom + 0.5 * seen[1] * scale
-    axes = figure.add_axes(
-        (
-            (center[0] - 0.5 * side) / width,
-            (center[1] - 0.5 * side) / height,
-            side / width,
-            side / height,
-        ),
-        projection="3d",
+    corner = center[0] - 0.5 * side, center[1] - 0.5 * side
+    axes = Axes3D(
+        figure,
+        (corner[0] / width, corner[1] / height, side / width, side / height),
         proj_type="ortho",
         computed_zorder=False,
     )
+    figure.add_axes(axes)
     axes.view_init(elev=view.elevation, azim=view.azimuth)
     for axis, name in enumerate("xyz"):
         reach = (middle[axis] - 0.5 * box[axis], middle[axis] + 0.5 * box[axis])

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
@@ -41,23 +42,25 @@ FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
 TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
 
 
-def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:
+def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
     """Return an empty white figure on an Agg canvas.
 
     Parameters
     ----------
     width, height : float
         Size in inches.
-    layout : str or None
-        Matplotlib's layout engine; None leaves axes where they are put.
+    constrained : bool
+        Let matplotlib make room for labels and legends; False leaves axes where they are put.
     """
     figure = Figure(
         figsize=(width, height),
         dpi=DPI,
-        layout=layout or "none",
+        layout="constrained" if constrained else None,
         facecolor="white",
         edgecolor="white",
     )
+    if not constrained:
+        figure.set_layout_engine("none")  # against the caller's own setting of a layout
     FigureCanvasAgg(figure)
     return figure
 
@@ -97,10 +100,11 @@ def exponents(axes: Axes, ticks: int = 6) -> None:
 
 def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:
     """Put one legend for the whole figure below its axes, where it hides no data."""
+    constrained = isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
     return figure.legend(
         handles=list(handles),
-        # "outside" makes room, which only a layout engine can do.
-        loc="lower center" if figure.get_layout_engine() is None else "outside lower center",
+        # "outside" makes room, which only the layout engine can do.
+        loc="outside lower center" if constrained else "lower center",
         ncols=max(1, min(columns, len(handles))),
         fontsize=TICK,
         labelcolor=BLACK,

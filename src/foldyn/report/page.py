@@ -39,6 +39,8 @@ td { border-bottom: 1px solid #e2e2e2; }
   h1 { font-size: 1.5rem; }
   h2 { font-size: 1.2rem; }
   th, td { padding: 0.3rem 0.5rem; }
+  .wide { overflow-x: auto; }
+  .wide img { max-width: none; width: 44rem; }
 }
 @media print { h2 { break-after: avoid; } figure, tr { break-inside: avoid; } }
 """

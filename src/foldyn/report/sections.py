@@ -21,6 +21,7 @@ _SIGNATURES = (
     (b"GIF89a", "image/gif"),
     (b"\xff\xd8\xff", "image/jpeg"),
 )
+_WIDE = 1200  # pixels; wider pictures are scrolled on a phone, as they would be too small to read
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,13 @@ class Picture:
         data = base64.b64encode(content).decode("ascii")
         alt = escape(self.alt or self.caption)
         caption = f"<figcaption>{escape(self.caption)}</figcaption>" if self.caption else ""
-        return f'<figure><img alt="{alt}" src="data:{kinds[0]};base64,{data}">{caption}</figure>'
+        width, height = _pixels(content)
+        size = f' width="{width}" height="{height}"' if width else ""
+        wide = ' class="wide"' if width > _WIDE else ""
+        return (
+            f'<figure><div{wide}><img alt="{alt}"{size} '
+            f'src="data:{kinds[0]};base64,{data}"></div>{caption}</figure>'
+        )
 
     def _bytes(self) -> bytes:
         if isinstance(self.source, bytes | bytearray):
@@ -174,6 +181,15 @@ class Picture:
 
 
 Section = Heading | Text | Table | Picture
+
+
+def _pixels(content: bytes) -> tuple[int, int]:
+    """Return width and height of a PNG or GIF; (0, 0) for what does not say so at its start."""
+    if content.startswith(b"\x89PNG") and len(content) >= 24:
+        return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
+    if content.startswith(b"GIF") and len(content) >= 10:
+        return int.from_bytes(content[6:8], "little"), int.from_bytes(content[8:10], "little")
+    return 0, 0
 
 
 def _is_number(value: Any) -> bool:

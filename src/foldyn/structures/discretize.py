@@ -26,7 +26,7 @@ def discretize(
     scheme: Literal["n5b8", "n4b5"] = "n5b8",
     mass: str = "mixed_voronoi",
     bar_law: str | BarLaw = "ogden",
-    fold_law: str | HingeLaw = EnhancedLinear(),  # noqa: B008 (frozen)
+    fold_law: str | HingeLaw = EnhancedLinear(),
     bend_law: str | HingeLaw = "superlinear",
     calibration: Literal["standard", "merlin2"] = "standard",
     crease_stiffness: float | Sequence[float] | None = None,
@@ -83,7 +83,7 @@ def discretize(
     )
     _check_laws(options)
     check_mass_rule(mass)
-    points = {int(k): np.asarray(v, float) for k, v in (centers or {}).items()}
+    points = _given_centers(centers or {}, pattern, scheme)
     mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
     calibrate.check_poisson(mesh, pattern, sheet)
 
@@ -126,9 +126,34 @@ def _check_laws(options: ModelOptions) -> None:
     hinge_law(options.bend_law, "bend_law")
 
 
+def _given_centers(
+    centers: Mapping[int, ArrayLike], pattern: Pattern, scheme: str
+) -> dict[int, NDArray]:
+    """Center points by panel number, each of a panel that has a center node."""
+    points = {}
+    for panel, point in centers.items():
+        known = isinstance(panel, int | np.integer) and 0 <= panel < len(pattern.faces)
+        if not known or len(pattern.faces[panel]) < 4 or scheme != "n5b8":
+            raise InputError(
+                f"centers: panel {panel!r} has no center node; only N5B8 panels of more than "
+                f"three corners have one ({len(pattern.faces)} panels, scheme {scheme})"
+            )
+        try:
+            array = np.asarray(point, float)
+        except (TypeError, ValueError):
+            array = np.zeros(0)
+        if array.shape != (3,) or not np.isfinite(array).all():
+            raise InputError(f"centers: panel {panel}: {point!r}: give three coordinates (m)")
+        points[int(panel)] = array
+    return points
+
+
 def _per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
-    array = np.asarray(value, float)
     n = len(pattern.creases)
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{field} = {value!r}: give a number, or one for each crease") from None
     if array.ndim > 1 or (array.ndim == 1 and len(array) != n):
         raise InputError(f"{field}: {array.size} values for {n} creases: give one, or one for each")
     if not np.isfinite(array).all():

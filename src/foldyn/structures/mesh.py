@@ -53,11 +53,25 @@ def fold_rows(pattern: Pattern, triangles: NDArray, triangle_panel: NDArray) -> 
 
     Wing i is the third corner of the triangle that runs low to high, wing l that of the other.
     """
-    third: dict[tuple[int, int], int] = {}
-    for a, b, c in triangles.tolist():
-        third[a, b], third[b, c], third[c, a] = c, a, b
-    rows = [(low, high, third[low, high], third[high, low]) for low, high in pattern.creases]
+    third = third_corners(triangles.tolist(), triangle_panel.tolist())
+    rows = [
+        (low, high, third[front, low, high], third[back, high, low])
+        for (low, high), (front, back) in zip(
+            pattern.creases.tolist(), pattern.crease_faces.tolist(), strict=True
+        )
+    ]
     return np.array(rows, np.int64).reshape(-1, 4)
+
+
+def third_corners(triangles: list, panels: list) -> dict[tuple[int, int, int], int]:
+    """Third corner of the triangle of a panel that runs a to b, by (panel, a, b).
+
+    By panel, because a diagonal of one panel may be an edge of another.
+    """
+    third = {}
+    for panel, (a, b, c) in zip(panels, triangles, strict=True):
+        third[panel, a, b], third[panel, b, c], third[panel, c, a] = c, a, b
+    return third
 
 
 def check_triangles(mesh: Mesh, pattern: Pattern, remedy: str) -> Mesh:

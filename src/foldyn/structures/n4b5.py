@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.structures.mesh import Mesh, check_triangles, fold_rows
+from foldyn.structures.mesh import Mesh, check_triangles, fold_rows, third_corners
 
 
 def n4b5(pattern: Pattern) -> Mesh:
@@ -23,10 +23,11 @@ def n4b5(pattern: Pattern) -> Mesh:
         owner += [number] * len(cuts)
         triangles += pieces
         triangle_panel += [number] * len(pieces)
-    third: dict[tuple[int, int], int] = {}
-    for a, b, c in triangles:
-        third[a, b], third[b, c], third[c, a] = c, a, b
-    bends = [(a, b, third[a, b], third[b, a]) for a, b in inner]
+    third = third_corners(triangles, triangle_panel)
+    bends = [
+        (a, b, third[panel, a, b], third[panel, b, a])
+        for panel, (a, b) in zip(owner, inner, strict=True)
+    ]
     rows = np.array(triangles, np.int64)
     mesh = Mesh(
         nodes=pattern.vertices,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from numbers import Real
 
 from foldyn.errors import InputError
 
@@ -43,7 +44,7 @@ class Sheet:
             value = getattr(self, field.name)
             if value is None and field.name == "density":
                 continue
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
+            if isinstance(value, bool) or not isinstance(value, Real):
                 raise InputError(f"sheet: {field.name} = {value!r}: give a number")
             if not math.isfinite(value):
                 raise InputError(f"sheet: {field.name} = {value}: must be finite")

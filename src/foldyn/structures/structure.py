@@ -164,9 +164,7 @@ class Structure:
         """Internal force (n, 3), N, at displacement u (n, 3), m: the gradient of the energy."""
         force = np.empty((len(self.nodes), 3))
         displacement = self._displacement(u)
-        mechanics.internal_force(
-            self.model, displacement, force, mechanics.workspace(self.model)
-        )
+        mechanics.internal_force(self.model, displacement, force, mechanics.workspace(self.model))
         return force
 
     def tangent(self, u: ArrayLike, floor: float = -np.inf) -> sparse.csr_array:
@@ -181,9 +179,7 @@ class Structure:
             the tangent is the exact second derivative of the energy: singular at rest where
             superlinear bends have no slope.
         """
-        return mechanics.tangent(
-            self.model, self.sparsity, self._displacement(u), floor
-        ).tocsr()
+        return mechanics.tangent(self.model, self.sparsity, self._displacement(u), floor).tocsr()
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
@@ -192,7 +188,7 @@ class Structure:
 
     def _displacement(self, u: ArrayLike) -> NDArray:
         array = np.ascontiguousarray(u, float)
-        if array.size != self.nodes.size:
+        if array.shape not in (self.nodes.shape, (self.nodes.size,)):
             raise InputError(
                 f"displacement of shape {np.shape(u)}: give {self.nodes.shape} (nodes, axes)"
             )

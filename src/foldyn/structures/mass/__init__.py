@@ -35,7 +35,7 @@ MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
 
 def check_mass_rule(name: str) -> None:
     """Refuse a rule that does not exist."""
-    if name not in MASS_RULES:
+    if not isinstance(name, str) or name not in MASS_RULES:
         raise InputError(f"mass = {name!r}: choose one of {', '.join(MASS_RULES)}")
 
 

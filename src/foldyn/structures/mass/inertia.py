@@ -19,9 +19,7 @@ def rotational_inertia(mass: sparse.csr_array, nodes: NDArray, start: int, end: 
     return float(sum(arm[:, c] @ (mass @ arm[:, c]) for c in range(3)))
 
 
-def rotational_inertia_errors(
-    mass: sparse.csr_array, surface: Surface, edges: NDArray
-) -> NDArray:
+def rotational_inertia_errors(mass: sparse.csr_array, surface: Surface, edges: NDArray) -> NDArray:
     """Relative error of the inertia about each edge (ne, 2) of a single flat panel.
 
     The consistent matrix is exact there: distances from an edge are linear over triangles.

@@ -1,9 +1,10 @@
-"""`simulate`: the motion of a case from an initial state."""
+"""`simulate`: the motion of a case from an initial state, and what makes it ready to run."""
 
 from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,24 +89,37 @@ def simulate(
     Histories are evaluated at every stage time t_n + c dt with t_n = n dt. Damping is
     C = alpha M + beta K0, K0 the tangent at rest.
     """
+    return prepare(case, duration, method, dt, every, initial, force).run(progress)
+
+
+def prepare(
+    case: Case,
+    duration: float,
+    method: str = "rk4",
+    dt: float | None = None,
+    every: int | float = 1,
+    initial: State | None = None,
+    force: bool = False,
+) -> Motion:
+    """Check everything that `simulate` checks and choose the step, without computing a motion.
+
+    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`.
+    """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of(method)
     positive("duration", duration)
-    u, v = _start(case, initial)
-    model, system, mass = pack(case)
-    critical = critical_step(case, method, u)
+    start = _start(case, initial)
+    packed = pack(case)
+    critical = critical_step(case, method, start[0])
     plan = schedule(duration, dt, every, critical)
     if not force and plan.dt > critical:
         raise InputError(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
             "one or leave dt out (force = true integrates all the same)"
         )
-    samples = plan.samples
-    check_memory(samples, len(u), len(system.supported))
-    run = _Run(case, integrator, plan, critical, force)
-    run.integrate(u, v, (model, system, mass), *reporter(progress))
-    return run.finish()
+    check_memory(plan.samples, len(start[0]), len(case.supported_dofs))
+    return Motion(case, integrator, plan, critical, force, start, packed)
 
 
 def _start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
@@ -124,26 +138,35 @@ def _start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
     return pair[0], pair[1]
 
 
-class _Run:
-    """Output arrays and bookkeeping of one motion."""
+class Motion:
+    """A motion that is ready to be computed; made by `prepare`."""
 
     def __init__(
-        self, case: Case, method: Method, plan: Schedule, critical: float, force: bool
-    ) -> None:
+        self, case: Case, method: Method, plan: Schedule, critical: float, force: bool,
+        start: tuple[NDArray, NDArray], packed: Any,
+    ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force = critical, force
-        n, samples = len(case.structure.nodes), plan.samples
-        self.displacement = np.empty((samples, n, 3))
-        self.velocity = np.empty((samples, n, 3))
-        self.reaction = np.empty((samples, len(case.supported_dofs)))
-        self.energy = np.empty((samples, len(AUDITED)))
+        self._start, self._packed = start, packed
         self.stored = 0
         self.seconds = 0.0
 
-    def integrate(self, u: NDArray, v: NDArray, packed: Any, report: Any, close: Any) -> None:
+    def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
+        """Integrate the motion; see `simulate`."""
+        n, samples = len(self.case.structure.nodes), self.plan.samples
+        self.displacement = np.empty((samples, n, 3))
+        self.velocity = np.empty((samples, n, 3))
+        self.reaction = np.empty((samples, len(self.case.supported_dofs)))
+        self.energy = np.empty((samples, len(AUDITED)))
+        self.stored = 0
+        self._integrate(*reporter(progress))
+        return self._finish()
+
+    def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
         """Advance in stretches between which histories are tabulated and progress is told."""
-        model, system, mass = packed
-        plan, work, memory = self.plan, workspace(packed[0]), scratch(len(u))
+        model, system, mass = self._packed
+        u, v = self._start[0].copy(), self._start[1].copy()
+        plan, work, memory = self.plan, workspace(model), scratch(len(u))
         tally = np.zeros(2)
         angle = angles(model.rest + u, model.hinges)
         recheck = max(1000, -(-plan.steps // RECHECKS))
@@ -266,7 +289,7 @@ class _Run:
         scale = energy_scale(energy)
         return float(np.abs(energy_error(energy)).max() / scale) if scale > 0.0 else 0.0
 
-    def finish(self) -> xarray.Dataset:
+    def _finish(self) -> xarray.Dataset:
         """Dataset of the whole motion; warns where its energy balance is poor."""
         error = self._audit()
         if error > INACCURATE:

@@ -1,0 +1,33 @@
+"""Studies of papers: shipped case files, one folder a paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from foldyn.errors import InputError
+
+_HERE = Path(__file__).parent
+
+
+def shipped_cases() -> dict[str, Path]:
+    """Case files that come with the package, by name ("herkal/case1")."""
+    found = sorted(_HERE.glob("*/cases/*.toml"))
+    return {f"{path.parts[-3]}/{path.stem}": path for path in found}
+
+
+def find_case(name: str) -> Path:
+    """Path of a case file: a file as named, or a shipped one ("herkal/case1").
+
+    Raises
+    ------
+    InputError
+        There is neither.
+    """
+    path = Path(name)
+    if path.exists():
+        return path
+    known = shipped_cases()
+    shipped = name.removesuffix(".toml")
+    if shipped in known:
+        return known[shipped]
+    raise InputError(f"{name}: there is no such file; shipped cases are {', '.join(known)}")

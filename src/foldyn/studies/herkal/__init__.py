@@ -1,0 +1,1 @@
+"""Herkal, Nagarajaiah and Paulino: Dynamic behavior of origami structures."""
