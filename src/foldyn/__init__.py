@@ -50,8 +50,8 @@ _HOME = {
     "initial_state": "dynamics",
 }
 _MODULES = (
-    "cases", "dynamics", "errors", "formats", "materials", "mechanics", "patterns", "plots",
-    "report", "results", "signals", "structures", "studies",
+    "cases", "checks", "dynamics", "errors", "formats", "materials", "mechanics", "patterns",
+    "plots", "report", "results", "signals", "structures", "studies",
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ if TYPE_CHECKING:
     from foldyn.results import case_of, load, save
     from foldyn.structures import Sheet, Structure, discretize
 
-__all__ = [*_HOME, *_MODULES, "__version__"]
+__all__ = sorted((*_HOME, *_MODULES, "__version__"))  # pyright: ignore
 
 
 def __getattr__(name: str) -> Any:

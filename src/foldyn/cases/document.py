@@ -192,7 +192,11 @@ class _Writer:
                     "which it would be sampled, is not known"
                 )
                 return {"kind": "user"}
-            history = Table(self.stage_times, history(self.stage_times))
+            try:
+                history = Table(self.stage_times, history(self.stage_times))
+            except InputError as error:
+                self.obstacles.append(str(error))
+                return {"kind": "user"}
         table: dict[str, Any] = {"kind": history.kind}
         for item in dataclasses.fields(cast(Any, history)):
             value = getattr(history, item.name)

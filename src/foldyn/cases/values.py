@@ -90,9 +90,8 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
         array = np.asarray(value)
     except ValueError:
         raise InputError(f"{name} = {show(value)}: rows have different lengths") from None
-    if array.dtype.kind not in "iuf" or _has_truth_values(value):
-        if array.size:
-            raise InputError(f"{name} = {show(value)}: must be numbers")
+    if array.size and (array.dtype.kind not in "iuf" or _has_truth_values(value)):
+        raise InputError(f"{name} = {show(value)}: must be numbers")
     result = np.array(array, dtype=np.float64)
     bad = np.argwhere(~np.isfinite(result))
     if bad.size:

@@ -25,7 +25,7 @@ def info() -> str:
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
         *(f"{name} {_version(name)}" for name in REQUIRED),
-        f"threads: {numba.config.NUMBA_NUM_THREADS} of {os.cpu_count()} processors",
+        f"threads: {numba.get_num_threads()} of {os.cpu_count()} processors",
     ]
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")

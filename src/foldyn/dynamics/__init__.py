@@ -3,8 +3,8 @@
 from foldyn.dynamics.critical_step import critical_step, largest_frequency
 from foldyn.dynamics.initial import initial_state
 from foldyn.dynamics.methods import METHODS, compiled
-from foldyn.dynamics.progress import Progress
 from foldyn.dynamics.motion import Motion, prepare, simulate
+from foldyn.dynamics.progress import Progress
 
 __all__ = [
     "METHODS",

@@ -60,7 +60,7 @@ def _largest(
 def stability_limit(
     amplification: Callable[[NDArray], NDArray], omega: float, alpha: float, beta: float
 ) -> float:
-    """Largest dt with |R(s dt)| <= 1 over the damped spectrum up to `omega` (rad/s).
+    """Largest dt with ``|R(s dt)| <= 1`` over the damped spectrum up to `omega` (rad/s).
 
     The spectrum is s^2 + (alpha + beta w^2) s + w^2 = 0 for all w from 0 to omega.
     Infinite for a system that neither vibrates nor decays.
@@ -99,7 +99,7 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     Notes
     -----
     With the damped spectrum s^2 + (alpha + beta w^2) s + w^2 = 0, the limit is the largest dt
-    with |R(s dt)| <= 1 for all frequencies w up to the highest of the structure.
+    with ``|R(s dt)| <= 1`` for all frequencies w up to the highest of the structure.
     """
     from foldyn.dynamics.methods import method_of
 

@@ -204,7 +204,10 @@ class Motion:
         start = np.arange(first, last + 1) * self.plan.dt
         times = start[:, None] + self.method.stages[None, :] * self.plan.dt
         histories = [history for _, history in self.case.load_terms]
-        columns = [np.asarray(history(times), float) for history in histories]
+        try:
+            columns = [np.asarray(history(times), float) for history in histories]
+        except InputError as error:  # a callable that fails at some time during the motion
+            raise InstabilityError(str(error), self._dataset()) from error
         return np.stack(columns, -1) if columns else np.zeros((*times.shape, 0))
 
     def _complete(self, step: int, code: int) -> int:
@@ -275,7 +278,7 @@ class Motion:
             "wall_seconds": self.seconds,
             "energy_error": self._relative_error(),
         }
-        energies = dict(zip(AUDITED, self.energy[:n].T, strict=True))
+        energies: dict[str, NDArray] = dict(zip(AUDITED, self.energy[:n].T, strict=True))
         times = np.arange(n) * plan.every * plan.dt
         return trajectory_dataset(
             self.case, times, self.displacement[:n], self.velocity[:n], self.reaction[:n],

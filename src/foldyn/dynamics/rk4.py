@@ -61,9 +61,7 @@ def advance(
                 vt[i, c] = v[i, c] + 0.5 * dt * a[i, c]
         for stage in range(1, 4):
             column = 1 if stage < 3 else 2
-            power_in, power_out = acceleration(
-                model, system, mass, ut, vt, f[column], a, work, s
-            )
+            power_in, power_out = acceleration(model, system, mass, ut, vt, f[column], a, work, s)
             weight = 2.0 if stage < 3 else 1.0
             work_in += weight * power_in
             work_out += weight * power_out

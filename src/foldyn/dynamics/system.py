@@ -70,7 +70,8 @@ def pack(case: Case) -> tuple[BarsHinges, System, Inertia]:
 
 def scratch(nodes: int) -> Scratch:
     """Memory for a model of so many nodes."""
-    return Scratch(*(np.zeros((nodes, 3)) for _ in range(5)), np.zeros(nodes), np.zeros(3))
+    full = [np.zeros((nodes, 3)) for _ in range(5)]
+    return Scratch(full[0], full[1], full[2], full[3], full[4], np.zeros(nodes), np.zeros(3))
 
 
 @kernel

@@ -5,6 +5,8 @@ The address is data, so the calling kernel stays one and the same cached kernel 
 
 from __future__ import annotations
 
+from typing import Any
+
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -20,12 +22,17 @@ def _caller(arity: int):
 
 
 @intrinsic
-def call1(typing_context, address, x):
+def _call1(typing_context, address, x):
     """Value of the function float64(float64) at `address`."""
     return types.float64(types.int64, types.float64), _caller(1)
 
 
 @intrinsic
-def call2(typing_context, address, x, y):
+def _call2(typing_context, address, x, y):
     """Value of the function float64(float64, float64) at `address`."""
     return types.float64(types.int64, types.float64, types.float64), _caller(2)
+
+
+# callable with one argument less than written: Numba adds the typing context
+call1: Any = _call1
+call2: Any = _call2

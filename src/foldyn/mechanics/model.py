@@ -7,7 +7,7 @@ space.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,7 @@ def build(
         hinge_runs.append(run(start, start + len(order_g), group.law))
         start += len(order_g)
 
-    def gather(column, shape, kind=float):
+    def gather(column: Any, shape: Any, kind: Any = float) -> NDArray:
         parts = [np.asarray(column(k, g))[o] for k, g, o in sorted_groups]
         joined = np.concatenate(parts) if parts else np.zeros(0)
         return np.ascontiguousarray(joined.reshape(shape), kind)

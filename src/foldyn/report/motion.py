@@ -100,9 +100,7 @@ def write_motion(
     return write_report(folder / "report.html", title, sections)
 
 
-def _table(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: list[int]
-) -> Table:
+def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: list[int]) -> Table:
     rows = []
     for rule, result in results.items():
         a = result.attrs

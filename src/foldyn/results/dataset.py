@@ -146,9 +146,7 @@ def _attributes(statistics: Mapping[str, Any]) -> dict[str, Any]:
             raise ValueError(f"statistics: {name} is an attribute of every result")
         if value is None:
             continue
-        if isinstance(value, bool | np.bool_):
-            attributes[name] = int(value)
-        elif isinstance(value, Integral):
+        if isinstance(value, bool | np.bool_ | Integral):
             attributes[name] = int(value)
         elif isinstance(value, Real):
             attributes[name] = float(value)

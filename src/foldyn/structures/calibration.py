@@ -98,7 +98,7 @@ def bar_areas(
     edges: dict[tuple[int, int], float] = {}
     for panel, face in enumerate(pattern.faces):
         inside = slice(inner_first[panel], inner_first[panel + 1])
-        ends = [tuple(sorted(e)) for e in zip(face, face[1:] + face[:1], strict=True)]
+        ends = [(min(e), max(e)) for e in zip(face, face[1:] + face[:1], strict=True)]
         length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
         if len(face) == 4 and mesh.centers[panel] >= 0:
             w, h = 0.5 * (length[0] + length[2]), 0.5 * (length[1] + length[3])

@@ -46,6 +46,7 @@ class Sheet:
                 continue
             if isinstance(value, bool) or not isinstance(value, Real):
                 raise InputError(f"sheet: {field.name} = {value!r}: give a number")
+            value = float(value)
             if not math.isfinite(value):
                 raise InputError(f"sheet: {field.name} = {value}: must be finite")
             if field.name == "poissons_ratio":

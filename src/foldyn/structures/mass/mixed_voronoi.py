@@ -22,5 +22,5 @@ def mixed_voronoi(surface: Surface) -> sparse.csr_array:
     _, cotangent = corner_angles(surface)
     obtuse = cotangent < 0.0
     fallback = np.where(obtuse, 0.5, 0.25)
-    shares = np.where(obtuse.any(axis=1)[:, None], fallback, circumcentric_shares(surface))
+    shares = np.where(obtuse.any(axis=1, keepdims=True), fallback, circumcentric_shares(surface))
     return from_triangle_shares(surface, shares)

@@ -1,0 +1,90 @@
+"""Public checkers of gradients, tangents and orders of convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+
+
+def observed_order(steps: ArrayLike, errors: ArrayLike) -> float:
+    """Order p of errors ~ step^p: slope of the least-squares line in logarithms.
+
+    Parameters
+    ----------
+    steps, errors : array_like, shape (n,)
+        Step sizes (or mesh sizes) and the errors with each; signs are ignored.
+
+    Examples
+    --------
+    >>> round(observed_order([0.1, 0.05, 0.025], [1e-4, 6.25e-6, 3.9e-7]), 2)
+    4.0
+    """
+    h, e = np.asarray(steps, float), np.abs(np.asarray(errors, float))
+    if h.shape != e.shape or h.ndim != 1 or len(h) < 2:
+        raise InputError("observed_order: give as many errors as steps, at least two")
+    if (e <= 0.0).any() or (h <= 0.0).any():
+        raise InputError("observed_order: steps and errors must not be zero")
+    return float(np.polyfit(np.log(h), np.log(e), 1)[0])
+
+
+def gradient_error(
+    energy: Callable[[NDArray], float],
+    force: Callable[[NDArray], NDArray],
+    u: ArrayLike,
+    seed: int = 0,
+) -> float:
+    """Relative difference of a force and the central difference of its energy at u.
+
+    Along random directions, extrapolated from two steps (error of order h^4).
+
+    Parameters
+    ----------
+    energy, force : callable
+        Functions of u; the force has the shape of u.
+    u : array_like
+        State, of any shape.
+    seed : int
+        Of the random directions.
+    """
+    point = np.asarray(u, float)
+    found, exact = [], []
+    rng = np.random.default_rng(seed)
+    size = max(float(np.abs(point).max()), 1e-3)
+    for _ in range(4):
+        d = rng.standard_normal(point.shape)
+
+        def slope(h: float, d: NDArray = d) -> float:
+            return (energy(point + h * d) - energy(point - h * d)) / (2.0 * h)
+
+        h = 1e-3 * size
+        found.append((4.0 * slope(0.5 * h) - slope(h)) / 3.0)
+        exact.append(float((np.asarray(force(point)) * d).sum()))
+    return float(np.linalg.norm(np.subtract(found, exact)) / np.linalg.norm(exact))
+
+
+def tangent_error(
+    force: Callable[[NDArray], NDArray],
+    tangent: Callable[[NDArray], object],
+    u: ArrayLike,
+    seed: int = 0,
+) -> float:
+    """Relative difference of a tangent and the central difference of its force at u.
+
+    The tangent is a matrix on flattened u. Along a random direction, extrapolated as in
+    `gradient_error`.
+    """
+    point = np.asarray(u, float)
+    d = np.random.default_rng(seed).standard_normal(point.shape)
+    size = max(float(np.abs(point).max()), 1e-3)
+
+    def slope(h: float) -> NDArray:
+        return (np.asarray(force(point + h * d)) - np.asarray(force(point - h * d))) / (2.0 * h)
+
+    h = 1e-3 * size
+    found = (4.0 * slope(0.5 * h) - slope(h)) / 3.0
+    exact = (tangent(point) @ d.ravel()).reshape(point.shape)  # type: ignore[operator]
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))

@@ -1,0 +1,81 @@
+"""Critical step: closed forms, dense eigensolver, and what happens on both sides of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oscillators import MASS, linear_law, oscillator, released
+from scipy import linalg
+
+import foldyn as fd
+from foldyn.dynamics import METHODS, largest_frequency
+from foldyn.dynamics.critical_step import MARGIN, stability_limit
+
+RK4 = METHODS["rk4"].amplification
+OMEGA = 4.0
+
+
+def test_stability_limits_of_rk4():
+    """2 sqrt(2) / w undamped; 2.7853 / |s| on the negative real axis."""
+    assert stability_limit(RK4, 10.0, 0.0, 0.0) == pytest.approx(2 * np.sqrt(2) / 10, rel=1e-6)
+    # overdamped by mass: s = -alpha for the rigid motion
+    assert stability_limit(RK4, 1e-3, 50.0, 0.0) == pytest.approx(2.785293563 / 50.0, rel=1e-6)
+    # overdamped by stiffness: the fast root is close to -beta w^2
+    fast = 0.5 * (1e-2 * 1e4**2 + np.sqrt((1e-2 * 1e4**2) ** 2 - 4 * 1e4**2))
+    assert stability_limit(RK4, 1e4, 0.0, 1e-2) == pytest.approx(2.785293563 / fast, rel=1e-4)
+    assert stability_limit(RK4, 0.0, 0.0, 0.0) == np.inf
+
+
+@pytest.mark.filterwarnings("ignore:the energy balance")
+@pytest.mark.parametrize("damping", [{}, {"alpha": 2.0}, {"beta": 0.1}, {"alpha": 1.0, "beta": 1}])
+def test_motion_just_below_and_above_the_limit(damping):
+    case = oscillator(linear_law(), MASS * OMEGA**2, **damping)
+    assert largest_frequency(case) == pytest.approx(OMEGA)
+    limit = fd.critical_step(case) / MARGIN
+    amplitude = []
+    for dt in (0.98 * limit, 1.02 * limit):
+        try:
+            motion = fd.simulate(case, 400 * dt, dt=dt, initial=released(0.1), force=True)
+        except fd.errors.InstabilityError as error:
+            motion = error.partial
+            amplitude.append(np.inf)
+        else:
+            amplitude.append(float(abs(motion.displacement[-50:]).max()))
+    assert amplitude[0] <= 0.1
+    assert amplitude[1] > 0.1
+
+
+@pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
+@pytest.mark.parametrize("cells", [(1, 1), (3, 2)])
+def test_largest_frequency_equals_a_dense_eigensolver(mass, cells):
+    pattern = fd.patterns.miura(cells=cells, a=1.0, b=1.2, panel_angle=70, dihedral=100)
+    sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    s = fd.discretize(pattern, sheet, bend_law="linear", fold_law="linear", mass=mass)
+    case = fd.Case(s, [fd.Fix([0], "xyz")])
+    free = case.free_dofs
+    k = s.tangent(np.zeros_like(s.nodes)).toarray()[np.ix_(free, free)]
+    m = np.kron(s.mass.toarray(), np.eye(3))[np.ix_(free, free)]
+    exact = np.sqrt(linalg.eigh(k, m, eigvals_only=True)[-1])
+    assert largest_frequency(case) == pytest.approx(exact, rel=1e-3)
+    assert largest_frequency(case) >= exact * (1.0 - 1e-9)
+
+
+def test_the_specimen_as_the_design_measured_it():
+    """Paper specimen, circumcenter mass: 1.55e-5 s undamped, 2e-7 s with beta = 4.1e-4."""
+    tilt = np.degrees(np.arccos(_cosine_of_the_tilt()))
+    pattern = fd.patterns.miura(
+        cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=180 - 2 * tilt
+    )
+    sheet = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
+    s = fd.discretize(pattern, sheet, mass="circumcenter", fold_law=fd.EnhancedLinear(75, 285))
+    supports = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
+    undamped = fd.critical_step(fd.Case(s, supports)) / MARGIN
+    assert undamped == pytest.approx(1.55e-5, rel=0.02)
+    stiff = fd.Case(s, supports, damping=fd.Rayleigh(14.4, 4.1e-4))
+    assert fd.critical_step(stiff) / MARGIN == pytest.approx(2e-7, rel=0.1)
+
+
+def _cosine_of_the_tilt() -> float:
+    """Height 8 s = 100.48 mm of the specimen, b = 25 mm: t = s / sqrt(b^2 - s^2) = cos f tan g."""
+    s = 100.48e-3 / 8
+    return s / np.sqrt(0.025**2 - s**2) / np.tan(np.radians(60))

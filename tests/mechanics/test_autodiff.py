@@ -1,0 +1,250 @@
+"""Forces and tangents against JAX: autodiff of energies written anew, in 64 bit.
+
+The dihedral is the angle by which wing i must be turned about the axis, through the front, to
+fall on wing l: another road than the closed form of the package.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from samples import MODELS, relative, state, structure
+
+import foldyn as fd
+from foldyn import mechanics
+from foldyn.materials import LinearBar, LinearHinge, Ogden, Superlinear, bar_law, hinge_law
+
+jax = pytest.importorskip("jax")
+jnp = jax.numpy
+jax.config.update("jax_enable_x64", True)
+
+TOLERANCE = 1e-12
+TWO_PI = 2 * math.pi
+
+
+def dihedral(points):
+    """Angle of points (4, 3): axis j, k, wings i, l."""
+    j, k, i, l = points  # noqa: E741
+    axis = (k - j) / jnp.linalg.norm(k - j)
+    first, second = i - j, l - j
+    first = first - jnp.dot(first, axis) * axis
+    second = second - jnp.dot(second, axis) * axis
+    front = jnp.cross(axis, first)
+    angle = jnp.arctan2(jnp.dot(second, front), jnp.dot(second, first))
+    return jnp.where(angle < 0, angle + TWO_PI, angle)
+
+
+def published(theta, rest, theta1, theta2):
+    """EnhancedLinear per k, energy as published (design, section 5)."""
+    mirrored = theta > theta2
+    t = jnp.where(mirrored, TWO_PI - theta, theta)
+    r = jnp.where(mirrored, TWO_PI - rest, rest)
+    limit = jnp.where(mirrored, TWO_PI - theta2, theta1)
+    beyond = t < limit
+    safe = jnp.where(beyond, t, limit)
+    p = jnp.pi / limit
+    locked = (r - limit) ** 2 / 2 + (r - limit) * (limit - safe)
+    locked = locked - 4 / p**2 * jnp.log(jnp.cos(p * (limit - safe) / 2))
+    return jnp.where(beyond, locked, (theta - rest) ** 2 / 2)
+
+
+def law_energy(law):
+    """Energy per k as a function of (theta, rest) of a hinge law object."""
+    if isinstance(law, LinearHinge):
+        return lambda theta, rest: (theta - rest) ** 2 / 2
+    if isinstance(law, Superlinear):
+        return lambda theta, rest: 3 / 7 * jnp.abs(theta - rest) ** (7 / 3)
+    limits = math.radians(law.theta1), math.radians(law.theta2)
+    if law.rest == "as_published":
+        return lambda theta, rest: published(theta, rest, *limits)
+
+    def stress_free(theta, rest):
+        moment = jax.grad(published)(rest, jax.lax.stop_gradient(rest), *limits)
+        return (
+            published(theta, rest, *limits)
+            - published(rest, rest, *limits)
+            - moment * (theta - rest)
+        )
+
+    return stress_free
+
+
+@functools.cache
+def hinge_oracle(law):
+    """Energy, force (4, 3) and tangent (4, 3, 4, 3) of hinges (n, 4, 3), compiled."""
+    per_unit = law_energy(law)
+
+    def energy(points, rest):
+        return per_unit(dihedral(points), rest)
+
+    return jax.jit(jax.vmap(lambda x, r: (energy(x, r), *forces(energy, x, r))))
+
+
+@functools.cache
+def bar_oracle(law):
+    """Energy, force (2, 3) and tangent (2, 3, 2, 3) per E A L of bars (n, 2, 3), compiled."""
+
+    def energy(points, length):
+        stretch = jnp.linalg.norm(points[1] - points[0]) / length
+        if isinstance(law, Ogden):
+            return ((stretch**5 - 1) / 5 - (stretch - 1)) / 4
+        assert isinstance(law, LinearBar)
+        return ((stretch**2 - 1) / 2) ** 2 / 2
+
+    return jax.jit(jax.vmap(lambda x, r: (energy(x, r), *forces(energy, x, r))))
+
+
+def forces(energy, x, r):
+    return jax.grad(energy)(x, r), jax.hessian(energy)(x, r)
+
+
+def assemble(n, nodes, scale, force, tangent):
+    """Sum element forces and tangents of elements with the given nodes."""
+    f, k = np.zeros((n, 3)), np.zeros((n, 3, n, 3))
+    for row, c, fe, ke in zip(nodes, scale, np.asarray(force), np.asarray(tangent), strict=True):
+        np.add.at(f, row, c * fe)
+        for a, na in enumerate(row):
+            for b, nb in enumerate(row):
+                k[na, :, nb, :] += c * ke[a, :, b, :]
+    return f, k.reshape(3 * n, 3 * n)
+
+
+def bar_pairs(seed, count=200):
+    """Bars (n, 2, 3) at rest and turned, stretched by -40 to -7 or by 7 to 50 %."""
+    rng = np.random.default_rng(seed)
+    rest = rng.uniform(-1, 1, (count, 2, 3)) + [[0, 0, 0], [2.5, 0, 0]]
+    now = rng.uniform(-1, 1, (count, 2, 3)) + [[0, 0, 0], [0, 2.5, 0]]
+    stretch = np.concatenate(
+        [np.linspace(0.6, 0.93, count // 2), np.linspace(1.07, 1.5, count // 2)]
+    )
+    length = np.linalg.norm(rest[:, 1] - rest[:, 0], axis=1)
+    along = now[:, 1] - now[:, 0]
+    along *= (stretch * length / np.linalg.norm(along, axis=1))[:, None]
+    now[:, 1] = now[:, 0] + along
+    return rest, now
+
+
+def hinge_quads(theta, seed):
+    """Hinges (n, 4, 3) at the given angles, of generic shape and place."""
+    rng = np.random.default_rng(seed)
+    n = len(theta)
+    length, wing = rng.uniform(0.5, 2.0, n), rng.uniform(0.5, 2.0, (2, n))
+    along = rng.uniform(-0.5, 1.5, (2, n)) * length
+    zero = np.zeros(n)
+    x = np.stack(
+        [
+            np.stack([zero, zero, zero], 1),
+            np.stack([length, zero, zero], 1),
+            np.stack([along[0], wing[0], zero], 1),
+            np.stack([along[1], wing[1] * np.cos(theta), wing[1] * np.sin(theta)], 1),
+        ],
+        axis=1,
+    )
+    q = np.linalg.qr(rng.standard_normal((n, 3, 3)))[0]
+    q *= np.linalg.det(q)[:, None, None]
+    return np.einsum("nij,nvj->nvi", q, x) + rng.uniform(-1, 1, (n, 1, 3))
+
+
+def element_model(points, rest=None, law=None, bars=None):
+    """A model of separate hinges (or bars) that share no nodes."""
+    count, width = points.shape[:2]
+    nodes = np.arange(count * width).reshape(count, width)
+    flat = points.reshape(-1, 3)
+    if bars is not None:
+        unit = 1.0 / np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        return mechanics.build(flat, nodes, unit, bars, ())
+    group = mechanics.Hinges(nodes, np.ones(count), rest, law)
+    return mechanics.build(flat, np.zeros((0, 2), int), np.zeros(0), bar_law("linear"), (group,))
+
+
+def computed(model, u):
+    """Element-wise force and tangent of a model of separate elements, and its energies."""
+    n = len(model.rest)
+    force = np.empty((n, 3))
+    mechanics.internal_force(model, u, force, mechanics.workspace(model))
+    k = mechanics.tangent(model, mechanics.sparsity(model), u).toarray()
+    out = np.empty(2)
+    mechanics.strain_energies(model, u, out)
+    return force, k, out
+
+
+def blocks(k, count, width):
+    size = 3 * width
+    return np.stack([k[size * e : size * (e + 1), size * e : size * (e + 1)] for e in range(count)])
+
+
+def each_relative(a, b):
+    a, b = a.reshape(len(b), -1), np.asarray(b).reshape(len(b), -1)
+    return (np.linalg.norm(a - b, axis=1) / np.linalg.norm(b, axis=1)).max()
+
+
+@pytest.mark.parametrize("name", ["ogden", "linear"])
+def test_each_bar(name):
+    rest, now = bar_pairs(3)
+    length = np.linalg.norm(rest[:, 1] - rest[:, 0], axis=1)
+    law = bar_law(name)
+    energy, force, tangent = bar_oracle(law)(now, length)
+    scale = length  # E A = 1: E A L
+    model = element_model(rest, bars=law)
+    ours, k, out = computed(model, (now - rest).reshape(-1, 3))
+    assert out[0] == pytest.approx(float((scale * energy).sum()), rel=1e-12)
+    assert each_relative(ours.reshape(-1, 2, 3), scale[:, None, None] * force) < TOLERANCE
+    wanted = np.asarray(tangent).reshape(-1, 6, 6) * scale[:, None, None]
+    assert each_relative(blocks(k, len(rest), 2), wanted) < TOLERANCE
+
+
+HINGE_LAWS = {
+    "linear": hinge_law("linear"),
+    "superlinear": hinge_law("superlinear"),
+    "stress-free": fd.EnhancedLinear(75, 285),
+    "published": fd.EnhancedLinear(75, 285, rest="as_published"),
+    "lopsided": fd.EnhancedLinear(110, 200, rest="stress_free"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(HINGE_LAWS))
+def test_each_hinge(name):
+    """Angles below theta1, between and above theta2, rest angles on all sides of them."""
+    law = HINGE_LAWS[name]
+    theta, rest = (
+        g.ravel() for g in np.meshgrid(np.linspace(0.25, 6.03, 17), np.radians([40, 120, 180, 310]))
+    )
+    now = hinge_quads(theta, seed=5)
+    energy, force, tangent = hinge_oracle(law)(now, rest)
+    model = element_model(now, rest, law)
+    ours, k, out = computed(model, np.zeros((4 * len(theta), 3)))
+    assert out[1] == pytest.approx(float(np.sum(energy)), rel=1e-12)
+    assert each_relative(ours.reshape(-1, 4, 3), np.asarray(force)) < TOLERANCE
+    wanted = np.asarray(tangent).reshape(-1, 12, 12)
+    assert each_relative(blocks(k, len(theta), 4), wanted) < TOLERANCE
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize("amplitude", [0.02, 0.15])
+def test_whole_structure(name, amplitude):
+    s = structure(name)
+    u = state(s, seed=7, amplitude=amplitude)
+    x = s.nodes + u
+    stiffness = s.sheet.youngs_modulus * s.bar_area * s.bar_length
+    energy, force, tangent = bar_oracle(s.bar_law)(x[s.bars], s.bar_length)
+    n = len(s.nodes)
+    f, k = assemble(n, s.bars, stiffness, force, tangent)
+    wanted = {"strain_bars": float(np.sum(stiffness * energy))}
+    groups = {
+        "strain_folds": (s.folds, s.fold_stiffness, s.fold_rest, s.fold_law),
+        "strain_bends": (s.bends, s.bend_stiffness, s.bend_rest, s.bend_law),
+    }
+    for group, (rows, stiff, rest, law) in groups.items():
+        energy, force, tangent = hinge_oracle(law)(x[rows], rest)
+        wanted[group] = float(np.sum(stiff * energy))
+        fe, ke = assemble(n, rows, stiff, force, tangent)
+        f, k = f + fe, k + ke
+    assert relative(s.internal_force(u), f) < TOLERANCE
+    assert relative(s.tangent(u).toarray(), k) < TOLERANCE
+    total = sum(wanted.values())
+    assert s.energy(u) == pytest.approx(total, rel=1e-12)
+    for group, value in wanted.items():
+        assert s.energies(u)[group] == pytest.approx(value, rel=1e-11, abs=1e-13 * total)

@@ -1,0 +1,172 @@
+"""Rigid motions do no work; forces balance; force and tangent turn with the structure."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from samples import MODELS, relative, rotation, state, structure
+
+NAMES = sorted(MODELS)
+STRESSED = {"miura n5b8 merlin2"}  # folds that are not stress-free at rest
+
+
+def forces_of(s):
+    """A force to compare with: that of a strain of one percent in every bar."""
+    return 0.01 * s.sheet.youngs_modulus * s.bar_area.max()
+
+
+def rigid_modes(x):
+    """Translations and infinitesimal rotations of nodes x, columns (3n, 6)."""
+    columns = [np.tile(e, (len(x), 1)) for e in np.eye(3)]
+    columns += [np.cross(e, x) for e in np.eye(3)]
+    return np.stack([c.ravel() for c in columns], axis=1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_at_rest(name):
+    s = structure(name)
+    zero = np.zeros_like(s.nodes)
+    if name in STRESSED:
+        assert np.abs(s.internal_force(zero)).max() > 1e-6 * forces_of(s)
+        return
+    assert np.abs(s.internal_force(zero)).max() < 1e-15 * forces_of(s)
+    assert all(0.0 <= e < 1e-18 for e in s.energies(zero).values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(4))
+def test_rigid_motion_of_the_rest_state(name, seed):
+    """A large rotation and translation: no force, the energy of the rest state."""
+    s = structure(name)
+    shift = np.random.default_rng(seed).uniform(-3, 3, 3)
+    u = s.nodes @ rotation(seed).T + shift - s.nodes
+    assert np.abs(u).max() > 0.5
+    rest = s.internal_force(np.zeros_like(u)) @ rotation(seed).T
+    assert np.abs(s.internal_force(u) - rest).max() < 1e-11 * forces_of(s)
+    at_rest = s.energy(np.zeros_like(u))
+    assert s.energy(u) == pytest.approx(at_rest, rel=1e-12, abs=1e-16)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(3))
+def test_force_and_tangent_turn_with_the_structure(name, seed):
+    s = structure(name)
+    u = state(s, seed)
+    q = rotation(seed + 100)
+    turned = (s.nodes + u) @ q.T + np.random.default_rng(seed).uniform(-1, 1, 3) - s.nodes
+    assert s.energy(turned) == pytest.approx(s.energy(u), rel=1e-12)
+    assert relative(s.internal_force(turned), s.internal_force(u) @ q.T) < 1e-12
+    big = np.kron(np.eye(len(u)), q)
+    assert relative(s.tangent(turned).toarray(), big @ s.tangent(u).toarray() @ big.T) < 1e-12
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_turned_pattern_is_the_same_structure(name):
+    """Discretized anew after a rotation: same stiffness, force turned."""
+    import foldyn as fd
+
+    s, q = structure(name), rotation(5)
+    make, options = MODELS[name]
+    pattern = make()
+    other = fd.discretize(fd.Pattern(pattern.vertices @ q.T, pattern.faces), s.sheet, **options)
+    np.testing.assert_array_equal(other.bars, s.bars)
+    np.testing.assert_array_equal(other.folds, s.folds)
+    np.testing.assert_allclose(other.bar_area, s.bar_area, rtol=1e-12)
+    np.testing.assert_allclose(other.bend_stiffness, s.bend_stiffness, rtol=1e-12)
+    np.testing.assert_allclose(other.fold_rest, s.fold_rest, rtol=1e-12)
+    u = state(s, 2)
+    assert relative(other.internal_force(u @ q.T), s.internal_force(u) @ q.T) < 1e-11
+
+
+@settings(max_examples=40, deadline=None)
+@given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-6, 0.15))
+def test_forces_and_moments_balance(name, seed, amplitude):
+    """At any state the internal forces have no resultant and no moment."""
+    s = structure(name)
+    u = state(s, seed, amplitude)
+    f = s.internal_force(u)
+    size = np.abs(f).max() * len(f) + 1e-12 * forces_of(s)
+    assert np.abs(f.sum(axis=0)).max() < 1e-13 * size
+    assert np.abs(np.cross(s.nodes + u, f).sum(axis=0)).max() < 1e-12 * size
+
+
+@settings(max_examples=30, deadline=None)
+@given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-3, 0.15))
+def test_tangent_on_rigid_modes(name, seed, amplitude):
+    """K times a translation is zero; K times a rotation is the rotated force, at any state."""
+    s = structure(name)
+    u = state(s, seed, amplitude)
+    k, f = s.tangent(u), s.internal_force(u)
+    scale = np.abs(k).sum(axis=1).max() * np.abs(s.nodes).max()
+    modes = rigid_modes(s.nodes + u)
+    assert np.abs(k @ modes[:, :3]).max() < 1e-12 * scale
+    for axis, column in zip(np.eye(3), modes[:, 3:].T, strict=True):
+        assert np.abs(k @ column - np.cross(axis, f).ravel()).max() < 1e-12 * scale
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_tangent_at_rest(name):
+    s = structure(name)
+    k = s.tangent(np.zeros_like(s.nodes))
+    assert k.shape == (s.nodes.size, s.nodes.size)
+    scale = np.abs(k).sum(axis=1).max()
+    assert np.abs((k - k.T).toarray()).max() < 1e-15 * scale
+    if name not in STRESSED:
+        assert np.abs(k @ rigid_modes(s.nodes)).max() < 1e-14 * scale * np.abs(s.nodes).max()
+        assert np.linalg.eigvalsh(k.toarray()).min() > -1e-12 * scale
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_force_is_gradient_and_tangent_its_slope(name):
+    """Central differences of second order, in every model."""
+    s = structure(name)
+    u, v = state(s, 3), state(s, 4, 1.0)
+
+    def errors(h):
+        force = (s.energy(u + h * v) - s.energy(u - h * v)) / (2 * h)
+        slope = (s.internal_force(u + h * v) - s.internal_force(u - h * v)) / (2 * h)
+        along = float(np.vdot(s.internal_force(u), v))
+        tangent = s.tangent(u) @ v.ravel()
+        return np.array([abs(force / along - 1), relative(slope.ravel(), tangent)])
+
+    coarse, fine = errors(2e-3), errors(1e-3)
+    np.testing.assert_allclose(np.log2(coarse / fine), 2.0, atol=0.15)
+    assert fine.max() < 1e-2
+
+
+@pytest.mark.parametrize("name", ["miura n5b8", "hexagon", "miura n4b5"])
+def test_numbering_does_not_matter(name):
+    """Nodes, bars and hinges in another order: the same energy, force and tangent."""
+    s = structure(name)
+    rng = np.random.default_rng(8)
+    n = len(s.nodes)
+    new = rng.permutation(n)  # new[i]: new number of node i
+    rows = {k: rng.permutation(len(getattr(s, k))) for k in ("bars", "folds", "bends")}
+    nodes = np.empty_like(s.nodes)
+    nodes[new] = s.nodes
+    other = dataclasses.replace(
+        s,
+        nodes=nodes,
+        pattern=None,
+        bars=new[s.bars][rows["bars"]],
+        bar_area=s.bar_area[rows["bars"]],
+        **{
+            f"{kind}{part}": (new[value] if part == "s" else value)[rows[kind + "s"]]
+            for kind in ("fold", "bend")
+            for part in ("s", "_stiffness", "_rest")
+            for value in [getattr(s, f"{kind}{part}")]
+        },
+    )
+    u = state(s, 9)
+    moved = np.empty_like(u)
+    moved[new] = u
+    for key, value in s.energies(u).items():
+        assert other.energies(moved)[key] == pytest.approx(value, rel=1e-13)
+    assert relative(other.internal_force(moved)[new], s.internal_force(u)) < 1e-13
+    dof = (3 * new[:, None] + np.arange(3)).ravel()
+    ours = other.tangent(moved).toarray()[np.ix_(dof, dof)]
+    assert relative(ours, s.tangent(u).toarray()) < 1e-13
