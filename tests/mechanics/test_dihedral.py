@@ -84,7 +84,7 @@ def test_small_angles_near_flat_are_resolved():
 
 
 def test_symmetries_of_the_row():
-    """Reversing the axis and exchanging the wings is the same hinge; one alone is the other side."""
+    """Axis reversed and wings exchanged: the same hinge; one of the two: its back."""
     points = wings(1.2, 1.3, (0.2, 0.9), (0.7, 1.4))
     theta = angle(points)
     assert angle(points[[1, 0, 3, 2]]) == pytest.approx(theta, abs=1e-15)

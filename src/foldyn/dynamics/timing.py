@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from numbers import Integral, Real
 from typing import NamedTuple
 
 from foldyn.errors import InputError
@@ -26,11 +27,12 @@ class Schedule(NamedTuple):
 
 def positive(name: str, value: object) -> float:
     """Return a positive finite number, or refuse it."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{name} = {value!r}: give a number (s)")
-    if not (math.isfinite(value) and value > 0.0):
+    number = float(value)
+    if not (math.isfinite(number) and number > 0.0):
         raise InputError(f"{name} = {value}: must be finite and greater than 0")
-    return float(value)
+    return number
 
 
 def schedule(duration: float, dt: float | None, every: int | float, critical: float) -> Schedule:
@@ -40,9 +42,9 @@ def schedule(duration: float, dt: float | None, every: int | float, critical: fl
     half the critical one, shortened so that it divides the sampling interval and the duration.
     """
     duration = positive("duration", duration)
-    if isinstance(every, bool) or not isinstance(every, (int, float)):
+    if isinstance(every, bool) or not isinstance(every, Real):
         raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")
-    in_seconds = not isinstance(every, int)
+    in_seconds = not isinstance(every, Integral)
     if in_seconds:
         every = positive("every", every)
         if every > duration * (1.0 + 1e-9):

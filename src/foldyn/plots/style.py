@@ -105,7 +105,7 @@ def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:
         handles=list(handles),
         # "outside" makes room, which only the layout engine can do.
         loc="outside lower center" if constrained else "lower center",
-        ncols=max(1, min(columns, len(handles))),
+        ncols=_even_columns(len(handles), columns),
         fontsize=TICK,
         labelcolor=BLACK,
         labelspacing=0.5,
@@ -127,3 +127,9 @@ def finish(figure: Figure) -> Figure:
     for axes in figure.axes:
         axes.tick_params(labelfontfamily=FAMILY)
     return figure
+
+
+def _even_columns(count: int, most: int) -> int:
+    """Columns, at most `most`, that fill the rows of a legend evenly."""
+    rows = max(1, -(-count // most))
+    return max(1, -(-count // rows))
