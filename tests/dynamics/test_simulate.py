@@ -269,3 +269,23 @@ def test_a_free_node_without_mass_is_refused():
     with pytest.raises(InputError, match="node 4 is free but has no mass"):
         fd.simulate(fd.Case(structure), 0.1)
     fd.simulate(fd.Case(structure, [fd.Fix([4], "xyz")]), 0.1)
+
+
+@pytest.mark.parametrize(("bend_law", "expected"), [("superlinear", 0.0312), ("linear", 0.0248)])
+def test_settles_in_the_static_equilibrium(bend_law, expected):
+    """Case study 1 under a slow load with strong damping comes to rest where forces balance.
+
+    The displacements of the loaded edge are those of an independent static solution
+    (docs/theory.md: 0.0312 m with superlinear bends, 0.0248 m with linear ones).
+    """
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    s = fd.discretize(pattern, SHEET, mass="circumcenter", bend_law=bend_law)
+    load = fd.Force([0, 1], (-1e-3, 0.0, 0.0), fd.Ramp(5.0))
+    case = fd.Case(s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], [load], fd.Rayleigh(3.0))
+    end = fd.simulate(case, 25.0, every=5.0).displacement.to_numpy()[-1]
+    np.testing.assert_allclose(end[[0, 1], 0], -expected, atol=5e-5)
+    force = s.internal_force(end).ravel()[case.free_dofs]
+    load_vector = np.zeros(s.nodes.shape)
+    load_vector[[0, 1], 0] = -1e-3
+    residual = force - load_vector.ravel()[case.free_dofs]
+    assert np.abs(residual).max() < 1e-4 * 1e-3

@@ -61,8 +61,13 @@ def structure_of(path, calibration="merlin2", stored_centers=True):
 
 
 @pytest.fixture(scope="module", params=FILES, ids=lambda p: p.stem.removeprefix("static_"))
-def golden(request):
-    return structure_of(request.param)
+def golden_path(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def golden(golden_path):
+    return structure_of(golden_path)
 
 
 def order(ours, theirs):
@@ -122,7 +127,7 @@ def test_energies(golden, c):
     ours = [e["strain_bars"], e["strain_bends"], e["strain_folds"], sum(e.values())]
     assert relative(ours, data[f"E{c}"]) < TOLERANCE
     # each energy by itself, as far as MERLIN2's acos knows its angles
-    np.testing.assert_allclose(ours, data[f"E{c}"], rtol=3e-6, atol=1e-16)
+    np.testing.assert_allclose(ours, data[f"E{c}"], rtol=1e-5, atol=1e-15 * sum(e.values()))
 
 
 @pytest.mark.parametrize("c", [1, 2, 3])
@@ -135,20 +140,17 @@ def test_tangent(golden, c):
     assert relative(ours, theirs) < TOLERANCE
 
 
-def test_own_center_of_polygons(golden, request):
-    data, s = golden
-    if not any(len(face) > 4 for face in s.pattern.faces) or s.options.scheme != "n5b8":
-        pytest.skip("no polygon")
-    path = next(p for p in FILES if p.stem.removeprefix("static_") in request.node.name)
-    _, own = structure_of(path, stored_centers=False)
+def test_own_centers(golden, golden_path):
+    """Also of polygons, for which MERLIN2's optimizer stops a little early."""
+    data, _ = golden
+    _, own = structure_of(golden_path, stored_centers=False)
     assert np.abs(own.nodes - data["nodes"]).max() < 1e-4 * own.pattern.size
 
 
-def test_standard_calibration_differs(golden, request):
+def test_standard_calibration(golden, golden_path):
     """Where MERLIN2 mis-orders, the standard calibration is another, by design."""
     data, s = golden
-    path = next(p for p in FILES if p.stem.removeprefix("static_") in request.node.name)
-    _, standard = structure_of(path, "standard")
+    _, standard = structure_of(golden_path, "standard")
     np.testing.assert_array_equal(standard.fold_stiffness, s.fold_stiffness)
     if s.options.scheme == "n4b5" or all(len(f) == 3 for f in s.pattern.faces):
         np.testing.assert_array_equal(standard.bend_stiffness, s.bend_stiffness)

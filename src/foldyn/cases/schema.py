@@ -8,7 +8,7 @@ continues the key's path (" = -1: must be ...", ".kind: missing ...").
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
 
@@ -24,6 +24,7 @@ from foldyn.structures.options import CALIBRATIONS, SCHEMES
 
 ANALYSES = ("dynamics",)
 LATER_ANALYSES = ("statics", "modes", "frf")
+AXES = ("x", "y", "z")
 METHODS = ("rk4",)
 """Integrators that a case file may name."""
 
@@ -187,9 +188,9 @@ class OutputSection(Section):
     """[output]: what is kept and shown."""
 
     nodes: Nodes = None
-    axis: Literal["x", "y", "z"] | None = None
+    axis: Annotated[Any, PlainValidator(lambda value: choice("", value, AXES))] = None
     every: Annotated[Any, PlainValidator(_every)] = None
-    max_frequency: Annotated[float, Field(gt=0.0)] | None = None
+    max_frequency: Positive | None = None
 
 
 class CaseSchema(Section):

@@ -66,6 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except ComputationError as error:
             print(f"foldyn: {error}", file=sys.stderr)
             return FAILED
+        except OSError as error:  # a full disk, a folder that vanished during the run
+            print(f"foldyn: cannot write the results: {error}", file=sys.stderr)
+            return FAILED
         except KeyboardInterrupt:
             print("foldyn: interrupted", file=sys.stderr)
             return INTERRUPTED

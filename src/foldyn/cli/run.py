@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import os
+import re
 import sys
+import tempfile
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,87 +16,150 @@ from foldyn.studies import find_case
 if TYPE_CHECKING:
     import xarray
 
+    from foldyn.dynamics import Motion
+
+# where the case file has what the functions that it calls complain about
+KEYS = {"duration": "analysis", "method": "analysis", "dt": "analysis", "every": "output"}
+
 
 def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -> Path:
     """Run a case file and write its results; returns their folder.
 
     Everything is checked before the first step is computed and before anything is written.
     """
-    from foldyn.dynamics import compiled, prepare
+    from foldyn.dynamics import compiled
 
     path = find_case(case)
-    case_file = read_case(path)
-    folder = Path(out) if out is not None else Path(f"{path.stem}-results")
-    _check_folder(folder)
-    method = case_file.analysis.arguments["method"]
-    motions = {}
-    for rule in case_file.masses:
-        try:
-            motions[rule] = prepare(case_file.case(rule), **case_file.analysis.arguments)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
+    folder = Path(f"{path.stem}-results" if out is None else out)
+    with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
+        case_file = read_case(path)
+        motions = _motions(case_file, figures)
+        names = {rule: _name(case_file, rule) for rule in motions}
+        _check_folder(folder, out, [*names.values(), *(["report.html"] if figures else [])])
+    for warning in told:
+        warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     say = _nothing if quiet else _say
     say(_headline(case_file))
-    if not compiled(method):
+    if not compiled(case_file.analysis.arguments["method"]):
         say("compiling the kernels: first use, up to half a minute; they are kept for later runs")
     results: dict[str, xarray.Dataset] = {}
-    failure = None
+    kept: list[str] = []
     for rule, motion in motions.items():
         try:
             results[rule] = motion.run(progress=not quiet and sys.stderr.isatty())
         except ComputationError as error:
-            failure = (rule, error)
-            break
+            if error.partial is not None:
+                error.partial.attrs["stopped_because"] = str(error)
+                kept.append(_save(error.partial, folder / names[rule]))
+            raise _failed(path, f"mass = {rule!r}: {error}", kept, error.partial) from None
+        kept.append(_save(results[rule], folder / names[rule]))
         say(_line(rule, results[rule]))
-    kept = _save(folder, case_file, results, failure)
-    if failure is not None:
-        rule, error = failure
-        raise ComputationError(
-            f"{path}: mass = {rule!r}: {error}\nfoldyn: kept what was computed: {', '.join(kept)}",
-            error.partial,
-        ) from None
-    if figures:
-        from foldyn.report import write_motion
-
-        say("drawing figures")
-        page = write_motion(case_file, results, folder)
-        say(f"wrote {', '.join(kept)}, figures and {page}")
-    else:
+    if not figures:
         say(f"wrote {', '.join(kept)}")
+        return folder
+    from foldyn.report import write_motion
+
+    say("drawing figures")
+    try:
+        page = write_motion(case_file, results, folder)
+    except InputError as error:
+        raise _failed(path, f"figures: {error}", kept) from None
+    say(f"wrote {', '.join(kept)}, figures and {page}")
     return folder
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse a results folder that cannot be written, before anything is computed."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder}: is a file; name a folder")
-    above = folder
-    while not above.exists():
-        above = above.parent
-    if not os.access(above, os.W_OK):
-        raise InputError(f"--out {folder}: {above} may not be written; name another folder")
+def _motions(case_file: CaseFile, figures: bool) -> dict[str, Motion]:
+    """Motions by mass rule, checked and ready to run."""
+    from foldyn.dynamics import prepare
+    from foldyn.dynamics.timing import check_memory
+    from foldyn.signals import MINIMUM_SAMPLES
+
+    path, several = case_file.path, len(case_file.masses) > 1
+    motions: dict[str, Motion] = {}
+    for rule in case_file.masses:
+        place = f'{path}: mass = "{rule}": ' if several else f"{path}: "
+        try:
+            motion = prepare(case_file.case(rule), **case_file.analysis.arguments)
+        except InputError as error:
+            raise InputError(place + _with_key(str(error))) from None
+        samples = motion.plan.samples
+        if figures and samples < MINIMUM_SAMPLES:
+            raise InputError(
+                f"{place}output.every: gives {samples} samples, spectra need {MINIMUM_SAMPLES}: "
+                "lower it, lengthen analysis.duration, or run with --no-figures"
+            )
+        motions[rule] = motion
+    case = case_file.case()
+    try:  # all of them together
+        check_memory(
+            sum(motion.plan.samples for motion in motions.values()),
+            len(case.structure.nodes),
+            len(case.supported_dofs),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {_with_key(str(error))}") from None
+    return motions
 
 
-def _save(
-    folder: Path,
-    case_file: CaseFile,
-    results: dict[str, xarray.Dataset],
-    failure: tuple[str, ComputationError] | None,
-) -> list[str]:
-    """Write the results, a partial one included; returns the files' names."""
+def _with_key(message: str) -> str:
+    """Put the section's name before a message that begins with the name of a key."""
+    found = re.match(r"\w+", message)
+    section = KEYS.get(found[0]) if found else None
+    return message if section is None else f"{section}.{message}"
+
+
+def _name(case_file: CaseFile, rule: str) -> str:
+    return "result.nc" if len(case_file.masses) == 1 else f"result-{rule}.nc"
+
+
+def _check_folder(folder: Path, out: str | None, names: list[str]) -> None:
+    """Refuse a results folder that cannot be written, by trying; leaves nothing behind."""
+    place = f"--out {folder}" if out is not None else f"results folder {folder}"
+    if out == "":
+        raise InputError("--out: is empty; name a folder")
+    made: list[Path] = []
+    try:
+        for part in (*reversed(folder.parents), folder):
+            if not part.exists():
+                part.mkdir()
+                made.append(part)
+        if not folder.is_dir():
+            raise InputError(f"{place}: is a file; name a folder")
+        for name in names:
+            if (folder / name).is_dir():
+                raise InputError(
+                    f"{place}: {folder / name} is a folder, a file of this name is to be written; "
+                    "name another folder"
+                )
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{place}: cannot be written ({reason}); name another folder") from None
+    finally:
+        for part in reversed(made):
+            part.rmdir()
+
+
+def _save(result: xarray.Dataset, file: Path) -> str:
+    """Write a result into a folder that is made where needed; returns the file's name."""
     from foldyn.results import save
 
-    folder.mkdir(parents=True, exist_ok=True)
-    everything = dict(results)
-    if failure is not None and failure[1].partial is not None:
-        everything[failure[0]] = failure[1].partial
-    single = len(case_file.masses) == 1
-    kept = []
-    for rule, result in everything.items():
-        file = folder / ("result.nc" if single else f"result-{rule}.nc")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    try:
         save(result, file)
-        kept.append(str(file))
-    return kept
+    except InputError as error:  # the input was right, but the folder has changed since
+        raise ComputationError(str(error), result) from None
+    return str(file)
+
+
+def _failed(
+    path: Path, reason: str, kept: list[str], partial: xarray.Dataset | None = None
+) -> ComputationError:
+    told = f"\nfoldyn: kept what was computed: {', '.join(kept)}" if kept else ""
+    return ComputationError(f"{path}: {reason}{told}", partial)
 
 
 def _headline(case_file: CaseFile) -> str:

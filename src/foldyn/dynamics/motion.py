@@ -109,6 +109,10 @@ def prepare(
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of(method)
     positive("duration", duration)
+    if not len(case.free_dofs):
+        raise InputError(
+            "supports: hold every node along x, y and z, so that nothing can move: free one"
+        )
     start = _start(case, initial)
     packed = pack(case)
     critical = critical_step(case, method, start[0])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from foldyn.errors import InputError
 
+MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
 
 
@@ -56,11 +57,13 @@ def schedule(duration: float, dt: float | None, every: int | float, critical: fl
         if not math.isfinite(target):
             raise InputError("dt: nothing limits the step of this case (no stiffness); give dt")
         span = float(every) if in_seconds else duration
+        _check_count(duration, min(target, span))
         count = max(1, math.ceil(span / target * (1.0 - 1e-12)))
         dt = span / count
         per_sample = count if in_seconds else int(every)
     else:
         dt = positive("dt", dt)
+        _check_count(duration, dt)
         if dt > duration * (1.0 + 1e-9):
             raise InputError(f"dt = {dt:g} s: longer than the duration of {duration:g} s")
         per_sample = max(1, round(every / dt)) if in_seconds else int(every)
@@ -71,7 +74,17 @@ def schedule(duration: float, dt: float | None, every: int | float, critical: fl
                 f"use dt = {near:.6g}, or leave dt out"
             )
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
+    if per_sample > steps:
+        raise InputError(f"every = {every}: longer than the motion of {steps} steps")
     return Schedule(dt, steps, per_sample)
+
+
+def _check_count(duration: float, dt: float) -> None:
+    """Refuse a motion that no machine can finish, and that integers could not count."""
+    if duration / dt > MOST_STEPS:
+        raise InputError(
+            f"duration = {duration:g} s: takes {duration / dt:.3g} steps of {dt:.3g} s; shorten it"
+        )
 
 
 def check_memory(samples: int, nodes: int, supported: int) -> None:
@@ -83,6 +96,6 @@ def check_memory(samples: int, nodes: int, supported: int) -> None:
         return
     if needed > 0.8 * available:
         raise InputError(
-            f"{samples} samples of {nodes} nodes need {needed / 2**30:.1f} GiB of "
-            f"{available / 2**30:.1f} GiB: raise every"
+            f"every: {samples:.3g} samples of {nodes} nodes need {needed / 2**30:.3g} GiB of "
+            f"{available / 2**30:.3g} GiB: raise it"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from foldyn.errors import InputError
@@ -23,9 +24,8 @@ def find_case(name: str) -> Path:
     InputError
         There is neither.
     """
-    path = Path(name)
-    if path.exists():
-        return path
+    if os.path.exists(name):  # Path.exists raises where a name is too long
+        return Path(name)
     known = shipped_cases()
     shipped = name.removesuffix(".toml")
     if shipped in known:

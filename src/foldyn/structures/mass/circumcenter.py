@@ -15,8 +15,8 @@ def circumcenter(surface: Surface) -> sparse.csr_array:
     Raises
     ------
     InputError
-        A triangle is obtuse: its circumcenter lies outside and a share is negative (below -1e-9;
-        right angles pass).
+        A triangle is so obtuse that a share is negative (below -1e-9 of the triangle; right
+        angles pass).
     """
     shares = circumcentric_shares(surface)
     worst = np.unravel_index(np.argmin(shares), shares.shape)

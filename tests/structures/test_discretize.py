@@ -1,0 +1,452 @@
+"""The arrays of a structure: shapes, numbering, orientation, centers, cuts, arguments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.patterns import GENERATORS
+from foldyn.structures.n5b8 import polygon_center, quad_centers
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
+MORE = {"simple_fold": {}, "miura": {"cells": (2, 1)}, "eggbox": {"cells": (1, 2)}, "kresling": {}}
+DART = [[0, 0], [2, -1], [0.6, 0], [2, 1]]  # reflex at 2
+L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+def one(vertices, **options):
+    pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
+    return fd.discretize(pattern, SHEET, **options)
+
+
+def regular(m):
+    angle = np.arange(m) * 2 * np.pi / m
+    return np.c_[np.cos(angle), np.sin(angle)]
+
+
+@pytest.mark.parametrize("name", sorted(GENERATORS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_counts_and_shapes(name, scheme):
+    pattern = GENERATORS[name](**MORE.get(name, {}))
+    s = fd.discretize(pattern, SHEET, scheme=scheme)
+    sizes = np.array([len(f) for f in pattern.faces])
+    with_center = (sizes > 3) if scheme == "n5b8" else np.zeros(len(sizes), bool)
+    inner = sizes[with_center].sum() + (sizes[~with_center] - 3).sum()
+    n = len(pattern.vertices) + with_center.sum()
+    assert s.nodes.shape == (n, 3)
+    assert s.bars.shape == (inner + len(pattern.edges), 2)
+    assert s.bar_length.shape == s.bar_area.shape == (len(s.bars),)
+    assert s.folds.shape == (len(pattern.creases), 4)
+    assert s.fold_stiffness.shape == s.fold_rest.shape == (len(pattern.creases),)
+    assert s.bends.shape == (inner, 4)
+    assert s.bend_stiffness.shape == s.bend_rest.shape == (inner,)
+    assert s.triangles.shape == (sizes[with_center].sum() + (sizes[~with_center] - 2).sum(), 3)
+    assert s.mass.shape == (n, n)
+    np.testing.assert_array_equal(s.nodes[: len(pattern.vertices)], pattern.vertices)
+    assert (s.bar_area > 0).all()
+    assert (s.bar_length > 0).all()
+    assert len({tuple(sorted(b)) for b in s.bars.tolist()}) == len(s.bars)
+    u = np.zeros_like(s.nodes)
+    assert s.internal_force(u).shape == (n, 3)
+    assert s.tangent(u).shape == (3 * n, 3 * n)
+    assert set(s.energies(u)) == {"strain_bars", "strain_folds", "strain_bends"}
+    assert isinstance(s.energy(u), float)
+    assert scheme in repr(s)
+
+
+@pytest.mark.parametrize("name", sorted(GENERATORS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_triangles_cover_the_panels(name, scheme):
+    """Counter-clockwise from the front, with the panels' areas, each side used once."""
+    pattern = GENERATORS[name](**MORE.get(name, {}))
+    s = fd.discretize(pattern, SHEET, scheme=scheme)
+    a, b, c = (s.nodes[s.triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a) / 2
+    signed = np.einsum("ij,ij->i", normal, pattern.face_normals[s.triangle_panel])
+    np.testing.assert_allclose(signed, np.linalg.norm(normal, axis=1), rtol=1e-12)
+    areas = np.bincount(s.triangle_panel, signed)
+    np.testing.assert_allclose(areas, pattern.face_areas, rtol=1e-12)
+    sides = [(t[k], t[(k + 1) % 3]) for t in s.triangles.tolist() for k in range(3)]
+    assert len(sides) == len(set(sides))
+
+
+@pytest.mark.parametrize("name", sorted(GENERATORS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_hinge_orientation(name, scheme):
+    """Axis j to k as the face of wing i runs; wing l's face runs k to j; angle from the front."""
+    pattern = GENERATORS[name](**MORE.get(name, {}))
+    s = fd.discretize(pattern, SHEET, scheme=scheme)
+    sides = {}
+    for p, t in zip(s.triangle_panel.tolist(), s.triangles.tolist(), strict=True):
+        for k in range(3):
+            sides[t[k], t[(k + 1) % 3]] = (t[(k + 2) % 3], p)
+    for row in [*s.folds.tolist(), *s.bends.tolist()]:
+        j, k, i, l = row  # noqa: E741
+        assert sides[j, k][0] == i
+        assert sides[k, j][0] == l
+    for row, crease in zip(s.folds.tolist(), pattern.creases.tolist(), strict=True):
+        assert sorted(row[:2]) == crease
+        j, k = row[:2]
+        face = pattern.faces[sides[j, k][1]]
+        assert face[(face.index(j) + 1) % len(face)] == k
+    np.testing.assert_allclose(s.fold_rest, pattern.dihedrals, rtol=0, atol=1e-12)
+    letters = np.array(pattern.assignments)
+    assert (s.fold_rest[letters == "V"] < np.pi).all()
+    assert (s.fold_rest[letters == "M"] > np.pi).all()
+    np.testing.assert_allclose(s.bend_rest, np.pi, rtol=0, atol=1e-12)
+    for row in s.bends.tolist():
+        panels = {sides[row[0], row[1]][1], sides[row[1], row[0]][1]}
+        assert len(panels) == 1
+
+
+def test_angles_of_the_contract():
+    """Simple fold: a mountain, 300 degrees for dihedral 60; the Miura has both letters."""
+    s = fd.discretize(fd.patterns.simple_fold(dihedral=60), SHEET)
+    np.testing.assert_allclose(np.degrees(s.fold_rest), [300.0], rtol=0, atol=1e-12)
+    m = fd.discretize(fd.patterns.miura(dihedral=60), SHEET)
+    zigzag = {tuple(c) for c in ((1, 4), (4, 7))}  # along x, j fixed at 1
+    found = {
+        tuple(c): np.degrees(r)
+        for c, r in zip(m.pattern.creases.tolist(), m.fold_rest, strict=True)
+    }
+    for crease in zigzag:
+        assert found[crease] == pytest.approx(300.0, abs=1e-10)  # j = 1 is a ridge
+    across = [found[3, 4], found[4, 5]]
+    assert all(abs(a - 180) > 20 for a in across)
+
+
+def test_specimen_numbering():
+    """The paper's fold 2-9 and bend 8-64 are our 1-8 and 7-63."""
+    pattern = fd.patterns.miura(cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=39.2)
+    s = fd.discretize(pattern, SHEET)
+    assert len(pattern.vertices) == 63
+    assert len(pattern.faces) == 48
+    assert s.nodes.shape == (111, 3)
+    assert [1, 8] in np.sort(s.folds[:, :2], axis=1).tolist()
+    assert [7, 63] in np.sort(s.bends[:, :2], axis=1).tolist()
+    np.testing.assert_array_equal(s.centers, np.arange(63, 111))
+    for p, face in enumerate(pattern.faces):
+        middle = pattern.vertices[list(face)].mean(axis=0)
+        np.testing.assert_allclose(s.nodes[63 + p], middle, atol=1e-15)
+    # panels run along x first: panel 1 starts one column of vertices further
+    assert set(pattern.faces[0]) == {0, 1, 7, 8}
+    assert set(pattern.faces[1]) == {7, 8, 14, 15}
+
+
+def test_arrays_are_read_only():
+    s = fd.discretize(fd.patterns.miura(), SHEET)
+    for name in ("nodes", "bars", "bar_length", "bar_area", "folds", "fold_stiffness",
+                 "fold_rest", "bends", "bend_stiffness", "bend_rest", "triangles"):  # fmt: skip
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(s, name)[0] = 0
+    with pytest.raises(AttributeError):
+        s.nodes = None
+    with pytest.raises(AttributeError):
+        s.options.mass = "panel"
+
+
+def test_inputs_are_left_alone():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    stiffness, rest, center = np.array([]), np.array([]), np.array([0.4, 0.5, 0.0])
+    before = vertices.copy()
+    pattern = fd.Pattern(vertices, [[0, 1, 2, 3]])
+    s = fd.discretize(
+        pattern, SHEET, crease_stiffness=stiffness, crease_rest=rest, centers={0: center}
+    )
+    np.testing.assert_array_equal(vertices, before)
+    center[:] = 9.0
+    vertices[:] = 9.0
+    assert vertices.flags.writeable
+    np.testing.assert_array_equal(s.nodes[:4], before)
+    np.testing.assert_array_equal(s.nodes[4], [0.4, 0.5, 0.0])
+    given = np.array([1.0, 2.0, 3.0, 4.0])
+    s = fd.discretize(fd.patterns.miura(), SHEET, crease_stiffness=given)
+    kept = s.fold_stiffness.copy()
+    given[:] = 0.0
+    np.testing.assert_array_equal(s.fold_stiffness, kept)
+
+
+def test_displacements_of_wrong_shape():
+    s = fd.discretize(fd.patterns.simple_fold(), SHEET)
+    n = len(s.nodes)
+    u = np.random.default_rng(0).uniform(-0.01, 0.01, (n, 3))
+    np.testing.assert_array_equal(s.internal_force(u.ravel()), s.internal_force(u))
+    for wrong in (u.T, u[:-1], u[:, :2], np.zeros(3 * n + 1), 0.0):
+        with pytest.raises(InputError, match="displacement"):
+            s.internal_force(wrong)
+
+
+# ---------------------------------------------------------------------------- creases
+
+
+def test_crease_stiffness_per_length():
+    pattern = fd.patterns.miura(a=1.0, b=2.0)
+    length = np.linalg.norm(
+        pattern.vertices[pattern.creases[:, 1]] - pattern.vertices[pattern.creases[:, 0]], axis=1
+    )
+    s = fd.discretize(pattern, SHEET, crease_stiffness=0.5)
+    np.testing.assert_allclose(s.fold_stiffness, 0.5 * length, rtol=1e-14)
+    each = [0.1, 0.2, 0.3, 0.0]
+    s = fd.discretize(pattern, SHEET, crease_stiffness=each)
+    np.testing.assert_allclose(s.fold_stiffness, each * length, rtol=1e-14)
+    assert s.options.crease_stiffness == each
+    plain = fd.discretize(pattern, SHEET)
+    np.testing.assert_array_equal(s.bend_stiffness, plain.bend_stiffness)
+    np.testing.assert_array_equal(s.bar_area, plain.bar_area)
+
+
+def test_crease_rest_in_degrees():
+    pattern = fd.patterns.miura(dihedral=60)
+    s = fd.discretize(pattern, SHEET, crease_rest=170)
+    np.testing.assert_allclose(s.fold_rest, np.radians(170), rtol=1e-15)
+    each = [100.0, 200.0, 300.0, 1.0]
+    s = fd.discretize(pattern, SHEET, crease_rest=each)
+    np.testing.assert_allclose(np.degrees(s.fold_rest), each, rtol=1e-14)
+    assert np.abs(s.internal_force(np.zeros_like(s.nodes))).max() > 1e-3  # not at rest as drawn
+    assert (s.bend_rest == fd.discretize(pattern, SHEET).bend_rest).all()
+    np.testing.assert_allclose(
+        s.dihedrals(np.zeros_like(s.nodes))[0], pattern.dihedrals, rtol=1e-13
+    )
+
+
+def test_pattern_that_rests_where_it_was_drawn():
+    """crease_rest equal to the pattern's own dihedrals changes nothing."""
+    pattern = fd.patterns.eggbox()
+    own = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, crease_rest=np.degrees(pattern.dihedrals))
+    np.testing.assert_allclose(s.fold_rest, own.fold_rest, rtol=1e-14)
+
+
+@pytest.mark.parametrize("field", ["crease_stiffness", "crease_rest"])
+@pytest.mark.parametrize(
+    "value",
+    [[1.0], [1.0] * 3, [1.0] * 5, [[1.0] * 4], np.nan, [1, 2, np.inf, 4], "soft", [1, "a", 2, 3],
+     [[1], [2, 3]], -1.0],
+)  # fmt: skip
+def test_wrong_crease_values(field, value):
+    with pytest.raises(InputError, match=field):
+        fd.discretize(fd.patterns.miura(), SHEET, **{field: value})
+
+
+@pytest.mark.parametrize("value", [0, 360, -10, 400, [90, 90, 90, 360]])
+def test_rest_angle_out_of_range(value):
+    with pytest.raises(InputError, match=r"crease_rest = .*between 0 and 360"):
+        fd.discretize(fd.patterns.miura(), SHEET, crease_rest=value)
+
+
+def test_crease_closed_at_rest():
+    """Two triangles that lie on each other: which side cannot be told."""
+    pattern = fd.Pattern([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 1, 0]], [[0, 1, 2], [1, 0, 3]])
+    with pytest.raises(InputError, match=r"crease 0 \(vertices 0, 1\)"):
+        fd.discretize(pattern, SHEET)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"scheme": "N5B8"}, {"scheme": None}, {"mass": "lumped"}, {"mass": ["panel"]},
+        {"bar_law": "hooke"}, {"fold_law": "ogden"}, {"bend_law": 1}, {"calibration": "merlin"},
+        {"centers": {1: [0, 0, 0]}}, {"centers": {-1: [0, 0, 0]}}, {"centers": {0: [0, 0]}},
+        {"centers": {0: "middle"}}, {"centers": {0: [np.nan, 0, 0]}}, {"centers": {"0": [0, 0, 0]}},
+        {"centers": {0: [0.5, 0.5, 0]}, "scheme": "n4b5"},
+    ],
+)  # fmt: skip
+def test_wrong_options(options):
+    field = next(iter(options))
+    with pytest.raises(InputError, match=field):
+        one(SQUARE, **options)
+
+
+def test_center_of_a_triangle_is_refused():
+    with pytest.raises(InputError, match="panel 0 has no center"):
+        fd.discretize(fd.patterns.kresling(), SHEET, centers={0: [0, 0, 0]})
+
+
+def test_pattern_and_sheet_of_wrong_type():
+    with pytest.raises(InputError, match="pattern"):
+        fd.discretize("miura", SHEET)
+    with pytest.raises(InputError, match="sheet"):
+        fd.discretize(fd.patterns.miura(), None)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("youngs_modulus", 0), ("youngs_modulus", -1e6), ("poissons_ratio", 0.5),
+     ("poissons_ratio", -1), ("thickness", 0.0), ("thickness", -0.01), ("density", 0.0),
+     ("density", np.nan), ("length_scale_ratio", 0), ("thickness", "0.01"), ("thickness", None),
+     ("poissons_ratio", np.inf), ("youngs_modulus", True)],
+)  # fmt: skip
+def test_wrong_sheet(field, value):
+    good = {"youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.01}
+    with pytest.raises(InputError, match=f"sheet: {field}"):
+        fd.Sheet(**{**good, field: value})
+
+
+def test_sheet_takes_numpy_numbers():
+    sheet = fd.Sheet(np.float32(1e6), np.float64(0.25), 1, density=np.int64(1000))
+    assert sheet.bending_modulus == pytest.approx(1e6 / (12 * 0.9375))
+
+
+# ---------------------------------------------------------------------------- centers
+
+
+def test_center_of_a_flat_quad_is_where_diagonals_cross():
+    """(0,0), (4,0), (3,3), (0,2): diagonals y = x and x + 2y = 4."""
+    s = one([[0, 0], [4, 0], [3, 3], [0, 2]])
+    np.testing.assert_allclose(s.nodes[4], [4 / 3, 4 / 3, 0], atol=1e-15)
+
+
+def test_center_of_a_quad_that_is_not_flat_lies_on_the_shorter_diagonal():
+    # diagonal 0-2 along x at z = 0, longer; diagonal 1-3 along y at z = 0.1
+    x = np.array([[[-2.0, 0, 0], [0.1, -1, 0.1], [2, 0, 0], [0.1, 1, 0.1]]])
+    np.testing.assert_allclose(quad_centers(x), [[0.1, 0, 0.1]], atol=1e-15)
+    swapped = np.roll(x, 1, axis=1)
+    np.testing.assert_allclose(quad_centers(swapped), [[0.1, 0, 0.1]], atol=1e-15)
+
+
+def test_center_at_equal_diagonals():
+    """The one through corners 2 and 4, counted from 1; also where they differ by rounding."""
+    x = np.array([[[-1.0, 0, 0], [0, -1, 0.1], [1, 0, 0], [0, 1, 0.1]]])
+    np.testing.assert_allclose(quad_centers(x), [[0, 0, 0.1]], atol=1e-15)
+    np.testing.assert_allclose(quad_centers(np.roll(x, 1, axis=1)), [[0, 0, 0]], atol=1e-15)
+    x[0, 2, 0] -= 1e-15
+    np.testing.assert_allclose(quad_centers(x), [[0, 0, 0.1]], atol=1e-15)
+
+
+def test_quad_that_is_not_flat_is_discretized():
+    s = one([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]])
+    assert np.abs(s.bend_rest - np.pi).max() > 0.01
+    assert np.abs(s.internal_force(np.zeros_like(s.nodes))).max() < 1e-9
+
+
+def objective(x, points):
+    """Sum of |(xj - c) x (xi - c)| / Lij^2 over diagonals, as MERLIN2 minimizes it."""
+    m = len(x)
+    total = np.zeros(len(points))
+    for i in range(m):
+        for j in range(i + 2, m):
+            if (i, j) != (0, m - 1):
+                a, b = x[j] - points, x[i] - points
+                cross = np.linalg.norm(np.cross(a, b), axis=1)
+                total += cross / np.sum((x[j] - x[i]) ** 2)
+    return total
+
+
+@pytest.mark.parametrize("m", [5, 6, 7, 8])
+def test_center_of_a_regular_polygon(m):
+    """On a pentagon every point of the inner one is a minimizer: the middle is taken."""
+    x = np.c_[regular(m), np.zeros(m)] * 2.5 + [3.0, -1.0, 2.0]
+    np.testing.assert_allclose(polygon_center(x), [3.0, -1.0, 2.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_center_of_a_polygon_is_optimal(seed):
+    rng = np.random.default_rng(seed)
+    m = 5 + seed % 3
+    angle = np.sort(rng.uniform(0, 2 * np.pi, m))
+    flat = np.c_[2 * np.cos(angle), np.sin(angle), np.zeros(m)]  # on an ellipse: convex
+    q = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    x = flat @ q.T + rng.uniform(-1, 1, 3)
+    center = polygon_center(x)
+    assert abs((center - x[0]) @ q[:, 2]) < 1e-12  # in its plane
+    best = objective(x, center[None])[0]
+    for size in (1e-6, 1e-3, 0.1, 1.0):
+        around = center + size * (rng.standard_normal((300, 2)) @ q[:, :2].T)
+        assert objective(x, around).min() > best - 1e-12
+    np.testing.assert_allclose(polygon_center(x * 1e-3), center * 1e-3, atol=1e-12)
+    np.testing.assert_allclose(polygon_center(np.roll(x, 2, axis=0)), center, atol=1e-9)
+
+
+# ---------------------------------------------------------------------------- cuts
+
+
+def diagonals(s):
+    return sorted(tuple(sorted(row)) for row in s.bends[:, :2].tolist())
+
+
+def test_n4b5_cuts_the_shorter_diagonal():
+    assert diagonals(one([[0, 0], [1, 0], [1.5, 1], [0.5, 1]], scheme="n4b5")) == [(1, 3)]
+    assert diagonals(one([[0, 0], [1, 0], [0.5, 1], [-0.5, 1]], scheme="n4b5")) == [(0, 2)]
+    assert diagonals(one(SQUARE, scheme="n4b5")) == [(0, 2)]  # tie: corners 1, 3 from 1
+    almost = [[0, 0], [1, 0], [1 + 1e-15, 1], [0, 1]]
+    assert diagonals(one(almost, scheme="n4b5")) == [(0, 2)]
+
+
+def test_dart():
+    """A quad with a reflex corner: no center sees all its edges; N4B5 cuts through the corner."""
+    with pytest.raises(InputError, match=r"panel 0 .*n4b5"):
+        one(DART)
+    s = one(DART, scheme="n4b5")
+    assert diagonals(s) == [(0, 2)]
+    for turn in range(1, 4):
+        s = one(np.roll(DART, turn, axis=0), scheme="n4b5")
+        assert diagonals(s) == [tuple(sorted((turn, (2 + turn) % 4)))]
+    # also where the diagonal outside the panel is the shorter one
+    flat_dart = [[0, 0], [2, -0.2], [1.7, 0], [2, 0.2]]
+    assert diagonals(one(flat_dart, scheme="n4b5")) == [(0, 2)]
+
+
+def test_l_shape_is_cut_inside():
+    s = one(L_SHAPE, scheme="n4b5")
+    assert len(s.triangles) == 4
+    assert len(s.bends) == 3
+    a, b, c = (s.nodes[s.triangles[:, k]] for k in range(3))
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(3.0, rel=1e-14)
+    for p, q in diagonals(s):
+        middle = (s.nodes[p] + s.nodes[q]) / 2
+        assert not (middle[0] > 1 and middle[1] > 1)  # the notch
+    np.testing.assert_allclose(s.bend_rest, np.pi, atol=1e-14)
+    # the shortest diagonals of all: 0-3 (sqrt 2) first
+    assert (0, 3) in diagonals(s)
+
+
+def test_l_shape_n5b8_needs_a_center_that_sees_every_edge():
+    with pytest.raises(InputError, match=r"panel 0 .*cannot see every edge.*n4b5"):
+        one(L_SHAPE)
+    s = one(L_SHAPE, centers={0: [0.5, 0.5, 0]})
+    assert len(s.triangles) == 6
+    assert s.surface.triangle_area.sum() == pytest.approx(3.0, rel=1e-14)
+    with pytest.raises(InputError, match="cannot see"):
+        one(SQUARE, centers={0: [2.0, 0.5, 0]})
+
+
+def test_n4b5_with_a_diagonal_that_is_an_edge_elsewhere():
+    """A pocket: a bent quad closed behind by two triangles whose crease is the quad's diagonal."""
+    vertices = [[0, 0, 0], [1, 0, 0.3], [1, 1, 0], [0, 1, 0.3]]
+    pattern = fd.Pattern(vertices, [[0, 1, 2, 3], [0, 2, 1], [0, 3, 2]])
+    s = fd.discretize(pattern, SHEET, scheme="n4b5", crease_rest=180)
+    assert diagonals(s) == [(0, 2)]
+    panels = dict(zip(map(tuple, s.triangles.tolist()), s.triangle_panel.tolist(), strict=True))
+    assert sorted(panels.values()) == [0, 0, 1, 2]
+    j, k, i, l = s.bends[0]  # noqa: E741
+    assert {i, l} == {1, 3}
+
+    def owner(*corners):
+        return [p for t, p in panels.items() if sorted(t) == sorted(corners)]
+
+    crease = [row for row in s.folds.tolist() if sorted(row[:2]) == [0, 2]]
+    assert len(crease) == 1
+    j, k, i, l = crease[0]  # noqa: E741
+    # the face of wing i (1 or 2, never the quad) runs j to k
+    for wing, (start, end) in ((i, (j, k)), (l, (k, j))):
+        face = next(f for f in pattern.faces[1:] if wing in f)
+        assert face[(face.index(start) + 1) % 3] == end
+        assert owner(start, end, wing)
+
+
+def test_pattern_of_many_kinds_of_panels():
+    """Triangle, quad and hexagon together: centers in panel order, bars in order of kinds."""
+    hexagon = np.c_[regular(6), np.zeros(6)]
+    vertices = np.vstack([hexagon, [[1.8, 1.0, 0], [-1.5, -1.8, 0], [-0.5, -2.0, 0]]])
+    pattern = fd.Pattern(vertices, [[1, 0, 6], [0, 1, 2, 3, 4, 5], [4, 3, 7, 8]])
+    s = fd.discretize(pattern, SHEET)
+    assert s.centers.tolist() == [-1, 9, 10]
+    assert [s.triangle_panel.tolist().count(p) for p in range(3)] == [1, 6, 4]
+    kinds = np.sort(s.bars, axis=1).tolist()
+    assert kinds[10:12] == pattern.creases.tolist()
+    assert kinds[12:] == pattern.boundary.tolist()
