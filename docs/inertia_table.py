@@ -15,7 +15,7 @@ from foldyn.structures import MASS_RULES, Sheet, discretize
 from foldyn.structures.mass import rotational_inertia
 
 PAGE = Path(__file__).with_name("mass-rules.md")
-SHEET = Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1000.0)
+SHEET = Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=1000.0)
 
 
 def parallelogram(a: float, b: float, angle: float) -> Pattern:

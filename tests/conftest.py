@@ -11,6 +11,9 @@ from stale_caches import remove_stale_caches
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
+# no doctests in them, and pytest cannot collect several modules of one name
+collect_ignore_glob = ["conftest.py", "*/conftest.py"]
+
 # before anything imports them: figures need no screen, and the oracle needs no accelerator
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

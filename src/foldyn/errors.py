@@ -39,5 +39,13 @@ class PenetrationError(ComputationError):
     """A hinge's dihedral jumped by more than pi: panel passed through panel."""
 
 
+class MotionInterrupted(KeyboardInterrupt):
+    """A motion was interrupted from the keyboard; `partial` has what was computed until then."""
+
+    def __init__(self, message: str, partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
 class FoldynWarning(UserWarning):
     """Something works, but perhaps not as intended."""

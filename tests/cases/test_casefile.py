@@ -66,6 +66,18 @@ def test_every_counts_steps_when_it_is_whole(read, short) -> None:
     np.testing.assert_array_equal(found.output.nodes, np.flatnonzero(height > 0.1))
 
 
+def test_axis_and_range_of_the_figures(read, short) -> None:
+    output = read(short + "[output]\naxis = 'y'\nmax_frequency = 5").output
+    assert (output.axis, output.max_frequency) == ("y", 5.0)
+    assert isinstance(output.max_frequency, float)
+    output = read(short).output
+    assert (output.axis, output.max_frequency) == (None, None)
+
+
+def test_a_byte_order_mark_is_no_obstacle(read, short) -> None:
+    assert read("\ufeff" + short).title == ""
+
+
 def test_without_loads_the_movable_vertices_are_shown(read, short) -> None:
     text = short.replace("[[loads]]\nnodes = [7, 6]\nforce = [1, 0, 0]\n", "")
     np.testing.assert_array_equal(read(text).output.nodes, [3, 4, 5, 6, 7, 8])

@@ -173,6 +173,38 @@ BAD = {
     "every": ([("every = 0.01", "every = 0")], "output.every = 0: must be at least 1 (steps)"),
     "every seconds": ([("every = 0.01", "every = -0.1")], "output.every = -0.1: must be greater"),
     "every truth": ([("every = 0.01", "every = true")], "output.every = true: must be a number"),
+    "output axis": (
+        [("every = 0.01", 'every = 0.01\naxis = "w"')],
+        'output.axis = "w": choose one of x, y, z',
+    ),
+    "output axis case": (
+        [("every = 0.01", 'every = 0.01\naxis = "X"')],
+        'output.axis = "X": ',
+    ),
+    "output axis number": (
+        [("every = 0.01", "every = 0.01\naxis = 1")],
+        "output.axis = 1: choose one of x, y, z",
+    ),
+    "output axis list": (
+        [("every = 0.01", 'every = 0.01\naxis = ["x"]')],
+        'output.axis = ["x"]: choose one of x, y, z',
+    ),
+    "output axes": (
+        [("every = 0.01", 'every = 0.01\naxes = "x"')],
+        "output.axes: unknown key; did you mean 'axis'? known keys: nodes, axis, every, max_freq",
+    ),
+    "max_frequency": (
+        [("every = 0.01", "every = 0.01\nmax_frequency = 0")],
+        "output.max_frequency = 0: must be greater than 0",
+    ),
+    "max_frequency nan": (
+        [("every = 0.01", "every = 0.01\nmax_frequency = nan")],
+        "output.max_frequency = nan: must be a finite number",
+    ),
+    "max_frequency text": (
+        [("every = 0.01", 'every = 0.01\nmax_frequency = "5 Hz"')],
+        'output.max_frequency = "5 Hz": must be a number',
+    ),
     "crease list": ([("[damping]", "crease_stiffness = [1.0]\n[damping]")], "model: "),
     "crease nan": (
         [("[damping]", "crease_rest = nan\n[damping]")],

@@ -10,7 +10,14 @@ from scipy import integrate
 
 import foldyn as fd
 from foldyn.checks import observed_order
-from foldyn.errors import ComputationError, InputError, InstabilityError, PenetrationError
+from foldyn.errors import (
+    ComputationError,
+    FoldynWarning,
+    InputError,
+    InstabilityError,
+    MotionInterrupted,
+    PenetrationError,
+)
 
 GOLDEN = Path(__file__).resolve().parents[3] / "shared" / "golden"
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -289,3 +296,20 @@ def test_settles_in_the_static_equilibrium(bend_law, expected):
     load_vector[[0, 1], 0] = -1e-3
     residual = force - load_vector.ravel()[case.free_dofs]
     assert np.abs(residual).max() < 1e-4 * 1e-3
+
+
+def test_an_interrupt_keeps_the_motion_until_then():
+    def stop(state):
+        if state.time > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(MotionInterrupted, match="interrupted at t =") as caught:
+        fd.simulate(case2(), 10.0, every=0.01, progress=stop)
+    kept = caught.value.partial
+    assert 0.2 < float(kept.time[-1]) < 9.0
+    assert np.isfinite(kept.displacement).all()
+
+
+def test_stiffness_damping_that_shrinks_the_step_is_told():
+    with pytest.warns(FoldynWarning, match="times smaller"):
+        fd.simulate(case2(beta=1e-2), 1e-3)

@@ -69,8 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OSError as error:  # a full disk, a folder that vanished during the run
             print(f"foldyn: cannot write the results: {error}", file=sys.stderr)
             return FAILED
-        except KeyboardInterrupt:
-            print("foldyn: interrupted", file=sys.stderr)
+        except KeyboardInterrupt as stop:
+            print(f"foldyn: {str(stop) or 'interrupted'}", file=sys.stderr)
             return INTERRUPTED
     return DONE
 

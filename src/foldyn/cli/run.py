@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.cases.casefile import CaseFile, read_case
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
@@ -47,11 +47,14 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     for rule, motion in motions.items():
         try:
             results[rule] = motion.run(progress=not quiet and sys.stderr.isatty())
-        except ComputationError as error:
+        except (ComputationError, MotionInterrupted) as error:
             if error.partial is not None:
                 error.partial.attrs["stopped_because"] = str(error)
                 kept.append(_save(error.partial, folder / names[rule]))
-            raise _failed(path, f"mass = {rule!r}: {error}", kept, error.partial) from None
+            failed = _failed(_place(case_file, rule), str(error), kept, error.partial)
+            if isinstance(error, MotionInterrupted):
+                raise MotionInterrupted(str(failed), error.partial) from None
+            raise failed from None
         kept.append(_save(results[rule], folder / names[rule]))
         say(_line(rule, results[rule]))
     if not figures:
@@ -63,7 +66,7 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     try:
         page = write_motion(case_file, results, folder)
     except InputError as error:
-        raise _failed(path, f"figures: {error}", kept) from None
+        raise _failed(f"{path}: figures: ", str(error), kept) from None
     say(f"wrote {', '.join(kept)}, figures and {page}")
     return folder
 
@@ -72,12 +75,11 @@ def _motions(case_file: CaseFile, figures: bool) -> dict[str, Motion]:
     """Motions by mass rule, checked and ready to run."""
     from foldyn.dynamics import prepare
     from foldyn.dynamics.timing import check_memory
-    from foldyn.signals import MINIMUM_SAMPLES
+    from foldyn.signals.spectrum import MINIMUM_SAMPLES
 
-    path, several = case_file.path, len(case_file.masses) > 1
     motions: dict[str, Motion] = {}
     for rule in case_file.masses:
-        place = f'{path}: mass = "{rule}": ' if several else f"{path}: "
+        place = _place(case_file, rule)
         try:
             motion = prepare(case_file.case(rule), **case_file.analysis.arguments)
         except InputError as error:
@@ -97,8 +99,14 @@ def _motions(case_file: CaseFile, figures: bool) -> dict[str, Motion]:
             len(case.supported_dofs),
         )
     except InputError as error:
-        raise InputError(f"{path}: {_with_key(str(error))}") from None
+        raise InputError(f"{case_file.path}: {_with_key(str(error))}") from None
     return motions
+
+
+def _place(case_file: CaseFile, rule: str) -> str:
+    """Beginning of a message: the file, and the mass rule where there are several."""
+    several = len(case_file.masses) > 1
+    return f'{case_file.path}: mass = "{rule}": ' if several else f"{case_file.path}: "
 
 
 def _with_key(message: str) -> str:
@@ -156,10 +164,10 @@ def _save(result: xarray.Dataset, file: Path) -> str:
 
 
 def _failed(
-    path: Path, reason: str, kept: list[str], partial: xarray.Dataset | None = None
+    place: str, reason: str, kept: list[str], partial: xarray.Dataset | None = None
 ) -> ComputationError:
     told = f"\nfoldyn: kept what was computed: {', '.join(kept)}" if kept else ""
-    return ComputationError(f"{path}: {reason}{told}", partial)
+    return ComputationError(f"{place}{reason}{told}", partial)
 
 
 def _headline(case_file: CaseFile) -> str:

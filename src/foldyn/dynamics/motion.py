@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, State
+from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import outcome
 from foldyn.dynamics.audit import AUDITED, energy_error, energy_scale
 from foldyn.dynamics.critical_step import MARGIN, critical_step
@@ -18,13 +19,20 @@ from foldyn.dynamics.methods import Method, method_of
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.system import pack, scratch
 from foldyn.dynamics.timing import Schedule, check_memory, positive, schedule
-from foldyn.errors import FoldynWarning, InputError, InstabilityError, PenetrationError
+from foldyn.errors import (
+    FoldynWarning,
+    InputError,
+    InstabilityError,
+    MotionInterrupted,
+    PenetrationError,
+)
 from foldyn.mechanics import angles, workspace
 from foldyn.results import trajectory_dataset
 
 if TYPE_CHECKING:
     import xarray
 
+DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
@@ -117,6 +125,7 @@ def prepare(
     packed = pack(case)
     critical = critical_step(case, method, start[0])
     plan = schedule(duration, dt, every, critical)
+    _warn_of_damping(case, method, start[0], critical)
     if not force and plan.dt > critical:
         raise InputError(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
@@ -140,6 +149,21 @@ def _start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
         node = int(np.argwhere((pair[1] != 0.0) & case.fixed)[0][0])
         raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
     return pair[0], pair[1]
+
+
+def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
+    """Say so where stiffness-proportional damping makes an explicit step very small."""
+    if case.damping.beta == 0.0:
+        return
+    without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
+    if without > DAMPING_COST * critical:
+        warnings.warn(
+            f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "
+            f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
+            "resolve the damping of the fastest vibration; alpha costs nothing",
+            FoldynWarning,
+            stacklevel=4,
+        )
 
 
 class Motion:
@@ -200,6 +224,10 @@ class Motion:
                 first = last
                 growth = REPORT_EVERY / max(clock, 1e-9)
                 length = max(CHUNK, min(int(length * min(growth, 8.0)), 100_000))
+        except KeyboardInterrupt:
+            raise MotionInterrupted(
+                f"interrupted at t = {first * plan.dt:.6g} s", self._dataset()
+            ) from None
         finally:
             close()
 
@@ -255,6 +283,8 @@ class Motion:
 
     def _fail(self, code: int, step: int, hinge: int, model: Any) -> None:
         moment = f"t = {step * self.plan.dt:.6g} s (step {step})"
+        if self.plan.dt > self.critical:
+            moment += f", with a step above the critical one of {self.critical:.3g} s,"
         if code == outcome.PENETRATION:
             j, k, i, l = model.hinges[hinge].tolist()  # noqa: E741
             raise PenetrationError(

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import xarray
 
 DPI = 150
+MOST_NODES = 12
+"""Nodes that one figure of a motion shows at most, a row each."""
 
 
 def write_motion(
@@ -35,7 +37,9 @@ def write_motion(
     folder = Path(folder)
     first = next(iter(results))
     case, trajectory = case_file.case(first), results[first]
-    nodes = case_file.output.nodes.tolist()
+    chosen = case_file.output.nodes.tolist()
+    nodes = chosen[:MOST_NODES]
+    some = f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
 
     def figure(name: str, caption: str, draw: Callable[[], Any]) -> Picture:
         path = folder / f"{name}.png"
@@ -70,7 +74,8 @@ def write_motion(
         Heading("The motion"),
         figure(
             "motion",
-            f"Displacement of the chosen nodes (left) and its frequency content (right), {rules}.",
+            f"Displacement of the chosen nodes{some} (left) and its frequency content (right), "
+            f"{rules}.",
             lambda: plots.plot_history(
                 results,
                 nodes,

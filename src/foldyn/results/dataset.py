@@ -12,7 +12,7 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import HISTORIES, Case
 from foldyn.cases.document import Document, to_document
 
 FORMAT = 1
@@ -80,7 +80,8 @@ def trajectory_dataset(
     }
     for name, text in ENERGIES.items():
         data[name] = _variable(("time",), energies[name], "J", text)
-    document = to_document(case, stage_times(statistics))
+    sampled = any(type(load.history) not in HISTORIES.values() for load in case.loads)
+    document = to_document(case, stage_times(statistics) if sampled else None)
     data.update(_case_variables(document))
     attributes: dict[str, Any] = {
         "foldyn_result": "trajectory",

@@ -16,13 +16,17 @@ that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results c
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns import Pattern
 from foldyn.structures.mesh import Mesh
 from foldyn.structures.sheet import Sheet
+
+WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
 def fold_stiffness(length: NDArray, sheet: Sheet) -> NDArray:
@@ -96,6 +100,7 @@ def bar_areas(
     inner_first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
     creases = set(map(tuple, pattern.creases.tolist()))
     edges: dict[tuple[int, int], float] = {}
+    weak: list[int] = []
     for panel, face in enumerate(pattern.faces):
         inside = slice(inner_first[panel], inner_first[panel + 1])
         ends = [(min(e), max(e)) for e in zip(face, face[1:] + face[:1], strict=True)]
@@ -107,6 +112,8 @@ def bar_areas(
             across = scale * abs(w**2 - nu * h**2) / w
             area = np.array([along, across, along, across])
             inner[inside] = scale * nu * (h**2 + w**2) ** 1.5 / (h * w)
+            if area.min() < WEAK * t * min(w, h):
+                weak.append(panel)
             if merlin2 and all(e in creases for e in ends):
                 area = _merlin2_edges(area, ends, pattern, panel)
         else:
@@ -117,6 +124,15 @@ def bar_areas(
             inner[inside] = area[0]
         for pair, value in zip(ends, area.tolist(), strict=True):
             edges[pair] = edges.get(pair, 0.0) + value
+    if weak:
+        shown = ", ".join(map(str, weak[:6])) + (", ..." if len(weak) > 6 else "")
+        warnings.warn(
+            f"panel {shown}: two edges get (almost) no bar area, because H^2 is close to nu W^2 "
+            "(W, H the lengths of its sides): it shears freely in its plane; use "
+            'scheme = "n4b5", or panels of other proportions',
+            FoldynWarning,
+            stacklevel=3,
+        )
     return inner, edges
 
 

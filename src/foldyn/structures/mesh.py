@@ -21,9 +21,8 @@ class Mesh:
         The pattern's vertices, then the panel centers in panel order.
     centers : (np,)
         Node number of each panel's center, -1 without one.
-    inner, inner_panel, inner_corner : (nh, 2), (nh,), (nh,)
-        Bars inside panels, sorted by panel, the panel of each and, for a spoke, which corner of
-        the panel it ends at (0 for a diagonal).
+    inner, inner_panel : (nh, 2), (nh,)
+        Bars inside panels, sorted by panel, the panel of each.
     bends : (nh, 4)
         Hinge on each inner bar: axis j, k, wings i, l.
     triangles, triangle_panel : (nt, 3), (nt,)
@@ -36,7 +35,6 @@ class Mesh:
     centers: NDArray
     inner: NDArray
     inner_panel: NDArray
-    inner_corner: NDArray
     bends: NDArray
     triangles: NDArray
     triangle_panel: NDArray

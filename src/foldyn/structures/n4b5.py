@@ -34,7 +34,6 @@ def n4b5(pattern: Pattern) -> Mesh:
         centers=np.full(len(pattern.faces), -1),
         inner=np.array(inner, np.int64).reshape(-1, 2),
         inner_panel=np.array(owner, np.int64),
-        inner_corner=np.zeros(len(owner), np.int64),
         bends=np.array(bends, np.int64).reshape(-1, 4),
         triangles=rows,
         triangle_panel=np.array(triangle_panel, np.int64),

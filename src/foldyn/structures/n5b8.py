@@ -18,7 +18,7 @@ def n5b8(pattern: Pattern, centers: dict[int, NDArray] | None = None) -> Mesh:
     sizes = np.array([len(f) for f in pattern.faces])
     number = np.where(sizes > 3, len(pattern.vertices) + np.cumsum(sizes > 3) - 1, -1)
     points = np.empty((int((sizes > 3).sum()), 3))
-    spokes, owner, corner, bends, triangles, triangle_panel = [], [], [], [], [], []
+    spokes, owner, bends, triangles, triangle_panel = [], [], [], [], []
     for size in np.unique(sizes):
         panels = np.flatnonzero(sizes == size)
         corners = np.array([pattern.faces[p] for p in panels])
@@ -36,7 +36,6 @@ def n5b8(pattern: Pattern, centers: dict[int, NDArray] | None = None) -> Mesh:
         triangles.append(np.stack([corners, after, hub], -1).reshape(-1, 3))
         triangle_panel.append(np.repeat(panels, size))
         owner.append(np.repeat(panels, size))
-        corner.append(np.tile(np.arange(size), len(panels)))
     for panel, point in given.items():
         points[number[panel] - len(pattern.vertices)] = point
     triangle_of = np.concatenate(triangle_panel)
@@ -53,7 +52,6 @@ def n5b8(pattern: Pattern, centers: dict[int, NDArray] | None = None) -> Mesh:
         centers=number,
         inner=sort(spokes, 2),
         inner_panel=owner_of[by_panel],
-        inner_corner=np.concatenate(corner)[by_panel] if corner else np.zeros(0, np.int64),
         bends=sort(bends, 4),
         triangles=triangle_rows,
         triangle_panel=triangle_of[order],

@@ -2,7 +2,8 @@
 
 4/9 (0.444) at the center, 1/4 at two opposite corners, 1/36 (0.028) at the other two: for a
 rhombus of 60 degrees these are q^2/12p^2 and p^2/12q^2, p and q the half diagonals. Despite the
-name the in-plane second moments of that rhombus are 0.336 and 3.0 times the exact ones.
+name the in-plane second moments of that rhombus are 1/3 (0.336 with the rounded 0.028) and 3 times
+the exact ones.
 """
 
 from __future__ import annotations

@@ -1,0 +1,138 @@
+"""The command called in its own folder, and case files that take milliseconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from foldyn.cli.main import main
+
+MIURA = """
+title = "a Miura unit cell"
+[pattern]
+kind = "miura"
+cells = [1, 1]
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+mass = "circumcenter"
+[damping]
+alpha = 0.0628
+[[supports]]
+nodes = [0, 1, 2]
+axes = "xyz"
+[[loads]]
+nodes = [7]
+force = [0.01, 0, 0]
+history = { kind = "half_sine", duration = 0.05 }
+[analysis]
+kind = "dynamics"
+duration = 0.1
+[output]
+every = 0.01
+"""
+
+# a fold whose creases do not lock, pulled shut: panel passes through panel at 0.28 s
+SHUT = """
+[pattern]
+kind = "simple_fold"
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+fold_law = "linear"
+[[supports]]
+nodes = [4, 5]
+[[supports]]
+nodes = [0, 1]
+axes = "z"
+[[loads]]
+nodes = [0, 1]
+force = [0.1, 0, 0]
+[analysis]
+kind = "dynamics"
+duration = 2.0
+[output]
+every = 0.01
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a call of the command left."""
+
+    status: int
+    out: str
+    err: str
+    new: list[str]  # files and folders that were not there before
+
+
+class Workplace:
+    """A folder in which the command is called."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.folder = folder
+        self.capsys = capsys
+
+    def write(self, content: str | bytes, name: str = "case.toml") -> None:
+        raw = content.encode() if isinstance(content, str) else content
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(raw)
+
+    def call(self, *arguments: str) -> Outcome:
+        before = self.contents()
+        self.capsys.readouterr()
+        status = main(arguments)
+        out, err = self.capsys.readouterr()
+        after = self.contents()
+        assert {name: after.get(name) for name in before} == before, "a file was changed"
+        return Outcome(status, out, err, sorted(set(after) - set(before)))
+
+    def run(self, content: str | bytes, *arguments: str) -> Outcome:
+        """Write case.toml and run it without figures."""
+        self.write(content)
+        return self.call("run", "case.toml", "--no-figures", *arguments)
+
+    def contents(self) -> dict[str, bytes | None]:
+        paths = sorted(self.folder.rglob("*"))
+        name = {path: path.relative_to(self.folder).as_posix() for path in paths}
+        return {name[p]: p.read_bytes() if p.is_file() else None for p in paths}
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch, capsys) -> Workplace:
+    monkeypatch.chdir(tmp_path)
+    return Workplace(tmp_path, capsys)
+
+
+@pytest.fixture
+def edited():
+    """Function that gives the Miura's case file with things replaced that occur in it once."""
+
+    def edit(*pairs: tuple[str, str], text: str = MIURA) -> str:
+        for old, new in pairs:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        return text
+
+    return edit
+
+
+@pytest.fixture
+def miura() -> str:
+    return MIURA
+
+
+@pytest.fixture
+def shut() -> str:
+    return SHUT

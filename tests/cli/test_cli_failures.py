@@ -1,0 +1,108 @@
+"""Status 1: a computation that fails leaves what was computed, and names it."""
+
+from __future__ import annotations
+
+import errno
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.dynamics import Motion
+
+KEPT = "foldyn: kept what was computed: "
+
+
+def check_partial(file: str, duration: float) -> None:
+    """The motion until the failure is there, shorter, finite, and says why it stopped."""
+    result = fd.load(file)
+    assert result.sizes["time"] >= 1
+    assert float(result.time[-1]) < duration
+    for name in ("displacement", "velocity", "kinetic", "work"):
+        assert np.isfinite(result[name]).all()
+    assert result.attrs["stopped_because"]
+    assert len(fd.case_of(result).structure.nodes) == result.sizes["node"]
+
+
+@pytest.mark.parametrize("factor", [1.2, 1.5, 10.0])
+def test_a_forced_step_far_above_the_critical_one(workplace, edited, factor) -> None:
+    dt = factor * 7.43e-4  # critical: 7.43e-4 s
+    text = edited(
+        ("duration = 0.1", f"duration = 5.0\ndt = {dt}\nforce = true"),
+        ("every = 0.01", "every = 1"),
+    )
+    failed = workplace.run(text)
+    assert failed.status == 1
+    assert failed.new == ["case-results", "case-results/result.nc"]
+    reason, kept = failed.err.splitlines()
+    assert reason.startswith("foldyn: case.toml: ")
+    assert "step" in reason
+    assert kept == KEPT + "case-results/result.nc"
+    assert "Traceback" not in failed.err
+    check_partial("case-results/result.nc", 5.0)
+
+
+def test_panel_through_panel(workplace, shut) -> None:
+    failed = workplace.run(shut)
+    assert failed.status == 1
+    reason, kept = failed.err.splitlines()
+    assert "panel passed through panel: the dihedral about nodes 2-3" in reason
+    assert "EnhancedLinear" in reason  # the remedy
+    assert kept == KEPT + "case-results/result.nc"
+    check_partial("case-results/result.nc", 2.0)
+    result = fd.load("case-results/result.nc")
+    assert float(result.time[-1]) > 0.2
+    assert result.attrs["stopped_because"] in reason
+    folds, _ = fd.case_of(result).structure.dihedrals(result.displacement.to_numpy()[-1])
+    assert np.degrees(folds[0]) > 300.0  # the mountain (300 degrees at rest) was closing
+
+
+def test_panel_through_panel_draws_no_figures(workplace, shut) -> None:
+    workplace.write(shut)
+    failed = workplace.call("run", "case.toml")
+    assert failed.status == 1
+    assert failed.new == ["case-results", "case-results/result.nc"]
+
+
+def test_rules_that_are_done_are_kept_beside_the_one_that_fails(workplace, edited) -> None:
+    # 7e-4 s is below the critical step of panel and beyond the stability limit of consistent
+    text = edited(
+        ('"circumcenter"', '["panel", "consistent", "centroid"]'),
+        ("duration = 0.1", "duration = 1.0\ndt = 7e-4\nforce = true"),
+        ("every = 0.01", "every = 1"),
+    )
+    failed = workplace.run(text)
+    assert failed.status == 1
+    files = [f"case-results/result-{rule}.nc" for rule in ("panel", "consistent")]
+    reason, kept = failed.err.splitlines()
+    assert reason.startswith('foldyn: case.toml: mass = "consistent": ')
+    assert kept == KEPT + ", ".join(files)
+    assert failed.new == ["case-results", *sorted(files)]
+    assert float(fd.load(files[0]).time[-1]) == pytest.approx(1.0, abs=7e-4)
+    check_partial(files[1], 1.0)
+
+
+def test_an_interrupted_list_keeps_what_was_done(workplace, edited, monkeypatch) -> None:
+    run = Motion.run
+
+    def interrupted(self, progress=None):
+        if self.case.structure.options.mass == "centroid":
+            raise KeyboardInterrupt
+        return run(self, progress)
+
+    monkeypatch.setattr(Motion, "run", interrupted)
+    stopped = workplace.run(edited(('"circumcenter"', '["panel", "centroid"]')))
+    assert (stopped.status, stopped.err) == (130, "foldyn: interrupted\n")
+    assert stopped.new == ["case-results", "case-results/result-panel.nc"]
+
+
+def test_a_full_disk(workplace, miura, monkeypatch) -> None:
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("foldyn.results.save", full)
+    failed = workplace.run(miura)
+    assert failed.status == 1
+    (line,) = failed.err.splitlines()
+    assert line.startswith("foldyn: cannot write the results: ")
+    assert "No space left on device" in line

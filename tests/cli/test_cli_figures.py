@@ -1,0 +1,56 @@
+"""The figures and the page that `foldyn run` leaves."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+
+PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "motion.gif", "energies.png")
+
+
+def test_figures_of_a_tiny_case(workplace, edited) -> None:
+    text = edited(
+        ('"circumcenter"', '["panel", "circumcenter"]'),
+        ('title = "a Miura unit cell"', 'title = "Miura & <co>"'),
+        ("every = 0.01", 'every = 0.02\nnodes = [7]\naxis = "x"\nmax_frequency = 20.0'),
+    )
+    workplace.write(text)
+    done = workplace.call("run", "case.toml", "--out", "r")
+    assert (done.status, done.err) == (0, "")
+    results = ("result-panel.nc", "result-circumcenter.nc")
+    files = {f"r/{name}" for name in (*PICTURES, *results, "report.html")}
+    assert set(done.new) == {"r", *files}
+    page = Path("r/report.html").read_text(encoding="utf-8")
+    for name in PICTURES:
+        assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
+    assert page.count("<img ") == len(PICTURES)
+    assert "<h1>Miura &amp; &lt;co&gt;</h1>" in page
+    for rule in ("panel", "circumcenter"):
+        assert f"<td>{rule}</td>" in page
+    assert f"figures and {Path('r/report.html')}" in done.out
+
+
+def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
+    """A sheet without loads shows some of its vertices, not hundreds of rows."""
+    from foldyn.report import motion
+
+    shown = []
+    monkeypatch.setattr(motion.plots, "animate", lambda *_, **__: Path("r/structure.png"))
+    draw = motion.plots.plot_history
+    monkeypatch.setattr(
+        motion.plots,
+        "plot_history",
+        lambda r, nodes, **k: shown.extend(nodes) or draw(r, nodes, **k),
+    )
+    workplace.write(
+        '[pattern]\nkind = "miura"\ncells = [6, 6]\n'
+        "[sheet]\nyoungs_modulus = 1e6\npoissons_ratio = 0.25\nthickness = 0.01\ndensity = 1.0\n"
+        '[[supports]]\nnodes = "xmin"\n'
+        '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\nevery = 0.001\n'
+    )
+    done = workplace.call("run", "case.toml", "--out", "r")
+    assert (done.status, done.err) == (0, "")
+    assert len(shown) == motion.MOST_NODES
+    page = Path("r/report.html").read_text(encoding="utf-8")
+    assert f"the first {motion.MOST_NODES} of 156" in page
+    assert not Path("r/load.png").exists()

@@ -1,0 +1,47 @@
+"""`foldyn info`, `--version`, and command lines that cannot be read."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata
+
+import pytest
+
+import foldyn as fd
+from foldyn.cli.main import main
+from foldyn.formats import FORMATS
+from foldyn.structures import MASS_RULES
+
+
+def test_info(workplace) -> None:
+    told = workplace.call("info")
+    assert (told.status, told.err, told.new) == (0, "", [])
+    lines = told.out.splitlines()
+    assert lines[0] == f"foldyn {fd.__version__}"
+    assert any(line.startswith(f"python {platform.python_version()}") for line in lines)
+    for name in ("numpy", "numba", "xarray"):
+        assert f"{name} {metadata.version(name)}" in lines
+    assert any(line.startswith("threads: ") for line in lines)
+    assert any(line.startswith("kernels of rk4: ") for line in lines)
+    assert any(line.startswith("optional parts: ") for line in lines)
+    for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES):
+        assert name in told.out
+    for k in (1, 2, 3, 4):
+        assert f"  herkal/case{k}" in lines
+
+
+def test_version(capsys) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"foldyn {fd.__version__}\n"
+
+
+@pytest.mark.parametrize("arguments", [[], ["run"], ["walk"], ["run", "a.toml", "--fast"]])
+def test_a_wrong_command_line_has_status_2(workplace, arguments) -> None:
+    before = workplace.contents()
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    assert "usage: foldyn" in workplace.capsys.readouterr().err
+    assert workplace.contents() == before

@@ -1,0 +1,157 @@
+"""`foldyn run` on good case files: what it writes, says and returns."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cli.main import main
+from foldyn.structures import MASS_RULES
+from foldyn.studies import find_case, shipped_cases
+
+PAPER_RULES = ["equi_inertial", "panel", "centroid", "circumcenter", "consistent"]
+
+
+def test_a_case_file_becomes_a_result_that_runs_again_from_itself(workplace, miura) -> None:
+    done = workplace.run(miura)
+    assert (done.status, done.err) == (0, "")
+    assert done.new == ["case-results", "case-results/result.nc"]
+    assert "a Miura unit cell: 13 nodes" in done.out
+    assert f"wrote {Path('case-results/result.nc')}" in done.out
+    result = fd.load("case-results/result.nc")
+    np.testing.assert_allclose(result.time, np.arange(11) * 0.01, rtol=1e-12)
+    assert float(np.abs(result.displacement.sel(node=7, axis="x")).max()) > 1e-3
+    assert result.attrs["energy_error"] < 1e-5
+    assert "stopped_because" not in result.attrs
+    a = result.attrs
+    again = fd.simulate(fd.case_of(result), a["duration"], dt=a["dt"], every=a["every"])
+    for name in ("time", "displacement", "velocity", "reaction", "work"):
+        np.testing.assert_array_equal(again[name], result[name])
+
+
+def test_a_list_of_mass_rules_gives_a_file_each(workplace, edited) -> None:
+    rules = list(MASS_RULES)
+    done = workplace.run(edited(('"circumcenter"', str(rules).replace("'", '"'))))
+    assert done.status == 0
+    assert done.new == ["case-results", *sorted(f"case-results/result-{r}.nc" for r in rules)]
+    motions = {rule: fd.load(f"case-results/result-{rule}.nc") for rule in rules}
+    for rule, motion in motions.items():
+        assert fd.case_of(motion).structure.options.mass == rule
+        assert f"  {rule}: " in done.out
+    one, other = motions["panel"].displacement, motions["consistent"].displacement
+    assert float(np.abs(one - other).max()) > 1e-4
+
+
+def test_out_names_the_folder(workplace, miura) -> None:
+    assert workplace.run(miura, "--out", "a/b").new == ["a", "a/b", "a/b/result.nc"]
+
+
+def test_a_second_run_replaces_the_first(workplace, miura, edited) -> None:
+    workplace.run(miura)
+    (workplace.folder / "case-results" / "notes.txt").write_text("mine")
+    workplace.write(edited(("duration = 0.1", "duration = 0.2")))
+    assert main(["run", "case.toml", "--no-figures"]) == 0
+    assert fd.load("case-results/result.nc").sizes["time"] == 21
+    assert (workplace.folder / "case-results" / "notes.txt").read_text() == "mine"
+
+
+def test_quiet_says_nothing(workplace, miura) -> None:
+    done = workplace.run(miura, "--quiet")
+    assert (done.status, done.out, done.err) == (0, "", "")
+    assert "case-results/result.nc" in done.new
+
+
+def test_names_beyond_ascii(workplace, miura) -> None:
+    workplace.write(miura, "Fälle/Miura – 折り紙.toml")
+    out = str(Path("Ergebnisse µ") / "ü")
+    done = workplace.call("run", "Fälle/Miura – 折り紙.toml", "--no-figures", "--out", out)
+    assert done.status == 0
+    assert fd.load(Path(out) / "result.nc").sizes["time"] == 11
+    assert workplace.call("run", "Fälle/Miura – 折り紙.toml", "--no-figures").new == [
+        "Miura – 折り紙-results",
+        "Miura – 折り紙-results/result.nc",
+    ]
+
+
+def test_a_byte_order_mark_is_no_obstacle(workplace, miura) -> None:
+    assert workplace.run(b"\xef\xbb\xbf" + miura.encode()).status == 0
+
+
+def test_free_flight_is_legal(workplace, edited) -> None:
+    text = edited(('[[supports]]\nnodes = [0, 1, 2]\naxes = "xyz"\n', ""))
+    done = workplace.run(text)
+    assert (done.status, done.err) == (0, "")
+    result = fd.load("case-results/result.nc")
+    assert result.sizes["support"] == 0
+    # the impulse of the half sine, 2/pi force times duration, carries the mass (4 panels) away
+    mass = 1.0 * 0.01 * 4 * np.sin(np.radians(60))
+    u = result.displacement.to_numpy()[-1]
+    drift = (fd.case_of(result).structure.mass @ u).sum(axis=0) / mass
+    speed = 0.01 * 0.05 * 2 / np.pi / mass
+    # centroid of the half sine at 0.025 s; damping (alpha = 0.0628/s) takes under 1 %
+    np.testing.assert_allclose(drift, [speed * (0.1 - 0.025), 0, 0], atol=0.01 * speed * 0.1)
+
+
+def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
+    done = workplace.run(edited(("nodes = [7]", "nodes = [0, 7]")))
+    assert done.status == 0
+    (line,) = done.err.splitlines()
+    assert line.startswith("foldyn: warning: loads[0]: the force [0.01, 0.0, 0.0] acts in part")
+
+
+def test_the_shipped_cases_are_what_they_say(workplace) -> None:
+    assert list(shipped_cases()) == [f"herkal/case{k}" for k in (1, 2, 3, 4)]
+    ratios, forces = [], []
+    for path in shipped_cases().values():
+        found = fd.read_case(path)
+        assert set(PAPER_RULES) <= set(found.masses)
+        sheet = found.sheet
+        assert (sheet.youngs_modulus, sheet.poissons_ratio, sheet.thickness) == (1e6, 0.25, 0.01)
+        ratios.append(sheet.length_scale_ratio)
+        forces.append([(load.nodes, load.vector) for load in found.case().loads])
+        for rule in found.masses:
+            fd.dynamics.prepare(found.case(rule), **found.analysis.arguments)
+    # design, section 7 (the paper's table of cases) and section 5 (directions: our assumptions)
+    assert ratios == [1.0, 1.0, 1.0, 5.0]
+    assert forces[1] == forces[3] == [((7,), (0.01, 0.0, 0.0))]
+    assert forces[2] == [((5,), (0.0, 0.01, 0.0))]
+    assert forces[0] == [((0, 1), (-1e-3, 0.0, 0.0))]
+
+
+@pytest.mark.parametrize("name", ["herkal/case1", "herkal/case3.toml"])
+def test_a_shipped_case_runs_by_its_name(workplace, name) -> None:
+    text = find_case(name).read_text(encoding="utf-8")
+    assert text.count("duration = 10.0") == 1
+    workplace.write(text.replace("duration = 10.0", "duration = 0.1"), "short.toml")
+    assert workplace.call("run", "short.toml", "--no-figures").status == 0
+    # by name: it is found and read, then the folder stops it before it is computed at full length
+    (workplace.folder / "taken").write_text("")
+    named = workplace.call("run", name, "--out", "taken")
+    assert (named.status, named.err) == (2, "foldyn: --out taken: is a file; name a folder\n")
+
+
+def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
+    source = str(Path(fd.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": source, "MPLBACKEND": "Agg"}
+    command = [sys.executable, "-m", "foldyn.cli.main", "run", "case.toml", "--no-figures"]
+    (tmp_path / "case.toml").write_text(miura)
+
+    def call() -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    good = call()
+    assert (good.returncode, good.stderr) == (0, "")
+    assert fd.load(tmp_path / "case-results" / "result.nc").sizes["time"] == 11
+    (tmp_path / "case.toml").write_text(miura.replace("thickness", "thicknes"))
+    bad = call()
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("foldyn: case.toml: sheet.thicknes: unknown key; did you mean")
+    assert len(bad.stderr.splitlines()) == 1

@@ -1,0 +1,182 @@
+"""The rule inertia_exact, and every rule's rotational inertia about a panel edge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mass_samples import (
+    HEXAGON,
+    PANELS,
+    QUADS_ONLY,
+    RECTANGLE,
+    RHO,
+    RULES,
+    SQUARE,
+    T,
+    exact_second_moments,
+    one,
+    second_moments,
+    shares,
+)
+
+from foldyn.structures import MASS_RULES
+from foldyn.structures.mass import rotational_inertia, rotational_inertia_errors
+
+# ---------------------------------------------------------------------------- inertia_exact
+
+
+@pytest.mark.parametrize("panel", ["square", "rectangle", "rhombus", "parallelogram", "oblique"])
+def test_inertia_exact_on_parallelograms(panel):
+    """2/3 and 1/12, and every second moment exact: so is the inertia about any axis."""
+    np.testing.assert_allclose(
+        shares(PANELS[panel], "inertia_exact"), [1 / 12] * 4 + [2 / 3], rtol=1e-12
+    )
+    rng = np.random.default_rng(2)
+    q = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    x = np.c_[np.array(PANELS[panel]), np.zeros(4)] @ q.T + rng.uniform(-1, 1, 3)
+    s = one(x, "inertia_exact")
+    exact = exact_second_moments(s)
+    np.testing.assert_allclose(second_moments(s), exact, atol=1e-12 * np.trace(exact))
+    exact_matrix = one(x, "consistent").mass
+    for a, b in [(0, 1), (1, 2), (0, 2), (1, 3)]:
+        assert rotational_inertia(s.mass, s.nodes, a, b) == pytest.approx(
+            rotational_inertia(exact_matrix, s.nodes, a, b), rel=1e-12
+        )
+
+
+def test_inertia_exact_on_a_regular_hexagon():
+    """By symmetry: corners c, center 1 - 6c, 3 c = 5/24 (radius 1)."""
+    np.testing.assert_allclose(
+        shares(HEXAGON, "inertia_exact"), [5 / 72] * 6 + [42 / 72], rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("panel", sorted(PANELS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_inertia_exact_on_any_panel(panel, scheme):
+    """Exact total and center of mass, positive, second moments no worse than the centroid's."""
+    x = np.c_[PANELS[panel], np.zeros(len(PANELS[panel]))] @ rotation(3).T + [3.0, -2.0, 1.0]
+    s, c = (one(x, rule, scheme=scheme) for rule in ("inertia_exact", "centroid"))
+    m, total = s.mass.diagonal(), RHO * T * s.pattern.face_areas.sum()
+    assert m.sum() == pytest.approx(total, rel=1e-14)
+    assert (m > 0.2 * c.mass.diagonal()).all()
+    middle = s.nodes[s.triangles].mean(axis=1)
+    center = s.surface.triangle_area @ middle / s.surface.triangle_area.sum()
+    np.testing.assert_allclose(m @ s.nodes / total, center, rtol=1e-13)
+    exact = exact_second_moments(s) - total * np.outer(center, center)
+
+    def error(structure):
+        found = second_moments(structure) - total * np.outer(center, center)
+        return np.linalg.norm(found - exact) / np.linalg.norm(exact)
+
+    assert error(s) < error(c) + 1e-13
+    if panel in ("hexagon", "pentagon", "quad", "trapezoid", "kite") and scheme == "n5b8":
+        assert error(s) < 0.7 * error(c)
+
+
+def rotation(seed):
+    q = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+    return q * np.linalg.det(q)
+
+
+@pytest.mark.parametrize("panel", ["trapezoid", "kite", "quad", "hexagon", "pentagon"])
+@pytest.mark.parametrize("rule", sorted(set(RULES) - {"circumcenter", "consistent"}))
+def test_shares_do_not_depend_on_place_size_or_first_corner(panel, rule):
+    x = np.array(PANELS[panel], float)
+    if rule in QUADS_ONLY and len(x) != 4:
+        return
+    before = shares(x, rule)
+    moved = 1e-3 * (np.c_[x, np.zeros(len(x))] @ rotation(7).T) + [0.2, 0.1, -0.3]
+    np.testing.assert_allclose(shares(moved, rule), before, atol=1e-9)
+    turned = shares(np.roll(x, 1, axis=0), rule)
+    np.testing.assert_allclose(np.roll(turned[:-1], -1), before[:-1], atol=1e-9)
+
+
+def test_inertia_exact_with_a_center_elsewhere():
+    """A parallelogram whose given center is not its middle keeps its center of mass."""
+    s = one(SQUARE, "inertia_exact", centers={0: [0.4, 0.55, 0]})
+    m = s.mass.diagonal()
+    np.testing.assert_allclose(m @ s.nodes / m.sum(), [0.5, 0.5, 0], atol=1e-14)
+    assert m.sum() == pytest.approx(RHO * T, rel=1e-14)
+
+
+# ---------------------------------------------------------------------------- rotation
+
+
+# Inertia about an edge of length 1 of a parallelogram of height h, over m h^2; exact 1/3. Far
+# corners are at h, the center at h/2: two corners' shares + center/4.
+ABOUT_AN_EDGE = {
+    "panel": 2 / 5 + 1 / 5 / 4,
+    "centroid": 2 / 6 + 1 / 3 / 4,
+    "equi_inertial": 1 / 4 + 1 / 36 + 4 / 9 / 4,
+    "equi_inertial_acute": 1 / 4 + 1 / 36 + 4 / 9 / 4,
+    "consistent": 1 / 3,
+    "inertia_exact": 2 / 12 + 2 / 3 / 4,
+}
+ERRORS = {
+    "panel": 0.35,
+    "centroid": 0.25,
+    "equi_inertial": 1 / 6,
+    "equi_inertial_acute": 1 / 6,
+    "circumcenter": 1 / 8,
+    "mixed_voronoi": 1 / 8,
+    "consistent": 0.0,
+    "inertia_exact": 0.0,
+}
+
+
+def errors_about_edges(vertices, rule, **options):
+    s = one(vertices, rule, **options)
+    return rotational_inertia_errors(s.mass, s.surface, s.pattern.edges)
+
+
+def test_every_rule_has_a_known_error():
+    assert set(ERRORS) == set(MASS_RULES)
+    for rule, inertia in ABOUT_AN_EDGE.items():
+        assert 3 * inertia - 1 == pytest.approx(ERRORS[rule], abs=1e-15)
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("panel", ["square", "rhombus"])
+def test_rotational_inertia_of_rhombi(panel, rule):
+    """Circumcenter: 2/8 + 1/2/4 = 3/8, one eighth too much."""
+    found = errors_about_edges(PANELS[panel], rule)
+    np.testing.assert_allclose(found, ERRORS[rule], rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("rule", sorted(ABOUT_AN_EDGE))
+@pytest.mark.parametrize("panel", ["rectangle", "parallelogram", "oblique"])
+def test_rotational_inertia_of_parallelograms(panel, rule):
+    found = errors_about_edges(PANELS[panel], rule)
+    np.testing.assert_allclose(found, ERRORS[rule], rtol=1e-12, atol=1e-12)
+
+
+def test_mixed_voronoi_on_the_2_to_1_rectangle():
+    """Center 13/32, corners 19/128: about an edge 51/128, 25/128 too much.
+
+    The triangles on the long edges are obtuse at the center (1/2, 1/4, 1/4); those on the short
+    edges give it (1 + (H/W)^2)/4 = 5/16. Each is a quarter of the panel.
+    """
+    np.testing.assert_allclose(
+        shares(RECTANGLE, "mixed_voronoi"), [19 / 128] * 4 + [13 / 32], rtol=1e-13
+    )
+    found = errors_about_edges(RECTANGLE, "mixed_voronoi")
+    np.testing.assert_allclose(found, 25 / 128, rtol=1e-12)
+
+
+@pytest.mark.parametrize("panel", sorted(PANELS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_consistent_is_exact_about_every_axis_in_the_panel(panel, scheme):
+    """Its second moments are the integrals over the triangles."""
+    s = one(PANELS[panel], "consistent", scheme=scheme)
+    exact = exact_second_moments(s)
+    np.testing.assert_allclose(second_moments(s), exact, atol=1e-14 * np.trace(exact))
+
+
+def test_rotational_inertia_of_a_square_in_numbers():
+    """m a^2/3 with m = 700 * 0.02 * 1 = 14 kg."""
+    s = one(SQUARE, "consistent")
+    for a, b in s.pattern.edges:
+        assert rotational_inertia(s.mass, s.nodes, a, b) == pytest.approx(14 / 3, rel=1e-13)
+    diagonal = rotational_inertia(s.mass, s.nodes, 0, 2)
+    assert diagonal == pytest.approx(14 / 12, rel=1e-13)
