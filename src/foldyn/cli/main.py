@@ -7,6 +7,7 @@ message, nothing written.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -65,6 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return BAD_INPUT
         except ComputationError as error:
             print(f"foldyn: {error}", file=sys.stderr)
+            return FAILED
+        except BrokenPipeError:  # the reader of our output has left, as `head` does
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return FAILED
         except OSError as error:  # a full disk, a folder that vanished during the run
             print(f"foldyn: cannot write the results: {error}", file=sys.stderr)

@@ -198,8 +198,8 @@ class Motion:
         tally = np.zeros(2)
         angle = angles(model.rest + u, model.hinges)
         recheck = max(1000, -(-plan.steps // RECHECKS))
-        first, length = 0, CHUNK
-        began = time.perf_counter()
+        first, length = 0, 0  # the first call only records t = 0: it may have to compile
+        began = None
         try:
             while True:
                 last = min(first + length, plan.steps, (first // recheck + 1) * recheck)
@@ -212,6 +212,7 @@ class Motion:
                     self.velocity[rows], self.reaction[rows], self.energy[rows], work, memory,
                 )  # fmt: skip
                 clock = time.perf_counter() - clock
+                began = time.perf_counter() if began is None else began
                 self.seconds = time.perf_counter() - began
                 self.stored = max(self.stored, self._complete(step, code))
                 if code != outcome.DONE:
@@ -219,7 +220,7 @@ class Motion:
                 report(Progress(last * plan.dt, plan.steps * plan.dt, last, self._audit()))
                 if last == plan.steps:
                     return
-                if last % recheck == 0 and not self.force:
+                if last and last % recheck == 0 and not self.force:
                     self._recheck(last, u)
                 first = last
                 growth = REPORT_EVERY / max(clock, 1e-9)
