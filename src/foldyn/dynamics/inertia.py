@@ -21,6 +21,7 @@ class Inertia(NamedTuple):
     """Mass matrix (nodal, CSR), its inverse where diagonal, its factors where not."""
 
     lumped: bool
+    diagonal: NDArray  # (n,)
     inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
     indptr: NDArray
     indices: NDArray
@@ -74,6 +75,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         factors = [_factor(mass, nodes) for nodes in sets]
     return Inertia(
         lumped,
+        diagonal,
         inverse,
         mass.indptr.astype(np.int64),
         mass.indices.astype(np.int64),
@@ -171,3 +173,18 @@ def solve_mass(m, r, a, scratch):
                 scratch[m.upper_row[p]] -= m.upper[p] * value
         for i in range(count):
             a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]
+
+
+@kernel
+def kinetic_energy(m, v, product):
+    """v M v / 2 (J), v (n, 3); product (n, 3) is scratch, used if the matrix is not diagonal."""
+    n, total = v.shape[0], 0.0
+    if m.lumped:
+        for i in range(n):
+            total += m.diagonal[i] * (v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
+        return 0.5 * total
+    times_mass(m, v, product)
+    for i in range(n):
+        for c in range(3):
+            total += v[i, c] * product[i, c]
+    return 0.5 * total

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.dynamics.inertia import Inertia, inertia, solve_mass, times_mass
+from foldyn.dynamics.inertia import Inertia, inertia, kinetic_energy, solve_mass, times_mass
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
 
@@ -20,7 +20,7 @@ class System(NamedTuple):
     free: NDArray  # (n, 3) 1.0 on free dofs, 0.0 on fixed ones
     supported: NDArray  # (s,) dof numbers 3 node + axis
     alpha: float
-    stiff_indptr: NDArray  # beta K0 by rows; no rows if beta = 0
+    stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
     stiff_indices: NDArray
     stiff_data: NDArray
     load_dof: NDArray  # (l,)
@@ -31,11 +31,8 @@ class System(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of one evaluation of the equation of motion."""
 
-    internal: NDArray  # (n, 3)
-    external: NDArray  # (n, 3)
-    viscous: NDArray  # (n, 3) C v
-    momentum: NDArray  # (n, 3) M v
-    residual: NDArray  # (n, 3)
+    force: NDArray  # (n, 3) F_int + beta K0 v - p
+    product: NDArray  # (n, 3) the mass matrix times a vector
     line: NDArray  # (n,)
     energy: NDArray  # (3,)
 
@@ -70,48 +67,36 @@ def pack(case: Case) -> tuple[BarsHinges, System, Inertia]:
 
 def scratch(nodes: int) -> Scratch:
     """Memory for a model of so many nodes."""
-    full = [np.zeros((nodes, 3)) for _ in range(5)]
-    return Scratch(full[0], full[1], full[2], full[3], full[4], np.zeros(nodes), np.zeros(3))
+    return Scratch(np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros(nodes), np.zeros(3))
 
 
 @kernel
 def acceleration(model, system, mass, u, v, factors, out, work, s):
     """Acceleration (n, 3) at displacement u and velocity v under the histories' factors.
 
-    Returns the power of the loads and the power dissipated (W). The forces stay in `s`.
+    a = - M^-1 (F_int + beta K0 v - p) - alpha v. Returns the power of the loads and the power
+    dissipated (W). The bracket stays in `s.force`.
     """
-    internal_force(model, u, s.internal, work)
-    s.external[:] = 0.0
-    external = s.external.reshape(-1)
-    speed = v.reshape(-1)
-    power_in = 0.0
+    internal_force(model, u, s.force, work)
+    force, speed = s.force.reshape(-1), v.reshape(-1)
+    power_in, power_out = 0.0, 0.0
     for q in range(system.load_dof.size):
         dof = system.load_dof[q]
-        force = system.load_value[q] * factors[system.load_history[q]]
-        external[dof] += force
-        power_in += force * speed[dof]
-    power_out = 0.0
-    alpha = system.alpha
-    stiff = system.stiff_indptr.size > 1
-    if alpha > 0.0 or stiff:
-        times_mass(mass, v, s.momentum)
-        viscous = s.viscous.reshape(-1)
-        momentum = s.momentum.reshape(-1)
-        for i in range(viscous.size):
-            viscous[i] = alpha * momentum[i]
-        if stiff:
-            for i in range(viscous.size):
-                total = 0.0
-                for p in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-                    total += system.stiff_data[p] * speed[system.stiff_indices[p]]
-                viscous[i] += total
-        for i in range(viscous.size):
-            power_out += viscous[i] * speed[i]
-    n = u.shape[0]
-    for i in range(n):
-        for c in range(3):
-            s.residual[i, c] = s.external[i, c] - s.internal[i, c] - s.viscous[i, c]
-    solve_mass(mass, s.residual, out, s.line)
+        load = system.load_value[q] * factors[system.load_history[q]]
+        force[dof] -= load
+        power_in += load * speed[dof]
+    for i in range(system.stiff_indptr.size - 1):
+        viscous = 0.0
+        for p in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
+            viscous += system.stiff_data[p] * speed[system.stiff_indices[p]]
+        force[i] += viscous
+        power_out += viscous * speed[i]
+    solve_mass(mass, s.force, out, s.line)
+    accelerated, alpha = out.reshape(-1), system.alpha
+    for i in range(speed.size):
+        accelerated[i] = -accelerated[i] - alpha * speed[i]
+    if alpha > 0.0:
+        power_out += 2.0 * alpha * kinetic_energy(mass, v, s.product)
     return power_in, power_out
 
 
@@ -119,23 +104,22 @@ def acceleration(model, system, mass, u, v, factors, out, work, s):
 def record(model, system, mass, u, v, a, s, displacement, velocity, reaction, energy):
     """Write one sample after `acceleration`; energy[:4] gets strain energies and kinetic energy.
 
-    The reaction is what the supports exert: M a + C v + F_int - p on supported dofs.
+    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there.
     """
     n = u.shape[0]
+    times_mass(mass, a, s.product)
+    for q in range(system.supported.size):
+        i, c = system.supported[q] // 3, system.supported[q] % 3
+        reaction[q] = s.product[i, c] + s.force[i, c]
+    energy[3] = kinetic_energy(mass, v, s.product)
+    times_mass(mass, v, s.product)
+    for q in range(system.supported.size):
+        i, c = system.supported[q] // 3, system.supported[q] % 3
+        reaction[q] += system.alpha * s.product[i, c]
     for i in range(n):
         for c in range(3):
             displacement[i, c] = u[i, c]
             velocity[i, c] = v[i, c]
-    times_mass(mass, a, s.momentum)
-    for q in range(system.supported.size):
-        i, c = system.supported[q] // 3, system.supported[q] % 3
-        reaction[q] = s.momentum[i, c] - s.residual[i, c]
     strain_energies(model, u, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
-    times_mass(mass, v, s.momentum)
-    kinetic = 0.0
-    for i in range(n):
-        for c in range(3):
-            kinetic += 0.5 * v[i, c] * s.momentum[i, c]
-    energy[3] = kinetic

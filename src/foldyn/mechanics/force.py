@@ -26,13 +26,18 @@ class Workspace(NamedTuple):
     points: NDArray  # (12 * BLOCK,)
     gradient: NDArray  # (13 * BLOCK,), the last row the angle
     value: NDArray  # (BLOCK,)
+    position: NDArray  # (n, 3)
     angle: NDArray  # (nh,) the dihedrals of the last evaluation, rad
 
 
 def workspace(model: BarsHinges) -> Workspace:
     """Scratch memory for `model`."""
     return Workspace(
-        np.empty(12 * BLOCK), np.empty(13 * BLOCK), np.empty(BLOCK), np.empty(len(model.hinges))
+        np.empty(12 * BLOCK),
+        np.empty(13 * BLOCK),
+        np.empty(BLOCK),
+        np.empty((len(model.rest), 3)),
+        np.empty(len(model.hinges)),
     )
 
 
@@ -91,7 +96,10 @@ def hinge_moments(code, address, model, first, m, angle, value):
 def add_hinge_forces(model, u, force, work):
     """Add the hinges' internal force at displacement u (n, 3) to force (n, 3)."""
     x, g, value, angle = work.points, work.gradient, work.value, work.angle
-    rest, hinges = model.rest, model.hinges
+    position, hinges = work.position, model.hinges
+    for n in range(u.shape[0]):
+        for c in range(3):
+            position[n, c] = model.rest[n, c] + u[n, c]
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
         address = model.addresses[model.hinge_runs[run, 3], 1]
@@ -102,10 +110,10 @@ def add_hinge_forces(model, u, force, work):
                 j, k = hinges[first + q, 0], hinges[first + q, 1]
                 i, l = hinges[first + q, 2], hinges[first + q, 3]  # noqa: E741
                 for c in range(3):
-                    x[c * BLOCK + q] = rest[j, c] + u[j, c]
-                    x[(3 + c) * BLOCK + q] = rest[k, c] + u[k, c]
-                    x[(6 + c) * BLOCK + q] = rest[i, c] + u[i, c]
-                    x[(9 + c) * BLOCK + q] = rest[l, c] + u[l, c]
+                    x[c * BLOCK + q] = position[j, c]
+                    x[(3 + c) * BLOCK + q] = position[k, c]
+                    x[(6 + c) * BLOCK + q] = position[i, c]
+                    x[(9 + c) * BLOCK + q] = position[l, c]
             for q in range(m):
                 (
                     g[12 * BLOCK + q],

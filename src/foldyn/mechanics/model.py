@@ -24,12 +24,12 @@ class BarsHinges(NamedTuple):
     """
 
     rest: NDArray  # (n, 3) rest position of the nodes, m
-    bars: NDArray  # (nb, 2) int32
+    bars: NDArray  # (nb, 2) uint32: signed indices would be tested for wraparound at every access
     bar_vector: NDArray  # (nb, 3) rest vector from the first node to the second, m
     bar_per_length2: NDArray  # (nb,) 1 / L^2
     bar_stiffness: NDArray  # (nb,) E A / L, N/m
     bar_runs: NDArray  # (rb, 4) int64
-    hinges: NDArray  # (nh, 4) int32: axis j, k, wings i, l
+    hinges: NDArray  # (nh, 4) uint32: axis j, k, wings i, l
     hinge_stiffness: NDArray  # (nh,) N m/rad, whole hinge
     hinge_rest: NDArray  # (nh,) rad
     hinge_parameters: NDArray  # (nh, 4)
@@ -64,7 +64,7 @@ def build(
         return start, end, of.code, len(addresses) - 1
 
     order = _order(bars)
-    bars = np.ascontiguousarray(bars[order], np.int32).reshape(-1, 2)
+    bars = np.ascontiguousarray(bars[order], np.uint32).reshape(-1, 2)
     vector = rest[bars[:, 1]] - rest[bars[:, 0]]
     bar_runs = [run(0, len(bars), law)]
 
@@ -87,7 +87,7 @@ def build(
         bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),
         bar_stiffness=np.ascontiguousarray(stiffness[order], float),
         bar_runs=np.array(bar_runs, np.int64).reshape(-1, 4),
-        hinges=gather(lambda k, g: g.nodes, (-1, 4), np.int32),
+        hinges=gather(lambda k, g: g.nodes, (-1, 4), np.uint32),
         hinge_stiffness=gather(lambda k, g: g.stiffness, -1),
         hinge_rest=gather(lambda k, g: g.rest, -1),
         hinge_parameters=gather(lambda k, g: g.law.parameters(g.rest), (-1, 4)),

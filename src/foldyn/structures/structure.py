@@ -197,4 +197,4 @@ class Structure:
 
 def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
     """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
-    return mechanics.angles(np.ascontiguousarray(x), np.ascontiguousarray(hinges, np.int32))
+    return mechanics.angles(np.ascontiguousarray(x), np.ascontiguousarray(hinges, np.uint32))
