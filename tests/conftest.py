@@ -1,4 +1,4 @@
-"""Fixtures for all tests, and the removal of stale compiled code."""
+"""Fixtures for all tests."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import os
 from pathlib import Path
 
 import pytest
-
-from stale_caches import remove_stale_caches
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -18,10 +16,6 @@ collect_ignore_glob = ["conftest.py", "*/conftest.py"]
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("JAX_ENABLE_X64", "1")
-
-
-def pytest_configure() -> None:
-    remove_stale_caches()
 
 
 @pytest.fixture(scope="session")

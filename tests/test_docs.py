@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from foldyn.cases import read_case
+from foldyn.cases import Table, read_case
 from foldyn.cases.schema import CaseSchema
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -34,6 +34,17 @@ def test_the_case_file_page_shows_a_case_file(tmp_path):
     (tmp_path / "case.toml").write_text(block, "utf-8")
     case_file = read_case(tmp_path / "case.toml")
     assert case_file.masses == ["circumcenter", "consistent"]
+
+
+def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
+    (text,), (toml,) = blocks("histories.md", "text"), blocks("histories.md", "toml")
+    (tmp_path / "pulse.csv").write_text(text, "utf-8")
+    (page,) = blocks("case-file.md", "toml")
+    old = 'history = { kind = "pulse", duration = 1.0 }\n'
+    assert old in page
+    (tmp_path / "case.toml").write_text(page.replace(old, toml), "utf-8")
+    history = read_case(tmp_path / "case.toml").case().loads[0].history
+    assert history == Table([0.0, 0.0025, 0.005], [0.0, 0.0125, 0.0])
 
 
 def sections() -> list[tuple[str, str]]:

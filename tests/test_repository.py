@@ -13,7 +13,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.cases import schema
-from stale_caches import remove_stale_caches
+from foldyn.kernel_cache import remove_stale_caches
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))

@@ -32,6 +32,7 @@ _HOME = {
     "Case": "cases",
     "Fix": "cases",
     "Force": "cases",
+    "Gravity": "cases",
     "Rayleigh": "cases",
     "State": "cases",
     "Constant": "cases",
@@ -40,6 +41,7 @@ _HOME = {
     "Ramp": "cases",
     "Step": "cases",
     "Harmonic": "cases",
+    "Chirp": "cases",
     "Table": "cases",
     "read_case": "cases",
     "save": "results",
@@ -57,9 +59,11 @@ _MODULES = (
 if TYPE_CHECKING:
     from foldyn.cases import (
         Case,
+        Chirp,
         Constant,
         Fix,
         Force,
+        Gravity,
         HalfSine,
         Harmonic,
         Pulse,

@@ -7,7 +7,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from foldyn.cases import Constant, Pulse, Rayleigh, Table, read_case
+from foldyn.cases import Chirp, Constant, Force, Gravity, Pulse, Rayleigh, Table, read_case
 from foldyn.errors import InputError
 from foldyn.formats import write_pattern
 from foldyn.materials import EnhancedLinear
@@ -116,6 +116,34 @@ def test_an_inline_table_as_history(read, short) -> None:
     history = 'history = { kind = "table", times = [0, 1], values = [0, 2.5] }'
     found = read(text.replace("force = [1, 0, 0]", f"force = [1, 0, 0]\n{history}"))
     assert found.case().loads[0].history == Table([0.0, 1.0], [0.0, 2.5])
+
+
+def test_gravity_alone_and_beside_a_force(read, short) -> None:
+    gravity = "gravity = [0, 0, -9.81]"
+    alone = read(short.replace("nodes = [7, 6]\nforce = [1, 0, 0]", gravity))
+    assert alone.case().loads == (Gravity((0, 0, -9.81)),)
+    np.testing.assert_array_equal(alone.output.nodes, [3, 4, 5, 6, 7, 8])  # what can move
+    sweep = 'history = { kind = "chirp", start = 1, end = 5, duration = 2 }'
+    both = read(f"{short}[[loads]]\n{gravity}\n{sweep}\n")
+    assert both.case().loads == (
+        Force([7, 6], (1, 0, 0)),
+        Gravity((0, 0, -9.81), Chirp(1.0, 5.0, 2.0)),
+    )
+    np.testing.assert_array_equal(both.output.nodes, [6, 7])  # those with a force
+
+
+def test_a_table_from_a_file_beside_the_case_file(
+    read, short, tmp_path, monkeypatch, tmp_path_factory
+) -> None:
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/pulse.csv").write_text("t [ms],F [mN],n\n0,0,0\n5,20,4\n")
+    text = short.replace("force = [1, 0, 0]", "force = [1, 0, 0]\nhistory = {{ {} }}")
+    file = 'kind = "table", file = "data/pulse.csv"'
+    forces = read(text.format(f'{file}, unit = "N"')).case()
+    assert forces.loads[0].history == Table([0.0, 0.005], [0.0, 0.02])
+    named = read(text.format(f'{file}, time = "t", value = "n"')).case()
+    assert named.loads[0].history == Table([0.0, 0.005], [0.0, 4.0])
 
 
 def test_patterns_inline_and_from_a_file(read, short, tmp_path) -> None:

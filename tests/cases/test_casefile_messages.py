@@ -83,6 +83,54 @@ BAD = {
         [("force = [0.01, 0, 0]", "force = [0.01, nan, 0]")],
         "loads[0].force[1] = nan: must be a finite number",
     ),
+    "gravity with nodes": (
+        [("force = [0.01, 0, 0]", "gravity = [0, 0, -9.81]")],
+        "loads[0].gravity: acts on the whole structure; leave out nodes and force",
+    ),
+    "no gravity": (
+        [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "gravity = [0, 0, 0]")],
+        "loads[0].gravity = [0, 0, 0]: must not be zero",
+    ),
+    "gravity item": (
+        [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "gravity = [0, 0, inf]")],
+        "loads[0].gravity[2] = inf: must be a finite number",
+    ),
+    "load without force": (
+        [("force = [0.01, 0, 0]\n", "")],
+        "loads[0].force: missing; give its value",
+    ),
+    "load without nodes": (
+        [("nodes = [6, 7, 8]\n", "")],
+        "loads[0].nodes: missing; give its value",
+    ),
+    "empty load": (
+        [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]\n", "")],
+        "loads[0]: give nodes and force, or gravity",
+    ),
+    "misspelled force": (
+        [("force = [0.01, 0, 0]", "forces = [0.01, 0, 0]")],
+        "loads[0].forces: unknown key; did you mean 'force'? known keys: nodes, force, gravity",
+    ),
+    "no CSV file": (
+        [('"pulse", duration = 1.0', '"table", file = "none.csv"')],
+        'loads[0].history.file = "none.csv": ',
+    ),
+    "CSV path": (
+        [('"pulse", duration = 1.0', '"table", file = 3')],
+        "loads[0].history.file = 3: must be the path of a CSV file",
+    ),
+    "CSV key": (
+        [('"pulse", duration = 1.0', '"table", file = "a.csv", times = [0, 1]')],
+        "loads[0].history.file: unknown key; known keys: times, values",
+    ),
+    "CSV column": (
+        [('"pulse", duration = 1.0', '"table", file = "a.csv", column = "F"')],
+        "loads[0].history.column: unknown key; known keys: file, time, value, unit",
+    ),
+    "empty table": (
+        [('"pulse", duration = 1.0', '"table"')],
+        "loads[0].history: give times and values, or file (CSV)",
+    ),
     "fixed only": (
         [("nodes = [6, 7, 8]", "nodes = [0, 1]")],
         "loads[0]: the force [0.01, 0.0, 0.0] acts only where supports hold",
@@ -290,6 +338,14 @@ def test_all_problems_are_told_at_once(read, example) -> None:
     first, second = str(caught.value).splitlines()
     assert first.endswith("case2.toml: sheet.thickness = -1: must be greater than 0")
     assert second == "  also damping.alpha = nan: must be a finite number"
+
+
+def test_a_bad_csv_file_is_named_with_its_line(read, example, tmp_path) -> None:
+    (tmp_path / "pulse.csv").write_text("t [s],f\n0,0\n1,one\n")
+    text = example.replace('"pulse", duration = 1.0', '"table", file = "pulse.csv"')
+    check(read, text, 'loads[0].history.file = "pulse.csv": ')
+    with pytest.raises(InputError, match=r'pulse\.csv: line 3, column "f": "one" is not a number'):
+        read(text)
 
 
 def test_a_misspelled_key_is_told_once(read, example) -> None:

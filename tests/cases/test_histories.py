@@ -9,6 +9,7 @@ import pytest
 
 from foldyn.cases import (
     HISTORIES,
+    Chirp,
     Constant,
     Function,
     HalfSine,
@@ -28,6 +29,7 @@ EXAMPLES = [
     Ramp(duration=2.0),
     Step(time=0.25),
     Harmonic(frequency=2.0, phase=30.0),
+    Chirp(start=0.5, end=3.0, duration=2.0, phase=30.0),
     Table(times=[0.0, 1.0, 3.0], values=[0.0, 2.0, -2.0]),
     Function(lambda t: t**2),
 ]
@@ -76,6 +78,11 @@ def test_values(history, time, factor) -> None:
         (lambda: Pulse(10**400), "must be a finite number"),
         (lambda: Step(math.inf), "time = inf: must be a finite number"),
         (lambda: Harmonic(0.0), "frequency = 0.0: must be greater than 0"),
+        (lambda: Chirp(-1, 2, 3), "start = -1: must be at least 0"),
+        (lambda: Chirp(1, -2, 3), "end = -2: must be at least 0"),
+        (lambda: Chirp(0, 0, 3), "start or end must be greater than 0"),
+        (lambda: Chirp(1, 2, 0), "duration = 0: must be greater than 0"),
+        (lambda: Chirp(1, 2, 3, math.inf), "phase = inf: must be a finite number"),
         (lambda: Table([0, 1], [0, math.nan]), r"values\[1\] = nan: must be a finite number"),
         (lambda: Table([0, 1], [0, True]), "values = .*: must be numbers"),
         (lambda: Table([0, 1], ["a", "b"]), "values = .*: must be numbers"),
@@ -90,6 +97,38 @@ def test_values(history, time, factor) -> None:
 def test_wrong_arguments(make, text) -> None:
     with pytest.raises(InputError, match=text):
         make()
+
+
+@pytest.mark.parametrize(
+    ("history", "time", "factor"),
+    [
+        # 2 t + t^2/2 turns: 1/2 at t = sqrt(5) - 2, 5/2 at t = 1
+        (Chirp(2.0, 4.0, 2.0), [-0.1, 0.0, 5**0.5 - 2, 1.0, 2.0, 3.0], [0, 0, 0, 0, 0, 0]),
+        (Chirp(2.0, 4.0, 2.0, phase=90.0), [-0.1, 0.0, 5**0.5 - 2, 1.0, 2.0], [0, 1, -1, -1, 0]),
+        # t - t^2/4 turns: 7/16, 3/4 and 15/16
+        (
+            Chirp(1.0, 0.0, 2.0),
+            [0.5, 1.0, 1.5],
+            [math.sin(math.pi / 8), -1, -math.sin(math.pi / 8)],
+        ),
+        (Chirp(2.0, 2.0, 1.0), [0.125, 0.375, 1.5], [1, -1, 0]),
+    ],
+)
+def test_chirps_by_hand(history, time, factor) -> None:
+    np.testing.assert_allclose(history(time), factor, rtol=0, atol=1e-14)
+
+
+def test_a_chirp_sweeps_from_start_to_end() -> None:
+    sweep = Chirp(start=1.0, end=9.0, duration=10.0)
+    time = np.linspace(0.0, 10.0, 200_001)[:-1]
+    factor = sweep(time)
+    # the mean of the frequency times the duration is the number of turns: two zeros in each
+    zeros = time[1:][np.diff(np.signbit(factor))]
+    assert len(zeros) == pytest.approx(2 * 5.0 * 10.0, abs=1)
+    for middle in (1.0, 5.0, 9.5):  # zeros two apart are one period apart
+        i = np.searchsorted(zeros, middle)
+        rate = 1.0 / (zeros[i + 1] - zeros[i - 1])
+        assert rate == pytest.approx(1.0 + 0.8 * zeros[i], rel=0.03)
 
 
 def test_equal_histories_compare_equal() -> None:
@@ -139,3 +178,21 @@ def test_a_function_must_give_finite_numbers() -> None:
         as_history(lambda t: np.where(t > 0.5, np.nan, 1.0))(np.array([0.0, 1.0]))
     with pytest.raises(InputError, match=r'gives "no" at t = 0.0 s: must be a number'):
         as_history(lambda t: "no")(0.0)
+
+
+def test_a_function_that_decides_once_for_all_times_is_called_for_each():
+    """`if np.any(t > ...)` answers an array with one branch: the entries tell otherwise."""
+
+    def steps(t):
+        return np.ones_like(t) if np.any(t > 0.5) else np.zeros_like(t)
+
+    times = np.linspace(0.0, 1.0, 11)
+    np.testing.assert_array_equal(as_history(steps)(times), np.where(times > 0.5, 1.0, 0.0))
+
+
+def test_a_function_that_fails_is_named_with_the_time():
+    def broken(t):
+        return 1.0 / (float(t) - 0.5)
+
+    with pytest.raises(InputError, match=r"history broken fails at t = 0.5 s: ZeroDivisionError"):
+        as_history(broken)(np.array([0.0, 0.5]))

@@ -21,7 +21,7 @@ def test_info(workplace) -> None:
     assert any(line.startswith(f"python {platform.python_version()}") for line in lines)
     for name in ("numpy", "numba", "xarray"):
         assert f"{name} {metadata.version(name)}" in lines
-    assert any(line.startswith("threads: ") for line in lines)
+    assert any(line.startswith("processors: ") for line in lines)
     assert any(line.startswith("kernels of rk4: ") for line in lines)
     assert any(line.startswith("optional parts: ") for line in lines)
     for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES):

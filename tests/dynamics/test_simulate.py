@@ -313,3 +313,55 @@ def test_an_interrupt_keeps_the_motion_until_then():
 def test_stiffness_damping_that_shrinks_the_step_is_told():
     with pytest.warns(FoldynWarning, match="times smaller"):
         fd.simulate(case2(beta=1e-2), 1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:the energy balance")
+def test_a_result_can_be_run_again_from_itself():
+    """The recipe of docs/results.md, with an initial state and a history of the user's own."""
+    case = case2(lambda t: np.cos(3.0 * t))
+    v = np.zeros(case.structure.nodes.shape)
+    v[7, 0] = 0.01
+    first = fd.simulate(case, 0.1, every=5, initial=fd.State(velocity=v))
+    assert first.attrs["started_from"] == "state"
+    again = fd.simulate(
+        fd.case_of(first),
+        float(first.duration),
+        method=first.method,
+        dt=float(first.dt),
+        every=int(first.every),
+        initial=fd.initial_state(first, at=0),
+    )
+    np.testing.assert_allclose(again.displacement, first.displacement, rtol=0, atol=1e-16)
+
+
+@pytest.mark.parametrize("initial", [{"velocity": 0}, np.zeros((13, 3)), "rest"])
+def test_an_initial_state_of_another_kind_is_refused(initial):
+    with pytest.raises(InputError, match="give a State"):
+        fd.simulate(case2(), 0.1, initial=initial)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"force": "no"}, "force"),
+        ({"progress": "yes"}, "progress"),
+        ({"method": ["rk4"]}, "method"),
+    ],
+)
+def test_arguments_of_other_kinds_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        fd.simulate(case2(), 0.1, **arguments)
+
+
+def test_the_mass_cannot_be_changed_behind_the_structure():
+    with pytest.raises(ValueError, match="read-only"):
+        miura().mass.data[:] *= 2.0
+
+
+def test_a_shifted_pattern_moves_the_same():
+    """Far from the origin no digits are lost: hinges see positions from their mean."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    far = fd.Pattern(pattern.vertices + np.array([1e3, -2e3, 5e2]), pattern.faces)
+    u = 0.01 * np.random.default_rng(0).standard_normal((13, 3))
+    near, shifted = (fd.discretize(p, SHEET).internal_force(u) for p in (pattern, far))
+    np.testing.assert_allclose(shifted, near, rtol=0, atol=1e-9 * np.abs(near).max())

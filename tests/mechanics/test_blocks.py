@@ -109,7 +109,7 @@ def test_workspace_holds_the_dihedrals_and_may_be_reused():
     u = state(s, 1)
     first = force_of(model, u, work)
     np.testing.assert_array_equal(
-        work.angle, mechanics.angles(s.nodes + u, np.asarray(model.hinges))
+        work.angle, mechanics.angles(model.rest + u, np.asarray(model.hinges))
     )
     force_of(model, state(s, 2), work)
     np.testing.assert_array_equal(force_of(model, u, work), first)

@@ -37,6 +37,26 @@ def test_one_curve_per_history(structure):
     assert labels[1] == "5 N along (0.6, 0, 0.8) on node 7: harmonic (frequency 2, phase 0)"
 
 
+def test_gravity_has_axes_of_its_own(structure):
+    loads = [
+        cases.Force([7], (0.01, 0.0, 0.0), cases.Chirp(1.0, 5.0, 2.0)),
+        cases.Gravity((0.0, 0.0, -9.81), cases.Ramp(1.0)),
+    ]
+    figure = plot_load_history(cases.Case(structure, loads=loads), 2.0)
+    force, gravity = figure.axes
+    assert [a.get_ylabel() for a in figure.axes] == ["force at a node (N)", "gravity (m/s2)"]
+    assert [a.get_xlabel() for a in figure.axes] == ["", "time (s)"]
+    assert force.get_lines()[0].get_ydata().max() == pytest.approx(0.01, rel=1e-4)
+    line = gravity.get_lines()[0]
+    np.testing.assert_allclose(line.get_ydata(), 9.81 * np.minimum(line.get_xdata(), 1.0))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "0.01 N along +x on node 7: chirp (start 1, end 5, duration 2, phase 0)",
+        "gravity 9.81 m/s2 along -z: ramp (duration 1)",
+    ]
+    alone = plot_load_history(cases.Case(structure, loads=loads[1:]), 2.0)
+    assert [a.get_ylabel() for a in alone.axes] == ["gravity (m/s2)"]
+
+
 def test_a_users_function_is_named(structure):
     def gust(t):
         return np.tanh(t)

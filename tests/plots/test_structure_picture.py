@@ -108,6 +108,27 @@ def test_load_arrow_points_along_the_force(structure):
     np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), force / 5.0, atol=1e-12)
 
 
+def test_gravity_is_one_arrow_at_the_center_of_mass(structure):
+    gravity = cases.Gravity((0.0, 0.0, -9.81))
+    figure = draw_structure(cases.Case(structure, loads=[gravity, cases.Force([7], (1, 0, 0))]))
+    assert _keys(figure)[-2:] == ["1 N along +x on node 7", "gravity 9.81 m/s2 along -z"]
+    shafts = [
+        np.array(c._segments3d)
+        for c in figure.axes[0].collections
+        if hasattr(c, "_segments3d") and c.get_zorder() == 7.0
+    ]
+    assert [len(group) for group in shafts] == [1, 1]
+    (start, end) = shafts[1][0]
+    mass = structure.mass.diagonal()
+    np.testing.assert_allclose(start, mass @ structure.nodes / mass.sum())
+    np.testing.assert_allclose(start[:2], end[:2], atol=1e-12)
+    assert end[2] < start[2]
+    hidden = draw_structure(cases.Case(structure, loads=[gravity]), loads=False)
+    assert not any("gravity" in key for key in _keys(hidden))
+    slanted = draw_structure(cases.Case(structure, loads=[cases.Gravity((3.0, 0.0, -4.0))]))
+    assert _keys(slanted)[-1] == "gravity 5 m/s2 along (0.6, 0, -0.8)"
+
+
 def test_deformed_sheet_over_the_undeformed(structure):
     u = np.zeros_like(structure.nodes)
     u[6:9, 0] = 0.1

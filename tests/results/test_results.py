@@ -11,8 +11,10 @@ import xarray as xr
 
 from foldyn.cases import (
     Case,
+    Chirp,
     Fix,
     Force,
+    Gravity,
     HalfSine,
     Harmonic,
     Pulse,
@@ -204,6 +206,33 @@ def test_loads_that_share_a_function_share_a_table() -> None:
         "tables_0_values",
     ]
     assert len(case_of(ds).load_terms) == 1
+
+
+def test_gravity_and_chirp_survive_a_file(tmp_path) -> None:
+    case = make_case(Chirp(1 / 3, 20.1, 0.7, 10))
+    more = [Gravity((0.1, 0, -9.81), Chirp(1 / 3, 20.1, 0.7, 10)), Gravity((0, 1 / 3, 0))]
+    case = dataclasses.replace(case, loads=[*case.loads, *more])
+    save(dataset(case), tmp_path / "run.nc")
+    assert_same_case(case_of(load(tmp_path / "run.nc")), case)
+
+
+def test_tables_from_csv_are_stored_as_numbers(tmp_path) -> None:
+    path = tmp_path / "pulse.csv"
+    path.write_text("t [ms],f\n0,0\n5,0.1\n")
+    case = make_case(Table.from_csv(path))
+    save(dataset(case), tmp_path / "run.nc")
+    path.unlink()
+    found = load(tmp_path / "run.nc")
+    assert "pulse" not in str(found["case"].values[()])
+    assert case_of(found).loads[0].history == Table([0.0, 0.005], [0.0, 0.1])
+
+
+def test_gravity_may_follow_a_function(tmp_path) -> None:
+    gravity = Gravity((0, 0, -9.81), lambda t: math.exp(-t))
+    case = dataclasses.replace(make_case(), loads=[gravity])
+    save(dataset(case), tmp_path / "run.nc")
+    table = case_of(load(tmp_path / "run.nc")).loads[0].history
+    assert table(0.05) == pytest.approx(math.exp(-0.05), rel=1e-15)
 
 
 def test_a_function_without_time_steps_cannot_be_rerun() -> None:

@@ -184,7 +184,7 @@ def test_crease_stiffness_per_length():
     each = [0.1, 0.2, 0.3, 0.0]
     s = fd.discretize(pattern, SHEET, crease_stiffness=each)
     np.testing.assert_allclose(s.fold_stiffness, each * length, rtol=1e-14)
-    assert s.options.crease_stiffness == each
+    assert s.options.crease_stiffness == tuple(each)
     plain = fd.discretize(pattern, SHEET)
     np.testing.assert_array_equal(s.bend_stiffness, plain.bend_stiffness)
     np.testing.assert_array_equal(s.bar_area, plain.bar_area)

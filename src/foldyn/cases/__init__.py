@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
+from foldyn.cases.function import Function, as_history
 from foldyn.cases.histories import (
     HISTORIES,
+    Chirp,
     Constant,
-    Function,
     HalfSine,
     Harmonic,
     History,
@@ -17,9 +18,8 @@ from foldyn.cases.histories import (
     Ramp,
     Step,
     Table,
-    as_history,
 )
-from foldyn.cases.loads import Force
+from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
 from foldyn.cases.supports import Fix
@@ -31,10 +31,12 @@ __all__ = [
     "HISTORIES",
     "Case",
     "CaseFile",
+    "Chirp",
     "Constant",
     "Fix",
     "Force",
     "Function",
+    "Gravity",
     "HalfSine",
     "Harmonic",
     "History",

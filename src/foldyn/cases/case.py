@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.damping import Rayleigh
-from foldyn.cases.histories import History, as_history
-from foldyn.cases.loads import Force
+from foldyn.cases.function import as_history
+from foldyn.cases.histories import History
+from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import Fix
 from foldyn.cases.values import show
@@ -32,8 +33,8 @@ class Case:
         The discretized pattern.
     supports : sequence of Fix
         Nodes held at rest; none by default (free motion is legal in dynamics).
-    loads : sequence of Force
-        Forces; none by default.
+    loads : sequence of Force and Gravity
+        Forces and gravity; none by default.
     damping : Rayleigh
         Damping; none by default.
 
@@ -46,34 +47,42 @@ class Case:
     load_terms : tuple of (ndarray of shape (n, 3), History)
         Forces (N) on all nodes with their history; loads with equal histories are one term.
         Forces on held nodes are kept: the reactions carry them.
+    force_terms : tuple of (ndarray of shape (n, 3), History)
+        The same of the forces on nodes alone, without gravity.
+    gravity_terms : tuple of (ndarray of shape (3,), History)
+        Accelerations of gravity (m/s2) with their history.
 
     Raises
     ------
     InputError
-        A node is out of range, or a load acts on held axes only.
+        A node is out of range, a force acts on held axes only, or gravity meets a structure
+        whose mass is not known.
 
     Warns
     -----
     FoldynWarning
-        A load acts on held axes in part.
+        A force acts on held axes in part.
     """
 
     structure: Any
     supports: Sequence[Fix] = ()
-    loads: Sequence[Force] = ()
+    loads: Sequence[Force | Gravity] = ()
     damping: Rayleigh = field(default_factory=Rayleigh)
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        for name, kind in (("supports", Fix), ("loads", Force)):
-            object.__setattr__(self, name, _tuple_of(name, kind, getattr(self, name)))
+        for name, kinds in (("supports", (Fix,)), ("loads", (Force, Gravity))):
+            object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
         if not isinstance(self.damping, Rayleigh):
             raise InputError(
                 f"damping = {show(self.damping)}: must be Rayleigh(alpha=..., beta=...)"
             )
         _ = self.fixed  # checks the supports' nodes
         for i, load in enumerate(self.loads):
-            self._check_load(f"loads[{i}]", load)
+            if isinstance(load, Gravity):
+                self._check_gravity(f"loads[{i}]")
+            else:
+                self._check_force(f"loads[{i}]", load)
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
@@ -101,27 +110,53 @@ class Case:
         """Forces (N) on all nodes, shape (n, 3), each with its history."""
         terms: list[tuple[NDArray[np.float64], History]] = []
         for i, load in enumerate(self.loads):
-            nodes = resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")
-            history = as_history(load.history)
-            forces = next((forces for forces, other in terms if other == history), None)
-            if forces is None:
-                forces = np.zeros((len(self.structure.nodes), 3))
-                terms.append((forces, history))
-            forces[nodes] += load.vector
-        for forces, _ in terms:
-            forces.flags.writeable = False
-        return tuple(terms)
+            _add(terms, as_history(load.history), self._forces_of(i, load))
+        return _frozen(terms)
+
+    @cached_property
+    def force_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+        """The terms of `load_terms` without gravity."""
+        terms: list[tuple[NDArray[np.float64], History]] = []
+        for i, load in enumerate(self.loads):
+            if isinstance(load, Force):
+                _add(terms, as_history(load.history), self._forces_of(i, load))
+        return _frozen(terms)
+
+    @cached_property
+    def gravity_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+        """Accelerations of gravity (m/s2), shape (3,), each with its history."""
+        terms: list[tuple[NDArray[np.float64], History]] = []
+        for load in self.loads:
+            if isinstance(load, Gravity):
+                _add(terms, as_history(load.history), np.array(load.acceleration))
+        return _frozen(terms)
 
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:
-        """Nodes on which a load acts, increasing."""
+        """Nodes on which a force acts, increasing; gravity, which acts on all, does not count."""
         chosen = [
             resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")
             for i, load in enumerate(self.loads)
+            if isinstance(load, Force)
         ]
         return np.unique(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=np.int64)
 
-    def _check_load(self, place: str, load: Force) -> None:
+    def _forces_of(self, i: int, load: Force | Gravity) -> NDArray[np.float64]:
+        """Forces (n, 3), N, of one load at factor 1."""
+        if isinstance(load, Gravity):
+            mass = np.asarray(self.structure.mass.sum(axis=1)).ravel()
+            return mass[:, None] * np.array(load.acceleration)
+        forces = np.zeros((len(self.structure.nodes), 3))
+        forces[resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")] = load.vector
+        return forces
+
+    def _check_gravity(self, place: str) -> None:
+        try:
+            _ = self.structure.mass
+        except InputError as error:
+            raise InputError(f"{place}: gravity needs the mass of the structure: {error}") from None
+
+    def _check_force(self, place: str, load: Force) -> None:
         nodes = resolve_nodes(self.structure, load.nodes, f"{place}.nodes")
         acts = np.flatnonzero(load.vector)
         held = self.fixed[np.ix_(nodes, acts)]
@@ -146,10 +181,30 @@ class Case:
         )
 
 
-def _tuple_of(name: str, kind: type, given: Any) -> tuple:
+def _add(
+    terms: list[tuple[NDArray[np.float64], History]], history: History, vector: NDArray[np.float64]
+) -> None:
+    """Add a vector to the term with an equal history, or as a new term."""
+    for known, other in terms:
+        if other == history:
+            known += vector
+            return
+    terms.append((vector, history))
+
+
+def _frozen(
+    terms: list[tuple[NDArray[np.float64], History]],
+) -> tuple[tuple[NDArray[np.float64], History], ...]:
+    for vector, _ in terms:
+        vector.flags.writeable = False
+    return tuple(terms)
+
+
+def _tuple_of(name: str, kinds: tuple[type, ...], given: Any) -> tuple:
+    listed = " or ".join(kind.__name__ for kind in kinds)
     if isinstance(given, str) or not isinstance(given, Sequence):
-        raise InputError(f"{name} = {show(given)}: must be a list of {kind.__name__}")
+        raise InputError(f"{name} = {show(given)}: must be a list of {listed}")
     for i, item in enumerate(given):
-        if not isinstance(item, kind):
-            raise InputError(f"{name}[{i}] = {show(item)}: must be a {kind.__name__}")
+        if not isinstance(item, kinds):
+            raise InputError(f"{name}[{i}] = {show(item)}: must be a {listed}")
     return tuple(given)

@@ -18,9 +18,9 @@ from pydantic import ValidationError
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import call_from
-from foldyn.cases.loads import Force
+from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
-from foldyn.cases.schema import CaseSchema
+from foldyn.cases.schema import CaseSchema, LoadSection
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import Fix
 from foldyn.cases.values import choice
@@ -128,7 +128,7 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     path = Path(path)
     document = _read_toml(path)
     try:
-        schema = CaseSchema.model_validate(document)
+        schema = CaseSchema.model_validate(document, context={"folder": path.parent})
     except ValidationError as error:
         raise InputError(f"{path}: {describe(error, CaseSchema)}") from None
     with _placed(path, "pattern"):
@@ -148,7 +148,7 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     for i, item in enumerate(schema.supports):
         with _placed(path, f"supports[{i}]."):
             parts["supports"].append(Fix(item.nodes, item.axes))
-    parts["loads"] = [Force(item.nodes, item.force, item.history) for item in schema.loads]
+    parts["loads"] = [_load(item) for item in schema.loads]
 
     cases = {masses[0]: _build(path, pattern, sheet, masses[0], parts)}
     with warnings.catch_warnings():  # the other rules would only repeat them
@@ -203,6 +203,12 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         raise InputError(f"{place}{error}") from None
 
 
+def _load(item: LoadSection) -> Force | Gravity:
+    if item.gravity is not None:
+        return Gravity(item.gravity, item.history)
+    return Force(item.nodes, item.force, item.history)
+
+
 def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
     with _placed(path, "model: "):
         structure = discretize(pattern, sheet, mass=mass, **parts["options"])
@@ -212,10 +218,10 @@ def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping
 
 
 def _output_nodes(case: Case, chosen: Any) -> NDArray[np.int64]:
-    """Nodes to show: those chosen, else those loaded, else every vertex that can move."""
+    """Nodes to show: those chosen, else those with a force, else every vertex that can move."""
     if chosen is not None:
         return resolve_nodes(case.structure, chosen, "output.nodes")
-    if case.loads:
+    if case.loaded_nodes.size:
         return case.loaded_nodes
     vertices = len(case.structure.pattern.vertices)
     return np.flatnonzero(~case.fixed[:vertices].all(axis=1))

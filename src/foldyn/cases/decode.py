@@ -8,16 +8,26 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
-from foldyn.cases.histories import HISTORIES, History
+from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.cases.values import choice, number, show, suggest
 from foldyn.errors import InputError
 
 
-def history_from(table: Any) -> History:
-    """History from its table, such as ``{kind = "pulse", duration = 1.0}``."""
+def history_from(table: Any, folder: Path | None = None) -> History:
+    """History from its table, such as ``{kind = "pulse", duration = 1.0}``.
+
+    Parameters
+    ----------
+    table : mapping
+    folder : Path, optional
+        Where the relative path of a table's CSV file starts; without it no file is read.
+    """
     kind, arguments = _kind_of(table, HISTORIES)
+    if kind == Table.kind and folder is not None and not arguments.keys() & {"times", "values"}:
+        return _table_from_file(arguments, folder)
     return call_from(HISTORIES[kind], arguments, checks_itself=True)
 
 
@@ -96,6 +106,20 @@ def _kind_of(table: Any, kinds: Mapping[str, Any]) -> tuple[str, dict[str, Any]]
         raise InputError(f".kind: missing; choose one of {listed}")
     kind = choice(".kind", table["kind"], kinds)
     return kind, {name: value for name, value in table.items() if name != "kind"}
+
+
+def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
+    check_keys(arguments, ["file", "time", "value", "unit", "times", "values"])
+    if "file" not in arguments:
+        raise InputError(": give times and values, or file (CSV)")
+    file = arguments["file"]
+    if not isinstance(file, str) or not file:
+        raise InputError(f".file = {show(file)}: must be the path of a CSV file")
+    columns = {name: value for name, value in arguments.items() if name != "file"}
+    try:
+        return Table.from_csv(folder / file, **columns)
+    except InputError as error:
+        raise InputError(f".file = {show(file)}: {error}") from None
 
 
 def _checked(place: str, value: Any, hint: Any) -> Any:

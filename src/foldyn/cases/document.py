@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import history_from, law_from
-from foldyn.cases.histories import HISTORIES, Constant, History, Table, as_history
-from foldyn.cases.loads import Force
+from foldyn.cases.function import as_history
+from foldyn.cases.histories import HISTORIES, Constant, History, Table
+from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.supports import Fix
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
@@ -170,8 +171,12 @@ class _Writer:
         }
         return {"kind": kind, **{key: _plain(value) for key, value in arguments.items()}}
 
-    def _load(self, load: Force) -> dict[str, Any]:
-        section: dict[str, Any] = {"nodes": _nodes(load.nodes), "force": list(load.vector)}
+    def _load(self, load: Force | Gravity) -> dict[str, Any]:
+        section: dict[str, Any]
+        if isinstance(load, Gravity):
+            section = {"gravity": list(load.acceleration)}
+        else:
+            section = {"nodes": _nodes(load.nodes), "force": list(load.vector)}
         history = as_history(load.history)
         if history != Constant():
             section["history"] = self._history(history)
@@ -208,18 +213,18 @@ class _Writer:
 
 def _read(sections: Mapping[str, Any]) -> Case:
     supports = [Fix(item["nodes"], item["axes"]) for item in sections["supports"]]
-    loads = [
-        Force(
-            item["nodes"],
-            item["force"],
-            history_from(item["history"]) if "history" in item else None,
-        )
-        for item in sections["loads"]
-    ]
+    loads = [_load(item) for item in sections["loads"]]
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were given when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
+
+
+def _load(item: Mapping[str, Any]) -> Force | Gravity:
+    history = history_from(item["history"]) if "history" in item else None
+    if "gravity" in item:
+        return Gravity(item["gravity"], history)
+    return Force(item["nodes"], item["force"], history)
 
 
 def _structure(sections: Mapping[str, Any]) -> Structure:

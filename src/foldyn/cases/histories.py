@@ -7,14 +7,16 @@ same shape. To add one: a frozen dataclass with `kind` and `factor`, and its lin
 from __future__ import annotations
 
 import math
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.cases.csv_table import read_columns
 from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
 
@@ -170,6 +172,51 @@ class Harmonic(History):
         return np.sin(2.0 * np.pi * self.frequency * time + math.radians(self.phase))
 
 
+@dataclass(frozen=True)
+class Chirp(History):
+    """Factor sin(2 pi (start t + (end - start) t^2 / (2 duration)) + phase), 0 <= t < duration.
+
+    The frequency goes from `start` to `end` in a straight line; before and after, the factor is 0.
+
+    Parameters
+    ----------
+    start, end : float
+        Frequency (Hz) at t = 0 and at t = duration, at least 0, not both 0; `end` may be the lower.
+    duration : float
+        Length of the sweep (s), greater than 0.
+    phase : float
+        Phase at t = 0 (degrees).
+
+    Examples
+    --------
+    >>> sweep = Chirp(start=0.0, end=2.0, duration=1.0)
+    >>> sweep([0.0, 0.5, 1.0]).round(12)
+    array([0., 1., 0.])
+    """
+
+    start: float
+    end: float
+    duration: float
+    phase: float = 0.0
+    kind: ClassVar[str] = "chirp"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        for name in ("start", "end"):
+            _set(self, name, number(name, getattr(self, name), least=0.0))
+        if self.start == self.end == 0.0:
+            raise InputError(f"end = {self.end}: start or end must be greater than 0")
+        _set(self, "duration", number("duration", self.duration, above=0.0))
+        _set(self, "phase", number("phase", self.phase))
+
+    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `History.factor`."""
+        inside = (time >= 0.0) & (time < self.duration)
+        slope = (self.end - self.start) / self.duration
+        turns = (self.start + 0.5 * slope * time) * time
+        return np.where(inside, np.sin(2.0 * np.pi * turns + math.radians(self.phase)), 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Table(History):
     """Factors given at times, linear between them, the first and the last held outside.
@@ -205,6 +252,43 @@ class Table(History):
         _set(self, "times", times)
         _set(self, "values", values)
 
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | os.PathLike[str],
+        time: str | None = None,
+        value: str | None = None,
+        unit: str = "-",
+    ) -> Table:
+        """Table from two columns of a CSV file, whose units are checked and converted.
+
+        The file is a text in UTF-8: a line with the names of the columns and their units in
+        brackets, as in ``time [ms],force [mN]``, then lines of numbers. Cells are separated by
+        tabs, semicolons or commas, whichever of these the header has first in this order. Empty
+        lines and lines that begin with # are skipped.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        time, value : str, optional
+            Headings of the two columns, with or without the unit; the first and the second column
+            by default. The unit of the time is s, ms, us or min.
+        unit : str
+            What the values become. The default "-" is a factor without unit, from a column with
+            [-], [1], [%] or no unit. With "N", "mN" or "kN" the column must be a force in one of
+            these and is converted: the load's vector is then a direction, (1, 0, 0) for a force
+            along x. Likewise "m", "cm", "mm" and "m/s2", "mm/s2".
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, a column is missing or ambiguous, a unit is missing, unknown
+            or of another quantity, a cell is not a finite number, times do not increase, or there
+            are fewer than two lines of numbers. The message names the file and the line.
+        """
+        return cls(*read_columns(path, time, value, unit))
+
     def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `History.factor`."""
         return np.asarray(np.interp(time, self.times, self.values))
@@ -220,81 +304,10 @@ class Table(History):
         return hash((self.times.tobytes(), self.values.tobytes()))
 
 
-@dataclass(frozen=True)
-class Function(History):
-    """A history from the user's own function of time.
-
-    Parameters
-    ----------
-    function : callable
-        Takes a time (s) and gives a factor; one that takes an array of times and gives an array
-        of the same shape is called once for all times.
-
-    Notes
-    -----
-    A function cannot be written to a file: results store it sampled at the stage times of the run.
-    """
-
-    function: Callable[[Any], Any]
-    kind: ClassVar[str] = "function"
-
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        factors = self._at_once(time) if time.ndim else None
-        if factors is None:
-            flat = [self._at(t) for t in time.ravel().tolist()]
-            factors = np.array(flat, dtype=np.float64).reshape(time.shape)
-        bad = np.argwhere(~np.isfinite(factors))
-        if bad.size:
-            place = tuple(bad[0])
-            raise InputError(
-                f"history {self._name} gives {factors[place]} at t = {time[place]} s: must be a "
-                "finite number at every time of the run"
-            )
-        return factors
-
-    def _at_once(self, time: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        try:
-            factors = np.array(self.function(time.copy()), dtype=np.float64)
-        except Exception:  # a scalar function may fail on an array in any way of its own
-            return None
-        return factors if factors.shape == time.shape else None
-
-    def _at(self, time: float) -> float:
-        value = self.function(time)
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"history {self._name} gives {show(value)} at t = {time} s: must be a number"
-            ) from None
-
-    @property
-    def _name(self) -> str:
-        return getattr(self.function, "__name__", repr(self.function))
-
-
 HISTORIES: Mapping[str, type[History]] = {
-    history.kind: history for history in (Constant, Pulse, HalfSine, Ramp, Step, Harmonic, Table)
+    history.kind: history
+    for history in (Constant, Pulse, HalfSine, Ramp, Step, Harmonic, Chirp, Table)
 }
-
-
-def as_history(history: History | Callable[[Any], Any] | None) -> History:
-    """Turn None (a constant), a history or any callable into a history."""
-    if history is None:
-        return Constant()
-    if isinstance(history, History):
-        return history
-    if isinstance(history, type) and issubclass(history, History):
-        raise InputError(
-            f"history = {history.__name__}: give an object, as in {history.__name__}(...)"
-        )
-    if callable(history):
-        return Function(history)
-    raise InputError(
-        f"history = {show(history)}: must be a history such as Pulse(duration=1.0), or a function "
-        "of time"
-    )
 
 
 def _set(instance: Any, name: str, value: Any) -> None:

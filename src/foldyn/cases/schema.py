@@ -8,9 +8,17 @@ continues the key's path (" = -1: must be ...", ".kind: missing ...").
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    model_validator,
+)
 
 from foldyn.cases.decode import check_keys, history_from, law_from
 from foldyn.cases.histories import History
@@ -25,7 +33,7 @@ from foldyn.structures.options import CALIBRATIONS, SCHEMES
 ANALYSES = ("dynamics",)
 LATER_ANALYSES = ("statics", "modes", "frf")
 AXES = ("x", "y", "z")
-METHODS = ("rk4",)
+METHODS = ("rk4", "central_difference")
 """Integrators that a case file may name."""
 
 
@@ -107,6 +115,10 @@ def _every(value: Any) -> int | float:
     return number("", value, above=0.0)
 
 
+def _history(value: Any, info: ValidationInfo) -> History:
+    return history_from(value, (info.context or {}).get("folder"))
+
+
 def _analysis(value: Any) -> Any:
     if isinstance(value, Mapping) and "kind" in value:
         kind = value["kind"]
@@ -124,7 +136,7 @@ Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_creases)]
-HistorySpec = Annotated[History | None, PlainValidator(history_from)]
+HistorySpec = Annotated[History | None, PlainValidator(_history)]
 
 
 class SheetSection(Section):
@@ -167,11 +179,27 @@ class SupportSection(Section):
 
 
 class LoadSection(Section):
-    """One of [[loads]]."""
+    """One of [[loads]]: a force on nodes, or gravity."""
 
-    nodes: Nodes
-    force: Annotated[Any, PlainValidator(lambda value: vector("", value))]
+    nodes: Nodes = None
+    force: Annotated[Any, PlainValidator(lambda value: vector("", value))] = None
+    gravity: Annotated[Any, PlainValidator(lambda value: vector("", value, nonzero=True))] = None
     history: HistorySpec = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set - {"history"}
+        if "gravity" in given and len(given) > 1:
+            raise InputError(
+                ".gravity: acts on the whole structure; leave out nodes and force, and give a "
+                "force its own [[loads]]"
+            )
+        if not given:
+            raise InputError(": give nodes and force, or gravity")
+        for key in ("nodes", "force"):
+            if "gravity" not in given and key not in given:
+                raise InputError(f".{key}: missing; give its value")
+        return self
 
 
 class DynamicsSection(Section):

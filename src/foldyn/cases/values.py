@@ -101,11 +101,13 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
     return result
 
 
-def vector(name: str, value: Any) -> tuple[float, float, float]:
-    """Return `value` as three finite floats."""
+def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, float, float]:
+    """Return `value` as three finite floats, if asked not all of them zero."""
     array = numbers(name, value)
     if array.shape != (3,):
         raise InputError(f"{name} = {show(value)}: must be three numbers (x, y, z)")
+    if nonzero and not array.any():
+        raise InputError(f"{name} = {show(value)}: must not be zero")
     x, y, z = array.tolist()
     return x, y, z
 

@@ -14,8 +14,6 @@ REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplo
 
 def info() -> str:
     """Text of the command."""
-    import numba
-
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
     from foldyn.patterns import GENERATORS
@@ -25,7 +23,7 @@ def info() -> str:
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
         *(f"{name} {_version(name)}" for name in REQUIRED),
-        f"threads: {numba.get_num_threads()} of {os.cpu_count()} processors",
+        f"processors: {os.cpu_count()}; a motion runs on one thread",
     ]
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")

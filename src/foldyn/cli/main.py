@@ -67,6 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except ComputationError as error:
             print(f"foldyn: {error}", file=sys.stderr)
             return FAILED
+        except MemoryError:
+            print("foldyn: not enough memory: take fewer cells or samples", file=sys.stderr)
+            return BAD_INPUT
         except BrokenPipeError:  # the reader of our output has left, as `head` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return FAILED

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from foldyn.dynamics import Motion
 
+FIGURES = ("structure", "laws", "load", "motion", "energies")  # those of report.write_motion
 # where the case file has what the functions that it calls complain about
 KEYS = {"duration": "analysis", "method": "analysis", "dt": "analysis", "every": "output"}
 
@@ -42,6 +43,8 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     say(_headline(case_file))
     if not compiled(case_file.analysis.arguments["method"]):
         say("compiling the kernels: first use, up to half a minute; they are kept for later runs")
+    for name in ("report.html", "motion.gif", *(f"{figure}.png" for figure in FIGURES)):
+        (folder / name).unlink(missing_ok=True)  # of an earlier run: they would belie this one
     results: dict[str, xarray.Dataset] = {}
     kept: list[str] = []
     for rule, motion in motions.items():

@@ -20,6 +20,8 @@ def initial_state(result: Any, at: int = -1) -> State:
     at : int, default -1
         Number of the sample; negative ones count from the end.
     """
+    if not hasattr(result, "sizes") or "displacement" not in result:
+        raise InputError(f"initial_state: got {type(result).__name__}, give a result (a dataset)")
     for dimension in ("time", "step"):
         if dimension in result.sizes:
             count = result.sizes[dimension]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from numpy.typing import NDArray
 
-from foldyn.dynamics import rk4
+from foldyn.dynamics import central_difference, rk4
+from foldyn.dynamics.stability import Growth
 from foldyn.errors import InputError
 
 
@@ -16,25 +18,32 @@ class Method(NamedTuple):
     """An explicit integrator with a fixed step.
 
     `advance` is a compiled function with the arguments of `rk4.advance`, `stages` the abscissas
-    at which it wants the factors of the histories, `amplification` its R(z) and `order` what
-    tests hold it to.
+    at which it wants the factors of the histories, `growth(omega, damping, dt)` the largest
+    factor by which a step multiplies a free vibration, and `order` what tests hold it to.
     """
 
     name: str
     order: int
     stages: NDArray
-    amplification: Callable[[NDArray], NDArray]
+    growth: Growth
     advance: Callable[..., tuple[int, int, int]]
 
 
 METHODS: Mapping[str, Method] = {
-    "rk4": Method("rk4", rk4.ORDER, rk4.STAGES, rk4.amplification, rk4.advance),
+    "rk4": Method("rk4", rk4.ORDER, rk4.STAGES, rk4.growth, rk4.advance),
+    "central_difference": Method(
+        "central_difference",
+        central_difference.ORDER,
+        central_difference.STAGES,
+        central_difference.growth,
+        central_difference.advance,
+    ),
 }
 
 
 def method_of(name: str) -> Method:
     """Integrator by its name."""
-    if name not in METHODS:
+    if not isinstance(name, str) or name not in METHODS:
         raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
     return METHODS[name]
 
@@ -45,4 +54,4 @@ def compiled(name: str) -> bool:
     folder = Path(advance.stats.cache_path)  # type: ignore[attr-defined]
     function = advance.py_func  # type: ignore[attr-defined]
     stem = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-"
-    return any(folder.glob(f"{stem}*.nbi"))
+    return any(folder.glob(f"{stem}*py{sys.version_info.major}{sys.version_info.minor}*.nbi"))

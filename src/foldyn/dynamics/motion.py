@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import outcome
 from foldyn.dynamics.audit import AUDITED, energy_error, energy_scale
-from foldyn.dynamics.critical_step import MARGIN, critical_step
+from foldyn.dynamics.critical_step import MARGIN, critical_step, largest_frequency
 from foldyn.dynamics.methods import Method, method_of
 from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.stability import is_stable, stability_limit
 from foldyn.dynamics.system import pack, scratch
 from foldyn.dynamics.timing import Schedule, check_memory, positive, schedule
 from foldyn.errors import (
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
 DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
@@ -57,7 +59,7 @@ def simulate(
     case : Case
     duration : float
         Simulated time (s). The last step is the last that does not go beyond it.
-    method : {"rk4"}
+    method : {"rk4", "central_difference"}
         Integrator.
     dt : float, optional
         Time step (s). Without it, half the critical step, shortened to divide `every`.
@@ -117,6 +119,8 @@ def prepare(
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of(method)
     positive("duration", duration)
+    if not isinstance(force, bool):
+        raise InputError(f"force = {force!r}: give True or False")
     if not len(case.free_dofs):
         raise InputError(
             "supports: hold every node along x, y and z, so that nothing can move: free one"
@@ -132,11 +136,23 @@ def prepare(
             "one or leave dt out (force = true integrates all the same)"
         )
     check_memory(plan.samples, len(start[0]), len(case.supported_dofs))
+    if plan.steps > MANY_STEPS:
+        warnings.warn(
+            f"{plan.steps:.3g} steps of {plan.dt:.3g} s are a long way (critical step "
+            f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
+            FoldynWarning,
+            stacklevel=3,
+        )
     return Motion(case, integrator, plan, critical, force, start, packed)
 
 
 def _start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
     """Displacement and velocity at t = 0, checked."""
+    if initial is not None and not isinstance(initial, State):
+        raise InputError(
+            f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
+            "velocity=...) or fd.initial_state(result)"
+        )
     shape = case.structure.nodes.shape
     pair = []
     for name in ("displacement", "velocity"):
@@ -195,7 +211,7 @@ class Motion:
         model, system, mass = self._packed
         u, v = self._start[0].copy(), self._start[1].copy()
         plan, work, memory = self.plan, workspace(model), scratch(len(u))
-        tally = np.zeros(2)
+        tally, carry = np.zeros(4), np.zeros_like(u)
         angle = angles(model.rest + u, model.hinges)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         first, length = 0, 0  # the first call only records t = 0: it may have to compile
@@ -207,7 +223,7 @@ class Motion:
                 rows = slice(row, last // plan.every + 1)
                 clock = time.perf_counter()
                 code, step, hinge = self.method.advance(
-                    model, system, mass, u, v, tally, plan.dt, first, last, plan.every,
+                    model, system, mass, u, v, carry, tally, plan.dt, first, last, plan.every,
                     self._factors(first, last), angle, self.displacement[rows],
                     self.velocity[rows], self.reaction[rows], self.energy[rows], work, memory,
                 )  # fmt: skip
@@ -273,8 +289,10 @@ class Motion:
 
     def _recheck(self, step: int, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
-        limit = critical_step(self.case, self.method.name, u) / MARGIN
-        if self.plan.dt > limit:
+        damping = self.case.damping.alpha, self.case.damping.beta
+        omega = largest_frequency(self.case, u)
+        if not is_stable(self.method.growth, omega, *damping, self.plan.dt):
+            limit = stability_limit(self.method.growth, omega, *damping)
             raise InstabilityError(
                 f"the structure has stiffened: at t = {step * self.plan.dt:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
@@ -312,6 +330,7 @@ class Motion:
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "energy_error": self._relative_error(),
+            "started_from": "rest" if self._at_rest() else "state",
         }
         energies: dict[str, NDArray] = dict(zip(AUDITED, self.energy[:n].T, strict=True))
         times = np.arange(n) * plan.every * plan.dt
@@ -319,6 +338,9 @@ class Motion:
             self.case, times, self.displacement[:n], self.velocity[:n], self.reaction[:n],
             energies, statistics,
         )  # fmt: skip
+
+    def _at_rest(self) -> bool:
+        return not (self._start[0].any() or self._start[1].any())
 
     def _relative_error(self) -> float:
         energy = self.energy[: self.stored]

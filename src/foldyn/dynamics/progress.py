@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from foldyn.errors import InputError
+
 
 class Progress(NamedTuple):
     """State of a run: simulated time and duration (s), steps done, relative energy error."""
@@ -22,6 +24,8 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
     """Reporter and its closing function: none, a bar on stderr (True), or the user's own."""
     if callable(choice):
         return choice, lambda: None
+    if choice is not None and not isinstance(choice, bool):
+        raise InputError(f"progress = {choice!r}: give True, False or a function of a Progress")
     if not choice:
         return lambda _: None, lambda: None
     from tqdm import tqdm

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
-from foldyn.dynamics.system import acceleration, record
+from foldyn.dynamics.stability import roots
+from foldyn.dynamics.system import acceleration, passed_through, record
 from foldyn.materials.compiled import kernel
 
 ORDER = 4
@@ -13,14 +14,19 @@ ORDER = 4
 STAGES = np.array([0.0, 0.5, 1.0])
 
 
-def amplification(z):
-    """R(z), the factor by which a step multiplies the solution of y' = s y, z = s dt."""
-    return 1.0 + z * (1.0 + z * (1.0 / 2.0 + z * (1.0 / 6.0 + z / 24.0)))
+def growth(omega, damping, dt):
+    """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
+
+    |R(s dt)| over both roots of s^2 + damping s + omega^2 = 0, R the exponential series to the
+    fourth power.
+    """
+    z = roots(omega, damping) * dt
+    return np.abs(1.0 + z * (1.0 + z * (1.0 / 2.0 + z * (1.0 / 6.0 + z / 24.0)))).max(axis=0)
 
 
 @kernel
 def advance(
-    model, system, mass, u, v, tally, dt, first, last, every, factors, angle,
+    model, system, mass, u, v, carry, tally, dt, first, last, every, factors, angle,
     displacement, velocity, reaction, energy, work, s,
 ):  # fmt: skip
     """Advance u, v (n, 3) from step `first` to step `last`, in place.
@@ -29,7 +35,8 @@ def advance(
     every) of the output arrays. tally holds the work of the loads and the energy dissipated (J),
     integrated with the method's own weights. factors is (last - first + 1, 3 stages, histories);
     angle (nh,) the dihedrals at the last step seen, compared to find panels that passed through
-    each other. Returns (outcome, step, hinge).
+    each other. carry (n, 3) is for methods that keep an acceleration. Returns (outcome, step,
+    hinge).
     """
     n = u.shape[0]
     ut, vt = np.empty_like(u), np.empty_like(u)
@@ -38,10 +45,9 @@ def advance(
     for step in range(first, last + 1):
         f = factors[step - first]
         power_in, power_out = acceleration(model, system, mass, u, v, f[0], a, work, s)
-        for e in range(angle.size):
-            if abs(work.angle[e] - angle[e]) > np.pi:
-                return PENETRATION, step, e
-            angle[e] = work.angle[e]
+        hinge = passed_through(work.angle, angle)
+        if hinge >= 0:
+            return PENETRATION, step, hinge
         if step % every == 0:
             k = step // every - offset
             record(

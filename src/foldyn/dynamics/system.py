@@ -123,3 +123,13 @@ def record(model, system, mass, u, v, a, s, displacement, velocity, reaction, en
     strain_energies(model, u, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
+
+
+@kernel
+def passed_through(now, before):
+    """Hinge whose dihedral jumped by more than pi, or -1; `before` (nh,) becomes `now`."""
+    for e in range(now.size):
+        if abs(now[e] - before[e]) > np.pi:
+            return e
+        before[e] = now[e]
+    return -1

@@ -23,7 +23,7 @@ class BarsHinges(NamedTuple):
     A run is a row (start, end, law code, row of `addresses`).
     """
 
-    rest: NDArray  # (n, 3) rest position of the nodes, m
+    rest: NDArray  # (n, 3) rest position of the nodes from their mean, m
     bars: NDArray  # (nb, 2) uint32: signed indices would be tested for wraparound at every access
     bar_vector: NDArray  # (nb, 3) rest vector from the first node to the second, m
     bar_per_length2: NDArray  # (nb,) 1 / L^2
@@ -81,7 +81,7 @@ def build(
         return np.ascontiguousarray(joined.reshape(shape), kind)
 
     return BarsHinges(
-        rest=np.ascontiguousarray(rest, float),
+        rest=np.ascontiguousarray(rest - rest.mean(axis=0)),  # far from the origin digits are lost
         bars=bars,
         bar_vector=np.ascontiguousarray(vector),
         bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import marks, scene, style
-from foldyn.plots.loads import describe_load
+from foldyn.plots.loads import describe_gravity, describe_load
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 
@@ -50,7 +50,8 @@ def draw_structure(
     supports : bool
         Mark held nodes: one triangle per held direction, and the names of the directions.
     loads : bool
-        Draw an arrow from each loaded node along its force, at the largest load's full length.
+        Draw an arrow from each loaded node along its force, at the largest load's full length,
+        and one from the center of mass along gravity.
     elements : bool
         Draw the bars inside the panels too.
     scale : float
@@ -79,17 +80,24 @@ def draw_structure(
     # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
     triangles, held = np.zeros((0, 3, 3)), []
-    shafts, heads, forces = np.zeros((0, 2, 3)), np.zeros((0, 3, 3)), []
+    shafts, heads, forces, gravity = np.zeros((0, 2, 3)), np.zeros((0, 3, 3)), [], []
     if sheet.case is not None and supports:
         triangles, held = marks.support_triangles(
             points, np.asarray(sheet.case.fixed), min(0.055 * size, 0.25 * edge), sight
         )
     if sheet.case is not None and loads:
-        forces = [np.asarray(vectors, dtype=np.float64) for vectors, _ in sheet.case.load_terms]
+        forces = [np.asarray(vectors, dtype=np.float64) for vectors, _ in sheet.case.force_terms]
+        gravity = [vector for vector, _ in sheet.case.gravity_terms]
+    length = min(0.17 * size, 0.8 * edge)
     longest = max((np.linalg.norm(f, axis=1).max() for f in forces), default=0.0)
     for vectors in forces:
-        length = min(0.17 * size, 0.8 * edge)
         more = marks.load_arrows(points, vectors, longest, length, sight)
+        shafts, heads = np.vstack([shafts, more[0]]), np.vstack([heads, more[1]])
+    own = len(shafts)  # arrows of forces; those of gravity follow
+    if gravity:
+        middle = np.tile(_center_of_mass(sheet, points), (len(gravity), 1))
+        strongest = max(float(np.linalg.norm(g)) for g in gravity)
+        more = marks.load_arrows(middle, np.array(gravity), strongest, 1.5 * length, sight)
         shafts, heads = np.vstack([shafts, more[0]]), np.vstack([heads, more[1]])
 
     # The names of the held directions stand beyond the triangles' feet.
@@ -105,6 +113,7 @@ def draw_structure(
     if len(triangles):
         keys.append(Patch(facecolor=style.SUPPORT, label="support (directions held)"))
     keys += _load_keys(forces)
+    keys += [_arrow_key(style.GRAVITY, describe_gravity(g)) for g in gravity]
 
     rows = -(-len(keys) // _LEGEND_COLUMNS)
     figure, axes = scene.view_figure(np.vstack(everything), sight, title, rows)
@@ -113,9 +122,10 @@ def draw_structure(
     DrawnSheet(axes, sheet, points, sight, elements)
     if len(triangles):
         marks.add_triangles(axes, triangles, style.SUPPORT, 6.0)
-    if len(heads):
-        scene.add_segments(axes, shafts, style.LOAD, 1.8, zorder=7.0)
-        marks.add_triangles(axes, heads, style.LOAD, 7.5)
+    for part, color in ((slice(own), style.LOAD), (slice(own, None), style.GRAVITY)):
+        if len(heads[part]):
+            scene.add_segments(axes, shafts[part], color, 1.8, zorder=7.0)
+            marks.add_triangles(axes, heads[part], color, 7.5)
     _write_labels(axes, sheet, points, numbers, held, (triangles, shafts, heads), sight)
     style.legend_below(figure, keys, _LEGEND_COLUMNS)
     return style.finish(figure)
@@ -138,22 +148,21 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDAr
 
 def _load_keys(forces: list[NDArray[np.float64]]) -> list[Line2D]:
     """Return the legend entries of the loads, one per history."""
-    keys = [
-        Line2D(
-            [],
-            [],
-            color=style.LOAD,
-            marker=">",
-            markersize=6.0,
-            linewidth=1.8,
-            label=describe_load(f),
-        )
-        for f in forces[:_MOST_LOADS_LISTED]
-    ]
+    keys = [_arrow_key(style.LOAD, describe_load(f)) for f in forces[:_MOST_LOADS_LISTED]]
     hidden = len(forces) - _MOST_LOADS_LISTED
     if hidden > 0:
         keys.append(Line2D([], [], linestyle="none", label=f"and {hidden} more loads"))
     return keys
+
+
+def _arrow_key(color: str, text: str) -> Line2D:
+    return Line2D([], [], color=color, marker=">", markersize=6.0, linewidth=1.8, label=text)
+
+
+def _center_of_mass(sheet: Sheet3D, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
+    mass = np.asarray(sheet.structure.mass.sum(axis=0)).ravel()
+    return mass @ points / mass.sum()
 
 
 def _write_labels(

@@ -36,6 +36,7 @@ CREASE_NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned"}
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
 SUPPORT = GREEN
 LOAD = PURPLE
+GRAVITY = BLACK
 
 DPI = 150
 FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.fft
-import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
@@ -67,7 +66,9 @@ def spectrum(
         raise InputError(f"pad: {pad!r}; the padding factor is a whole number from 1 up")
 
     if detrend is not None:
-        samples = scipy.signal.detrend(samples, axis=0, type=detrend)
+        from scipy.signal import detrend as subtract  # slow to import, and seldom needed
+
+        samples = subtract(samples, axis=0, type=detrend)
     gain = float(n)
     if window is not None:
         weights = _window(window, n)
@@ -127,7 +128,9 @@ def _window(window: str | tuple | ArrayLike, n: int) -> NDArray[np.float64]:
     """Return the window's samples, by name or as given."""
     if isinstance(window, str | tuple):
         try:
-            weights = np.asarray(scipy.signal.get_window(window, n), dtype=np.float64)
+            from scipy.signal import get_window
+
+            weights = np.asarray(get_window(window, n), dtype=np.float64)
         except (ValueError, TypeError) as error:
             raise InputError(f"window: {window!r} is not known to scipy ({error})") from error
     else:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from foldyn.errors import InputError
 from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
 
@@ -27,6 +29,12 @@ class ModelOptions:
     crease_rest: float | Sequence[float] | None = None
 
     def __post_init__(self) -> None:
+        for field in ("crease_stiffness", "crease_rest"):
+            value = getattr(self, field)
+            if isinstance(value, bool):
+                raise InputError(f"{field} = {value}: give a number, or one for each crease")
+            if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
+                object.__setattr__(self, field, tuple(value))  # a copy that stays as it is
         for field, known in (("scheme", SCHEMES), ("calibration", CALIBRATIONS)):
             value = getattr(self, field)
             if value not in known:

@@ -57,6 +57,13 @@ class Sheet:
                     )
             elif value <= 0.0:
                 raise InputError(f"sheet: {field.name} = {value}: must be greater than 0")
+            object.__setattr__(self, field.name, value)  # in double precision
+        g = self.bending_modulus
+        if not (math.isfinite(g) and g > 1e-300):
+            raise InputError(
+                f"sheet: the bending stiffness E t^3 / 12(1 - nu^2) = {g} is out of range: check "
+                f"youngs_modulus = {self.youngs_modulus:g} Pa and thickness = {self.thickness:g} m"
+            )
 
     @property
     def bending_modulus(self) -> float:

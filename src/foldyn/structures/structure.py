@@ -130,8 +130,12 @@ class Structure:
             The sheet has no density, or the rule does not suit the structure.
         """
         if self.node_mass is not None:
-            return sparse.csr_array(sparse.diags_array(self.node_mass))
-        return MASS_RULES[self.options.mass](self.surface)
+            mass = sparse.csr_array(sparse.diags_array(self.node_mass))
+        else:
+            mass = MASS_RULES[self.options.mass](self.surface)
+        for array in (mass.data, mass.indices, mass.indptr):
+            array.setflags(write=False)
+        return mass
 
     @cached_property
     def surface(self) -> Surface:
@@ -197,4 +201,5 @@ class Structure:
 
 def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
     """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
-    return mechanics.angles(np.ascontiguousarray(x), np.ascontiguousarray(hinges, np.uint32))
+    centered = np.ascontiguousarray(x - x.mean(axis=0))  # as `mechanics.build` does
+    return mechanics.angles(centered, np.ascontiguousarray(hinges, np.uint32))

@@ -1,0 +1,237 @@
+"""Columns of a CSV file with their units: times and values of a table."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.values import show, suggest
+from foldyn.errors import InputError
+
+TIME_UNITS: Mapping[str, Fraction] = {
+    "s": Fraction(1),
+    "ms": Fraction(1, 10**3),
+    "us": Fraction(1, 10**6),
+    "min": Fraction(60),
+}
+"""Units of the time column, each with its size in seconds."""
+
+UNITS: Mapping[str, Mapping[str, Fraction]] = {
+    "number without unit": {"-": Fraction(1), "1": Fraction(1), "%": Fraction(1, 100)},
+    "force": {"N": Fraction(1), "mN": Fraction(1, 10**3), "kN": Fraction(10**3)},
+    "length": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 10**3)},
+    "acceleration": {"m/s2": Fraction(1), "mm/s2": Fraction(1, 10**3)},
+}
+"""Units of the value column by quantity, each with its size in the SI unit."""
+
+_NUMBER = "number without unit"
+_SPELLINGS = {"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"}
+_DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
+_HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One column: its place in a line, its heading as it stands, and the parts of that."""
+
+    place: int
+    heading: str
+    name: str
+    unit: str | None
+
+
+def read_columns(
+    path: str | os.PathLike[str], time: str | None, value: str | None, unit: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (s) and values (in `unit`) of a CSV file; see `Table.from_csv`."""
+    for name, given in (("time", time), ("value", value)):
+        if given is not None and not isinstance(given, str):
+            raise InputError(
+                f"{name} = {show(given)}: must be the heading of a column, or its name"
+            )
+    wanted = _SPELLINGS.get(unit, unit) if isinstance(unit, str) else ""
+    if _quantity(wanted) is None:
+        known = ", ".join(known for units in UNITS.values() for known in units)
+        raise InputError(f"unit = {show(unit)}: is not known; choose one of {known}")
+    try:
+        file = Path(path)
+    except TypeError:
+        raise InputError(f"path = {show(path)}: must be the path of a CSV file") from None
+    try:
+        return _columns(_text(file), time, value, wanted)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError("there is no such file") from None
+    except IsADirectoryError:
+        raise InputError("is a folder; give a CSV file") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise InputError("is not a text file in UTF-8; save it as CSV in UTF-8") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot be read: {reason}") from None
+
+
+def _columns(
+    text: str, time: str | None, value: str | None, wanted: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    lines = [
+        (number, line)
+        for number, line in enumerate(re.split(r"\r\n|\r|\n", text), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise InputError(f"holds no lines but empty ones and comments; {_HEADER}")
+    number, first = lines[0]
+    delimiter = next((mark for mark in _DELIMITERS if mark in first), ",")
+    columns = _headings(number, _cells(number, first, delimiter))
+    found = _find("time", time, columns, 0), _find("value", value, columns, 1)
+    if found[0] == found[1]:
+        raise InputError(f'time and value: are both the column "{found[0].heading}"; name two')
+    ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
+    rows = []
+    for number, line in lines[1:]:
+        cells = _cells(number, line, delimiter)
+        if len(cells) != len(columns):
+            raise InputError(
+                f"line {number}: has {len(cells)} cells, the header has {len(columns)} (cells "
+                f"end at every {_DELIMITERS[delimiter]})"
+            )
+        rows.append(
+            [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
+        )
+    if len(rows) < 2:
+        raise InputError(f"too few lines of numbers ({len(rows)}); a table needs at least two")
+    times, values = np.array(rows, dtype=np.float64).T
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if back.size:
+        i = int(back[0]) + 1
+        raise InputError(
+            f"line {lines[i + 1][0]}: the time {times[i]:.9g} s does not come after the time "
+            f"before it ({times[i - 1]:.9g} s); times must increase"
+        )
+    return times, values
+
+
+def _cells(number: int, line: str, delimiter: str) -> list[str]:
+    try:
+        (cells,) = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+    except csv.Error as error:
+        raise InputError(f"line {number}: cannot be read: {error}") from None
+    return [cell.strip() for cell in cells]
+
+
+def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
+    if all(_is_number(cell) for cell in cells):
+        raise InputError(f"line {number}: holds numbers, no names; {_HEADER} (without # before it)")
+    if len(cells) < 2:
+        raise InputError(
+            f'line {number}: "{cells[0]}" is one column, a table needs two; {_HEADER} (comma, '
+            "semicolon or tab between them)"
+        )
+    columns = []
+    for place, cell in enumerate(cells):
+        found = re.search(r"\[([^][]*)\]$", cell)
+        name = cell[: found.start()].strip() if found else cell
+        unit = found.group(1).strip() if found else ""
+        columns.append(_Column(place, cell, name, _SPELLINGS.get(unit, unit) or None))
+    return columns
+
+
+def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: int) -> _Column:
+    if wanted is None:
+        return columns[default]
+    found = [column for column in columns if wanted.strip() in (column.heading, column.name)]
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(f'"{column.heading}"' for column in columns)
+    if found:
+        raise InputError(f'{field} = "{wanted}": names {len(found)} of the columns {listed}')
+    hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
+    raise InputError(f'{field} = "{wanted}": is no column; {hint}there are {listed}')
+
+
+def _quantity(unit: str) -> str | None:
+    return next((quantity for quantity, units in UNITS.items() if unit in units), None)
+
+
+def _time_ratio(column: _Column) -> Fraction:
+    listed = ", ".join(TIME_UNITS)
+    if column.unit is None:
+        raise InputError(
+            f'column "{column.heading}": has no unit of time; write it in the header, as in '
+            f'"{column.name or "time"} [s]" (known: {listed})'
+        )
+    if column.unit not in TIME_UNITS:
+        raise InputError(
+            f'column "{column.heading}": [{column.unit}] is no unit of time; use one of {listed}'
+        )
+    return TIME_UNITS[column.unit]
+
+
+def _value_ratio(column: _Column, wanted: str) -> Fraction:
+    """Size of the column's unit in the unit that the caller wants."""
+    quantity = _quantity(wanted) or _NUMBER
+    listed = ", ".join(UNITS[quantity])
+    place = f'column "{column.heading}"'
+    if column.unit is None and quantity != _NUMBER:
+        raise InputError(
+            f'{place}: has no unit, unit = "{wanted}" asks for {_article(quantity)}; write the '
+            f'unit in the header, as in "{column.name} [{wanted}]"'
+        )
+    unit = column.unit or "-"
+    own = _quantity(unit)
+    if own is None:
+        raise InputError(f"{place}: the unit [{unit}] is not known; use one of {listed}")
+    if own != quantity and quantity == _NUMBER:
+        raise InputError(
+            f"{place}: is {_article(own)}, but a history is a factor without unit; say "
+            f'unit = "{unit}" to take the numbers in {unit}, and give the load as a direction of '
+            "length 1"
+        )
+    if own != quantity:
+        raise InputError(
+            f'{place}: is {_article(own)}, unit = "{wanted}" asks for {_article(quantity)} '
+            f"({listed})"
+        )
+    return UNITS[own][unit] / UNITS[quantity][wanted]
+
+
+def _article(quantity: str) -> str:
+    return f"an {quantity}" if quantity[0] in "aeiou" else f"a {quantity}"
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell  # 1_000 is a number to Python only
+
+
+def _number(number: int, cells: Sequence[str], column: _Column, ratio: Fraction) -> float:
+    cell = cells[column.place]
+    place = f'line {number}, column "{column.heading}"'
+    if not cell:
+        raise InputError(f"{place}: is empty; every line needs a number there")
+    if not _is_number(cell):
+        hint = " (decimals are written with a point)" if "," in cell else ""
+        raise InputError(f'{place}: "{cell}" is not a number{hint}')
+    # an exact ratio of whole numbers: 5 ms become the double nearest to 0.005 s
+    value = float(cell) * ratio.numerator / ratio.denominator
+    if not np.isfinite(value):
+        raise InputError(f'{place}: "{cell}" is not a finite number')
+    return value
