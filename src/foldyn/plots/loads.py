@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from foldyn.cases import Case
 
 _SAMPLES = 2001
-_LISTED_NODES = 6
+_LISTED_NODES = 3
 
 
 def plot_load_history(case: Case, duration: float, title: str = "") -> Figure:

@@ -103,6 +103,8 @@ def draw_structure(
     # The names of the held directions stand beyond the triangles' feet.
     feet = triangles[:, :1] + 1.6 * (triangles - triangles[:, :1])
     everything = [points, feet.reshape(-1, 3), heads.reshape(-1, 3)]
+    if numbers:  # room for the labels above the highest nodes
+        everything.append(points + np.array([0.0, 0.0, 0.06 * size]))
     keys: list[Any] = []
     if displacement is not None:
         everything.append(sheet.nodes)
