@@ -115,3 +115,12 @@ def test_wrong_bar_law(spec):
 def test_wrong_hinge_law_names_the_field(spec):
     with pytest.raises(InputError, match=r"fold_law.*superlinear"):
         hinge_law(spec, "fold_law")
+
+
+def test_ogden_in_terms_of_the_excess_is_the_same_law():
+    """The kernels' form, of x = lambda^2 - 1, gives the stress of lambda - 1."""
+    from foldyn.materials import ogden
+
+    e = np.concatenate([-np.geomspace(0.9, 1e-12, 60), np.geomspace(1e-12, 2.0, 60)])
+    found = [ogden.stress_of_excess(x) for x in e * (2.0 + e)]
+    np.testing.assert_allclose(found, [ogden.stress(v) for v in e], rtol=1e-14)

@@ -212,3 +212,15 @@ def test_broadcasting():
         for j, r in enumerate(RESTS):
             assert table[i, j] == law.moment(theta[i, 0], r)
     assert np.shape(law.energy(1.0, 2.0)) == ()
+
+
+def test_superlinear_moment_over_all_magnitudes():
+    """|d|^(4/3) without branches: 4 ulp from 1e-100 to pi, zero at zero, odd, NaN stays NaN."""
+    d = np.concatenate([[0.0], np.geomspace(1e-100, np.pi, 4001)])
+    law = hinge_law("superlinear")
+    found = law.moment(d, 0.0)
+    exact = np.abs(d.astype(np.longdouble)) ** (np.longdouble(4) / 3)
+    assert found[0] == 0.0
+    assert float(np.abs(found[1:] / exact[1:] - 1).max()) < 4 * np.finfo(float).eps
+    np.testing.assert_array_equal(law.moment(-d, 0.0), -found)
+    assert np.isnan(law.moment(np.nan, 0.0))

@@ -14,7 +14,8 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from foldyn.errors import InputError
-from foldyn.materials.compiled import kernel
+from foldyn.materials.compiled import kernel, scalar, summing
+from foldyn.mechanics.flat import flat
 
 
 class Inertia(NamedTuple):
@@ -146,14 +147,20 @@ def times_mass(m, v, out):
                 out[i, c] += value * v[j, c]
 
 
-@kernel
+@scalar
 def solve_mass(m, r, a, scratch):
     """Solve M a = r on free dofs; a is zero on fixed ones. scratch holds n numbers."""
     if m.lumped:
-        for i in range(r.shape[0]):
-            for c in range(3):
-                a[i, c] = r[i, c] * m.inverse[i, c]
-        return
+        left, right, inverse = flat(a), flat(r), flat(m.inverse)
+        for i in range(left.size):
+            left[i] = right[i] * inverse[i]
+    else:
+        substitute(m, r, a, scratch)
+
+
+@kernel
+def substitute(m, r, a, scratch):
+    """Solve M a = r with the factors of a consistent matrix."""
     a[:] = 0.0
     for c in range(3):
         k = m.factor_of_axis[c]
@@ -175,14 +182,20 @@ def solve_mass(m, r, a, scratch):
             a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]
 
 
-@kernel
+@summing
+def _lumped_sum(diagonal, v):
+    total = 0.0
+    for i in range(diagonal.size):
+        total += diagonal[i] * (v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
+    return total
+
+
+@scalar
 def kinetic_energy(m, v, product):
     """v M v / 2 (J), v (n, 3); product (n, 3) is scratch, used if the matrix is not diagonal."""
     n, total = v.shape[0], 0.0
     if m.lumped:
-        for i in range(n):
-            total += m.diagonal[i] * (v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
-        return 0.5 * total
+        return 0.5 * _lumped_sum(m.diagonal, v)
     times_mass(m, v, product)
     for i in range(n):
         for c in range(3):

@@ -8,6 +8,7 @@ from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration, passed_through, record
 from foldyn.materials.compiled import kernel
+from foldyn.mechanics.flat import flat
 
 ORDER = 4
 # abscissas of the stages; the loop needs each history's factors at these
@@ -38,54 +39,57 @@ def advance(
     each other. carry (n, 3) is for methods that keep an acceleration. Returns (outcome, step,
     hinge).
     """
-    n = u.shape[0]
+    n = u.size
     ut, vt = np.empty_like(u), np.empty_like(u)
     du, dv, a = np.empty_like(u), np.empty_like(u), np.empty_like(u)
+    fu, fv, fut, fvt = flat(u), flat(v), flat(ut), flat(vt)
+    fdu, fdv, fa = flat(du), flat(dv), flat(a)
     offset = (first + every - 1) // every
+    for i in range(n):
+        fut[i], fvt[i] = fu[i], fv[i]
     for step in range(first, last + 1):
         f = factors[step - first]
-        power_in, power_out = acceleration(model, system, mass, u, v, f[0], a, work, s)
-        hinge = passed_through(work.angle, angle)
-        if hinge >= 0:
-            return PENETRATION, step, hinge
-        if step % every == 0:
-            k = step // every - offset
-            record(
-                model, system, mass, u, v, a, s,
-                displacement[k], velocity[k], reaction[k], energy[k],
-            )  # fmt: skip
-            energy[k, 4], energy[k, 5] = tally[1], tally[0]
-            if not np.isfinite(energy[k].sum()):
-                return NOT_FINITE, step, -1
-        if step == last:
-            break
-        work_in, work_out = power_in, power_out
-        for i in range(n):
-            for c in range(3):
-                du[i, c], dv[i, c] = v[i, c], a[i, c]
-                ut[i, c] = u[i, c] + 0.5 * dt * v[i, c]
-                vt[i, c] = v[i, c] + 0.5 * dt * a[i, c]
-        for stage in range(1, 4):
-            column = 1 if stage < 3 else 2
+        work_in, work_out, wrong = 0.0, 0.0, 0
+        for stage in range(4):
+            column = (stage + 1) // 2
             power_in, power_out = acceleration(model, system, mass, ut, vt, f[column], a, work, s)
-            weight = 2.0 if stage < 3 else 1.0
+            weight = 2.0 if 0 < stage < 3 else 1.0
             work_in += weight * power_in
             work_out += weight * power_out
-            ahead = 0.5 * dt if stage == 1 else dt
-            for i in range(n):
-                for c in range(3):
-                    du[i, c] += weight * vt[i, c]
-                    dv[i, c] += weight * a[i, c]
-                    ut[i, c] = u[i, c] + ahead * vt[i, c]
-                    vt[i, c] = v[i, c] + ahead * a[i, c]
-        total = 0.0
-        for i in range(n):
-            for c in range(3):
-                u[i, c] += dt / 6.0 * du[i, c]
-                v[i, c] += dt / 6.0 * dv[i, c]
-                total += v[i, c]
+            ahead = 0.5 * dt if stage < 2 else dt
+            if stage == 0:
+                hinge = passed_through(work.angle, angle)
+                if hinge >= 0:
+                    return PENETRATION, step, hinge
+                if step % every == 0:
+                    k = step // every - offset
+                    record(
+                        model, system, mass, u, v, a, s,
+                        displacement[k], velocity[k], reaction[k], energy[k],
+                    )  # fmt: skip
+                    energy[k, 4], energy[k, 5] = tally[1], tally[0]
+                    if not np.isfinite(energy[k].sum()):
+                        return NOT_FINITE, step, -1
+                if step == last:
+                    return DONE, last, -1
+                for i in range(n):
+                    fdu[i], fdv[i] = fvt[i], fa[i]
+                    fut[i] = fu[i] + ahead * fvt[i]
+                    fvt[i] = fv[i] + ahead * fa[i]
+            elif stage < 3:
+                for i in range(n):
+                    fdu[i] += 2.0 * fvt[i]
+                    fdv[i] += 2.0 * fa[i]
+                    fut[i] = fu[i] + ahead * fvt[i]
+                    fvt[i] = fv[i] + ahead * fa[i]
+            else:
+                for i in range(n):
+                    fu[i] += dt / 6.0 * (fdu[i] + fvt[i])
+                    fv[i] += dt / 6.0 * (fdv[i] + fa[i])
+                    fut[i], fvt[i] = fu[i], fv[i]
+                    wrong += not abs(fv[i]) < np.inf
         tally[0] += dt / 6.0 * work_in
         tally[1] += dt / 6.0 * work_out
-        if not np.isfinite(total):
+        if wrong > 0:
             return NOT_FINITE, step + 1, -1
     return DONE, last, -1

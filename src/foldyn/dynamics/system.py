@@ -10,8 +10,9 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import Inertia, inertia, kinetic_energy, solve_mass, times_mass
-from foldyn.materials.compiled import kernel
+from foldyn.materials.compiled import kernel, scalar
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
+from foldyn.mechanics.flat import flat
 
 
 class System(NamedTuple):
@@ -70,7 +71,7 @@ def scratch(nodes: int) -> Scratch:
     return Scratch(np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros(nodes), np.zeros(3))
 
 
-@kernel
+@scalar
 def acceleration(model, system, mass, u, v, factors, out, work, s):
     """Acceleration (n, 3) at displacement u and velocity v under the histories' factors.
 
@@ -78,7 +79,7 @@ def acceleration(model, system, mass, u, v, factors, out, work, s):
     dissipated (W). The bracket stays in `s.force`.
     """
     internal_force(model, u, s.force, work)
-    force, speed = s.force.reshape(-1), v.reshape(-1)
+    force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
     for q in range(system.load_dof.size):
         dof = system.load_dof[q]
@@ -92,7 +93,7 @@ def acceleration(model, system, mass, u, v, factors, out, work, s):
         force[i] += viscous
         power_out += viscous * speed[i]
     solve_mass(mass, s.force, out, s.line)
-    accelerated, alpha = out.reshape(-1), system.alpha
+    accelerated, alpha = flat(out), system.alpha
     for i in range(speed.size):
         accelerated[i] = -accelerated[i] - alpha * speed[i]
     if alpha > 0.0:
@@ -125,11 +126,16 @@ def record(model, system, mass, u, v, a, s, displacement, velocity, reaction, en
         energy[k] = s.energy[k]
 
 
-@kernel
+@scalar
 def passed_through(now, before):
     """Hinge whose dihedral jumped by more than pi, or -1; `before` (nh,) becomes `now`."""
+    jumps = 0
     for e in range(now.size):
-        if abs(now[e] - before[e]) > np.pi:
-            return e
+        jumps += abs(now[e] - before[e]) > np.pi
+    if jumps > 0:
+        for e in range(now.size):
+            if abs(now[e] - before[e]) > np.pi:
+                return e
+    for e in range(now.size):
         before[e] = now[e]
     return -1

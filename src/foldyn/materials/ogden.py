@@ -7,6 +7,7 @@ near e = 0: the plain formulas lose five digits of the energy of a nearly unstre
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -24,6 +25,12 @@ def energy(e):
 def stress(e):
     """S / E_y."""
     return 0.25 * e * (4.0 + e * (6.0 + e * (4.0 + e))) / (1.0 + e)
+
+
+@scalar
+def stress_of_excess(x):
+    """S / E_y at x = lambda^2 - 1, for kernels: one root and one division."""
+    return 0.25 * x * (2.0 + x) / math.sqrt(1.0 + x)
 
 
 @scalar

@@ -68,15 +68,23 @@ def build(
     vector = rest[bars[:, 1]] - rest[bars[:, 0]]
     bar_runs = [run(0, len(bars), law)]
 
-    hinge_runs, start, sorted_groups = [], 0, []
+    # groups with equal laws share a run: fewer blocks, and neighbors in space side by side
+    members: list[list[int]] = []
     for number, group in enumerate(groups):
-        order_g = _order(group.nodes)
-        sorted_groups.append((number, group, order_g))
-        hinge_runs.append(run(start, start + len(order_g), group.law))
-        start += len(order_g)
+        same = [m for m in members if groups[m[0]].law == group.law]
+        same[0].append(number) if same else members.append([number])
+    hinge_runs, start, orders = [], 0, []
+    for numbers in members:
+        nodes = np.concatenate([np.asarray(groups[k].nodes).reshape(-1, 4) for k in numbers])
+        orders.append(_order(nodes))
+        hinge_runs.append(run(start, start + len(nodes), groups[numbers[0]].law))
+        start += len(nodes)
 
     def gather(column: Any, shape: Any, kind: Any = float) -> NDArray:
-        parts = [np.asarray(column(k, g))[o] for k, g, o in sorted_groups]
+        parts = [
+            np.concatenate([np.asarray(column(k, groups[k])) for k in numbers])[order]
+            for numbers, order in zip(members, orders, strict=True)
+        ]
         joined = np.concatenate(parts) if parts else np.zeros(0)
         return np.ascontiguousarray(joined.reshape(shape), kind)
 
