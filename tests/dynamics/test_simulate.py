@@ -365,3 +365,11 @@ def test_a_shifted_pattern_moves_the_same():
     u = 0.01 * np.random.default_rng(0).standard_normal((13, 3))
     near, shifted = (fd.discretize(p, SHEET).internal_force(u) for p in (pattern, far))
     np.testing.assert_allclose(shifted, near, rtol=0, atol=1e-9 * np.abs(near).max())
+
+
+def test_the_progress_bar_tells_pace_and_energy_error(capsys):
+    fd.simulate(case2(), 1.0, every=0.01, progress=True)
+    told = capsys.readouterr().err
+    assert "steps/s" in told
+    assert "energy error" in told
+    assert "/1 s" in told

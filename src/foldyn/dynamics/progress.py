@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -31,11 +32,16 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
     from tqdm import tqdm
 
     layout = "{l_bar}{bar}| {n:.3g}/{total:.3g} s [{elapsed}<{remaining}{postfix}]"
-    bar = tqdm(total=1.0, bar_format=layout, leave=False)
+    first: list[float] = []  # when the first report came: compilation is over then
+    bar = tqdm(total=1.0, bar_format=layout, leave=False, mininterval=0.0)
 
     def show(state: Progress) -> None:
         bar.total = state.duration
-        bar.set_postfix_str(f"energy error {state.energy_error:.1e}", refresh=False)
+        if not first:
+            first.append(time.perf_counter())
+        pace = state.steps / max(time.perf_counter() - first[0], 1e-9)
+        told = f"{pace:,.0f} steps/s, energy error {state.energy_error:.1e}"
+        bar.set_postfix_str(told, refresh=False)
         bar.update(state.time - bar.n)
 
     return show, bar.close
