@@ -19,4 +19,4 @@ def energy_scale(energy: NDArray) -> float:
     """Largest energy at play (J): kinetic, change of strain, dissipated or work."""
     strain = energy[:, :3].sum(axis=1)
     moving = np.column_stack([strain - strain[0], energy[:, 3:]])
-    return float(np.abs(moving).max())
+    return float(np.nanmax(np.abs(moving)))

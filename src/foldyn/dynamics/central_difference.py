@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
-from foldyn.dynamics.system import acceleration, passed_through, record
+from foldyn.dynamics.outcome import DONE, NOT_FINITE
+from foldyn.dynamics.system import acceleration, observe
 from foldyn.materials.compiled import kernel
 
 ORDER = 2
@@ -71,18 +71,12 @@ def advance(
             if not np.isfinite(total):
                 return NOT_FINITE, step, -1
         if step == 0 or step > first:  # else the last stretch has done this
-            hinge = passed_through(work.angle, angle)
-            if hinge >= 0:
-                return PENETRATION, step, hinge
-            if step % every == 0:
-                k = step // every - offset
-                record(
-                    model, system, mass, u, v, carry, s,
-                    displacement[k], velocity[k], reaction[k], energy[k],
-                )  # fmt: skip
-                energy[k, 4], energy[k, 5] = tally[1], tally[0]
-                if not np.isfinite(energy[k].sum()):
-                    return NOT_FINITE, step, -1
+            found, hinge = observe(
+                model, system, mass, u, v, carry, tally, step, every, offset, angle,
+                displacement, velocity, reaction, energy, work, s,
+            )  # fmt: skip
+            if found != DONE:
+                return found, step, hinge
         if step == last:
             break
         for i in range(n):

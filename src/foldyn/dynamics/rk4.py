@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
+from foldyn.dynamics.outcome import DONE, NOT_FINITE
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration, passed_through, record
+from foldyn.dynamics.system import acceleration, observe
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.flat import flat
 
@@ -58,18 +58,12 @@ def advance(
             work_out += weight * power_out
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
-                hinge = passed_through(work.angle, angle)
-                if hinge >= 0:
-                    return PENETRATION, step, hinge
-                if step % every == 0:
-                    k = step // every - offset
-                    record(
-                        model, system, mass, u, v, a, s,
-                        displacement[k], velocity[k], reaction[k], energy[k],
-                    )  # fmt: skip
-                    energy[k, 4], energy[k, 5] = tally[1], tally[0]
-                    if not np.isfinite(energy[k].sum()):
-                        return NOT_FINITE, step, -1
+                found, hinge = observe(
+                    model, system, mass, u, v, a, tally, step, every, offset, angle,
+                    displacement, velocity, reaction, energy, work, s,
+                )  # fmt: skip
+                if found != DONE:
+                    return found, step, hinge
                 if step == last:
                     return DONE, last, -1
                 for i in range(n):

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import Inertia, inertia, kinetic_energy, solve_mass, times_mass
+from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.materials.compiled import kernel, scalar
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
 from foldyn.mechanics.flat import flat
@@ -18,7 +19,6 @@ from foldyn.mechanics.flat import flat
 class System(NamedTuple):
     """What compiled integrators need beside the model: n nodes, h histories, s supported dofs."""
 
-    free: NDArray  # (n, 3) 1.0 on free dofs, 0.0 on fixed ones
     supported: NDArray  # (s,) dof numbers 3 node + axis
     alpha: float
     stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
@@ -53,7 +53,6 @@ def pack(case: Case) -> tuple[BarsHinges, System, Inertia]:
     else:
         k0 = sparse.csr_array((0, 0))
     system = System(
-        free=(~case.fixed).astype(float),
         supported=np.asarray(case.supported_dofs, np.int64),
         alpha=float(case.damping.alpha),
         stiff_indptr=k0.indptr.astype(np.int64),
@@ -139,3 +138,28 @@ def passed_through(now, before):
     for e in range(now.size):
         before[e] = now[e]
     return -1
+
+
+@scalar
+def observe(
+    model, system, mass, u, v, a, tally, step, every, offset, angle,
+    displacement, velocity, reaction, energy, work, s,
+):  # fmt: skip
+    """Look for panels that passed through each other, and write a sample every `every` steps.
+
+    Every method calls it at t_n after `acceleration`; the sample goes to row step / every -
+    offset. Returns (outcome, hinge).
+    """
+    hinge = passed_through(work.angle, angle)
+    if hinge >= 0:
+        return PENETRATION, hinge
+    if step % every == 0:
+        k = step // every - offset
+        record(
+            model, system, mass, u, v, a, s,
+            displacement[k], velocity[k], reaction[k], energy[k],
+        )  # fmt: skip
+        energy[k, 4], energy[k, 5] = tally[1], tally[0]
+        if not np.isfinite(energy[k].sum()):
+            return NOT_FINITE, -1
+    return DONE, -1

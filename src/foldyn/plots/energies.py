@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.plots import style
 
@@ -21,7 +22,6 @@ NAMES = {
     "dissipated": "dissipated",
     "work": "work of the loads",
 }
-STRAIN = ("strain_bars", "strain_folds", "strain_bends")
 
 
 def energy_error(trajectory: xr.Dataset) -> np.ndarray:
@@ -37,9 +37,7 @@ def energy_error(trajectory: xr.Dataset) -> np.ndarray:
     ndarray, shape (time,)
         The imbalance (J): zero for an exact motion.
     """
-    total = trajectory["kinetic"].values + trajectory["dissipated"].values
-    total = total + sum(trajectory[name].values for name in STRAIN) - trajectory["work"].values
-    return total - total[0]
+    return audit.energy_error(_table(trajectory))
 
 
 def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
@@ -79,7 +77,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
         handles.append(line)
     error = energy_error(trajectory)
     worst = float(np.nanmax(np.abs(error)))
-    largest = _energy_at_play(trajectory)
+    largest = audit.energy_scale(_table(trajectory))
     lower.plot(time, error, color=style.BLACK, linewidth=1.0, label="balance error")
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
@@ -94,9 +92,6 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     return style.finish(figure)
 
 
-def _energy_at_play(trajectory: xr.Dataset) -> float:
-    """Return the largest of kinetic energy, change of strain energy, dissipated and work (J)."""
-    strain = np.sum([trajectory[name].values for name in STRAIN], axis=0)
-    moving = [strain - strain[0]]
-    moving += [trajectory[name].values for name in NAMES if name not in STRAIN]
-    return float(np.nanmax(np.abs(moving)))
+def _table(trajectory: xr.Dataset) -> np.ndarray:
+    """Return the energies (J) as the audit has them, a column each."""
+    return np.column_stack([trajectory[name].values for name in audit.AUDITED])
