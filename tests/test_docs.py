@@ -30,16 +30,27 @@ def test_quickstart_runs(tmp_path, monkeypatch):
 
 
 def test_the_case_file_page_shows_a_case_file(tmp_path):
-    (block,) = blocks("case-file.md", "toml")
+    block, *_ = blocks("case-file.md", "toml")
     (tmp_path / "case.toml").write_text(block, "utf-8")
     case_file = read_case(tmp_path / "case.toml")
     assert case_file.masses == ["circumcenter", "consistent"]
 
 
+def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
+    page, moving, actuated = blocks("case-file.md", "toml")
+    rest = re.sub(r"^\[\[(supports|loads)\]\]\n(.+\n)*", "", page, flags=re.M)
+    (tmp_path / "case.toml").write_text(rest + moving + actuated, "utf-8")
+    case = read_case(tmp_path / "case.toml").case()
+    assert len(case.supports) == 3
+    assert case.imposed.sum() == 2
+    assert len(case.base_terms) == 1
+    assert len(case.actuated_creases) == len(case.structure.folds)
+
+
 def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
     (text,), (toml,) = blocks("histories.md", "text"), blocks("histories.md", "toml")
     (tmp_path / "pulse.csv").write_text(text, "utf-8")
-    (page,) = blocks("case-file.md", "toml")
+    page, *_ = blocks("case-file.md", "toml")
     old = 'history = { kind = "pulse", duration = 1.0 }\n'
     assert old in page
     (tmp_path / "case.toml").write_text(page.replace(old, toml), "utf-8")

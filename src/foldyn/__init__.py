@@ -31,8 +31,11 @@ _HOME = {
     "discretize": "structures",
     "Case": "cases",
     "Fix": "cases",
+    "Impose": "cases",
+    "BaseMotion": "cases",
     "Force": "cases",
     "Gravity": "cases",
+    "Actuate": "cases",
     "Rayleigh": "cases",
     "State": "cases",
     "Constant": "cases",
@@ -58,6 +61,8 @@ _MODULES = (
 
 if TYPE_CHECKING:
     from foldyn.cases import (
+        Actuate,
+        BaseMotion,
         Case,
         Chirp,
         Constant,
@@ -66,6 +71,7 @@ if TYPE_CHECKING:
         Gravity,
         HalfSine,
         Harmonic,
+        Impose,
         Pulse,
         Ramp,
         Rayleigh,

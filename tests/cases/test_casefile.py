@@ -39,6 +39,8 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
         "dt": None,
         "every": 0.01,
         "force": False,
+        "tolerance": None,
+        "start": 0.0,
     }
     np.testing.assert_array_equal(found.output.nodes, [6, 7])
     assert found.output.every == 0.01

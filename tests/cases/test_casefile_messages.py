@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from casefile_checks import check, edited
 
 from foldyn.errors import FoldynWarning, InputError
 
@@ -72,8 +73,8 @@ BAD = {
         "damping = 0.02: must be a table, written [damping]",
     ),
     "key in a list": (
-        [('axes = "xyz"', 'axis = "xyz"')],
-        "supports[0].axis: unknown key; did you mean 'axes'? known keys: nodes",
+        [('axes = "xyz"', 'axess = "xyz"')],
+        "supports[0].axess: unknown key; did you mean 'axes'? known keys: nodes",
     ),
     "force": (
         [("force = [0.01, 0, 0]", "force = [0.01, 0]")],
@@ -105,7 +106,7 @@ BAD = {
     ),
     "empty load": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]\n", "")],
-        "loads[0]: give nodes and force, or gravity",
+        "loads[0]: give nodes and force, or gravity, or creases and angle",
     ),
     "misspelled force": (
         [("force = [0.01, 0, 0]", "forces = [0.01, 0, 0]")],
@@ -290,25 +291,6 @@ BAD_SHORT = {
         'model: mass = "circumcenter": ',
     ),
 }
-
-
-def edited(text: str, edits: list[tuple[str, str]]) -> str:
-    """Text with things replaced that occur in it once."""
-    for old, new in edits:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text
-
-
-def check(read, text: str, message: str) -> None:
-    """Reading fails, and one line of the message begins as told."""
-    with pytest.raises(InputError) as caught:
-        read(text)
-    first, *more = str(caught.value).splitlines()
-    path, _, line = first.partition(": ")
-    assert path.endswith("case2.toml")
-    lines = [line, *(other.removeprefix("  also ") for other in more)]
-    assert any(line.startswith(message) for line in lines), lines
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import foldyn as fd
+from foldyn.dynamics import METHODS
 from foldyn.structures import ModelOptions
 
 LENGTH = 2.0  # of the bar, m
@@ -50,3 +51,8 @@ def released(amplitude: float, speed: float = 0.0) -> fd.State:
     u, v = np.zeros((2, 3)), np.zeros((2, 3))
     u[1, 0], v[1, 0] = amplitude, speed
     return fd.State(u, v)
+
+
+def equal_steps(method: str) -> dict[str, float]:
+    """Arguments of `simulate` with which a method that controls its error takes equal steps."""
+    return {"tolerance": 1e6} if METHODS[method].adaptive else {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oscillators import MASS, duffing_law, linear_law, oscillator, released
+from oscillators import MASS, duffing_law, equal_steps, linear_law, oscillator, released
 from scipy import special
 
 import foldyn as fd
@@ -21,7 +21,7 @@ def spring() -> fd.Case:
 
 
 def end(case: fd.Case, dt: float, duration: float, initial: fd.State, method: str) -> float:
-    motion = fd.simulate(case, duration, method, dt=dt, every=1, initial=initial)
+    motion = fd.simulate(case, duration, method, dt=dt, initial=initial, **equal_steps(method))
     return float(motion.displacement[-1, 1, 0])
 
 
@@ -30,10 +30,15 @@ def test_order_on_the_linear_oscillator(spring, method):
     """x = a cos(w t): the error at a fixed time falls with the method's order."""
     duration, a = 2.0, 0.1
     steps = np.array([60, 120, 240, 480])
-    errors = [
-        end(spring, duration / n, duration, released(a), method) - a * np.cos(OMEGA * duration)
-        for n in steps
-    ]
+    errors = []
+    for n in steps:
+        motion = fd.simulate(
+            spring, duration, method, dt=duration / n, initial=released(a), **equal_steps(method)
+        )
+        phase = OMEGA * motion.time.to_numpy()
+        u = motion.displacement[:, 1, 0].to_numpy() - a * np.cos(phase)
+        v = motion.velocity[:, 1, 0].to_numpy() / OMEGA + a * np.sin(phase)
+        errors.append(np.hypot(u, v).max())
     assert observed_order(duration / steps, errors) == pytest.approx(METHODS[method].order, abs=0.1)
 
 
@@ -82,13 +87,17 @@ def test_damped_motion(alpha, beta, method):
     case = oscillator(linear_law(), K, alpha=alpha, beta=beta)
     ratio = alpha / (2.0 * OMEGA) + beta * OMEGA / 2.0
     steps, errors = np.array([300, 600, 1200, 2400]), []
+    if METHODS[method].order == 5:
+        steps //= 6  # else rounding hides the order
     for n in steps:
-        motion = fd.simulate(case, 3.0, method, dt=3.0 / n, initial=released(0.1))
+        motion = fd.simulate(
+            case, 3.0, method, dt=3.0 / n, initial=released(0.1), **equal_steps(method)
+        )
         exact = damped(motion.time.to_numpy(), ratio)
         errors.append(float(np.abs(motion.displacement[:, 1, 0].to_numpy() - exact).max()))
     order = METHODS[method].order
     assert observed_order(3.0 / steps, errors) == pytest.approx(order, abs=0.1)
-    assert errors[-1] < (1e-10 if order == 4 else 1e-5)
+    assert errors[-1] < (1e-5 if order == 2 else 1e-10)
     energy = motion.kinetic + motion.strain_bars
     np.testing.assert_allclose(motion.dissipated, energy[0] - energy, atol=10 * errors[-1])
 

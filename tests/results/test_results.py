@@ -10,6 +10,8 @@ import pytest
 import xarray as xr
 
 from foldyn.cases import (
+    Actuate,
+    BaseMotion,
     Case,
     Chirp,
     Fix,
@@ -17,7 +19,9 @@ from foldyn.cases import (
     Gravity,
     HalfSine,
     Harmonic,
+    Impose,
     Pulse,
+    Ramp,
     Rayleigh,
     Step,
     Table,
@@ -194,6 +198,14 @@ def test_functions_are_stored_sampled_at_stage_times(tmp_path) -> None:
     assert_same_case(case_of(again), found)
 
 
+def test_a_run_that_starts_later_samples_functions_later() -> None:
+    case = make_case(lambda t: math.exp(-3 * t))
+    table = case_of(dataset(case, start=2.0)).loads[0].history
+    assert table.times[[0, -1]].tolist() == [2.0, 2.4]
+    for time in (2.0, 2.05, 2.35, 2.4):
+        assert table(time) == pytest.approx(math.exp(-3 * time), rel=1e-14)
+
+
 def test_loads_that_share_a_function_share_a_table() -> None:
     def push(t):
         return t * t
@@ -214,6 +226,62 @@ def test_gravity_and_chirp_survive_a_file(tmp_path) -> None:
     case = dataclasses.replace(case, loads=[*case.loads, *more])
     save(dataset(case), tmp_path / "run.nc")
     assert_same_case(case_of(load(tmp_path / "run.nc")), case)
+
+
+def moving_case(history) -> Case:
+    structure = make_case().structure
+    return Case(
+        structure,
+        [
+            Fix("xmin"),
+            Impose([9, 7], "x", [1 / 3, -0.1], history),
+            Impose("xmax", "z", 0.7),
+            BaseMotion("x", Harmonic(1 / 3, 10), 1e-3 / 3),
+            BaseMotion("y", history),
+        ],
+        [
+            Actuate("mountain", 200 / 3 + 180, history),
+            Actuate([5, 1], [100.1, 1 / 3]),
+            Force([12], (0, 0.1, 0), history),
+        ],
+    )
+
+
+def test_moving_supports_and_actuated_creases_survive_a_file(tmp_path) -> None:
+    case = moving_case(Ramp(1 / 3, smooth=True))
+    save(dataset(case), tmp_path / "run.nc")
+    found = case_of(load(tmp_path / "run.nc"))
+    assert_same_case(found, case)
+    np.testing.assert_array_equal(found.imposed, case.imposed)
+    for name in ("imposed_terms", "base_terms", "actuation_terms"):
+        pairs = zip(getattr(found, name), getattr(case, name), strict=True)
+        for (values, history), (expected, law) in pairs:
+            np.testing.assert_array_equal(values, expected)
+            assert history == law
+
+
+def test_functions_that_move_supports_are_stored_as_smooth_tables(tmp_path) -> None:
+    case = moving_case(lambda t: 1.0 - math.cos(3 * t))
+    save(dataset(case), tmp_path / "run.nc")
+    found = case_of(load(tmp_path / "run.nc"))
+    moves, pushes = found.supports[1].history, found.loads[2].history
+    assert found.supports[4].history == found.loads[0].history == moves
+    assert moves.smooth and not pushes.smooth
+    for time in np.arange(9) * 0.05:  # stage times of steps of 0.1 s
+        assert moves(time) == pytest.approx(1.0 - math.cos(3 * time), abs=1e-15)
+        assert pushes(time) == moves(time)
+    rates = moves.derivatives([0.1, 0.125, 0.3])[1]
+    np.testing.assert_allclose(rates, 3 * np.sin(3 * np.array([0.1, 0.125, 0.3])), rtol=2e-3)
+    assert_same_case(case_of(dataset(found)), found)
+
+
+def test_a_function_that_moves_a_support_needs_time_steps() -> None:
+    structure = make_case().structure
+    for support in (Impose([9], "x", 0.1, lambda t: t), BaseMotion("x", lambda t: t)):
+        case = Case(structure, [Fix("xmin"), support])
+        assert dataset(case).attrs["rerunnable"] == 1
+        with pytest.raises(InputError, match="a motion has a function of time as history"):
+            case_of(dataset(case, steps=None))
 
 
 def test_tables_from_csv_are_stored_as_numbers(tmp_path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cases.actuation import Actuate
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.function import Function, as_history
@@ -22,13 +23,15 @@ from foldyn.cases.histories import (
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
-from foldyn.cases.supports import Fix
+from foldyn.cases.supports import BaseMotion, Fix, Impose
 
 if TYPE_CHECKING:
     from foldyn.cases.casefile import CaseFile, read_case
 
 __all__ = [
     "HISTORIES",
+    "Actuate",
+    "BaseMotion",
     "Case",
     "CaseFile",
     "Chirp",
@@ -40,6 +43,7 @@ __all__ = [
     "HalfSine",
     "Harmonic",
     "History",
+    "Impose",
     "Pulse",
     "Ramp",
     "Rayleigh",

@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.actuation import Actuate, resolve_creases, rest_changes
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import Fix
+from foldyn.cases.supports import AXES, BaseMotion, Fix, Impose, Support
 from foldyn.cases.values import show
 from foldyn.errors import FoldynWarning, InputError
 
-AXES = "xyz"
+Terms = tuple[tuple[NDArray[np.float64], History], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,17 +32,20 @@ class Case:
     ----------
     structure : Structure
         The discretized pattern.
-    supports : sequence of Fix
-        Nodes held at rest; none by default (free motion is legal in dynamics).
-    loads : sequence of Force and Gravity
-        Forces and gravity; none by default.
+    supports : sequence of Fix, Impose and BaseMotion
+        Nodes held at rest or moved as prescribed, and motions of the base; none by default (free
+        motion is legal in dynamics).
+    loads : sequence of Force, Gravity and Actuate
+        Forces, gravity and creases that fold by themselves; none by default.
     damping : Rayleigh
         Damping; none by default.
 
     Attributes
     ----------
     fixed : ndarray of bool, shape (n, 3)
-        True where a node is held along an axis.
+        True where a node is held along an axis, by `Fix` or by `Impose`.
+    imposed : ndarray of bool, shape (n, 3)
+        True where an `Impose` moves a node along an axis.
     free_dofs, supported_dofs : ndarray of int64
         Numbers 3 * node + axis of the free and of the held ones, increasing.
     load_terms : tuple of (ndarray of shape (n, 3), History)
@@ -51,12 +55,22 @@ class Case:
         The same of the forces on nodes alone, without gravity.
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
+    imposed_terms : tuple of (ndarray of shape (n, 3), History)
+        Displacements (m) at factor 1 of the imposed dofs, zero elsewhere, with their history;
+        equal histories are one term.
+    base_terms : tuple of (ndarray of shape (n, 3), History)
+        The same of the dofs that `Fix` holds along the axis of a `BaseMotion`, from where they
+        stand at the start of the motion.
+    actuation_terms : tuple of (ndarray of shape (nf,), History)
+        Changes (rad) of the rest angles of the folds at factor 1, zero elsewhere, with their
+        history; equal histories are one term.
 
     Raises
     ------
     InputError
-        A node is out of range, a force acts on held axes only, or gravity meets a structure
-        whose mass is not known.
+        A node or crease is out of range; a dof is held and imposed, or imposed twice; a base
+        motion has no support to move; a crease is actuated twice; a force acts on held axes only;
+        or gravity meets a structure whose mass is not known.
 
     Warns
     -----
@@ -65,35 +79,65 @@ class Case:
     """
 
     structure: Any
-    supports: Sequence[Fix] = ()
-    loads: Sequence[Force | Gravity] = ()
+    supports: Sequence[Support] = ()
+    loads: Sequence[Force | Gravity | Actuate] = ()
     damping: Rayleigh = field(default_factory=Rayleigh)
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        for name, kinds in (("supports", (Fix,)), ("loads", (Force, Gravity))):
+        kinds_of = {"supports": (Fix, Impose, BaseMotion), "loads": (Force, Gravity, Actuate)}
+        for name, kinds in kinds_of.items():
             object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
         if not isinstance(self.damping, Rayleigh):
             raise InputError(
                 f"damping = {show(self.damping)}: must be Rayleigh(alpha=..., beta=...)"
             )
-        _ = self.fixed  # checks the supports' nodes
+        _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         for i, load in enumerate(self.loads):
             if isinstance(load, Gravity):
                 self._check_gravity(f"loads[{i}]")
-            else:
+            elif isinstance(load, Force):
                 self._check_force(f"loads[{i}]", load)
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
-        """Whether each node is held along each axis, shape (n, 3)."""
-        mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
-        for i, support in enumerate(self.supports):
-            nodes = resolve_nodes(self.structure, support.nodes, f"supports[{i}].nodes")
-            for axis in support.axes:
-                mask[nodes, AXES.index(axis)] = True
+        """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
+        mask = self.imposed | self._held
         mask.flags.writeable = False
         return mask
+
+    @cached_property
+    def imposed(self) -> NDArray[np.bool_]:
+        """Whether an Impose moves each node along each axis, shape (n, 3)."""
+        mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
+        for i, support in enumerate(self.supports):
+            if not isinstance(support, Impose):
+                continue
+            nodes, axis = self._nodes_of(i, support), AXES.index(support.axis)
+            for taken, how in ((self._held, "held and imposed"), (mask, "imposed twice")):
+                twice = nodes[taken[nodes, axis]]
+                if twice.size:
+                    raise InputError(
+                        f"supports[{i}]: node {twice[0]} is {how} along {support.axis}, a "
+                        "contradictory support; leave out one of the two"
+                    )
+            mask[nodes, axis] = True
+        mask.flags.writeable = False
+        return mask
+
+    @cached_property
+    def _held(self) -> NDArray[np.bool_]:
+        """Whether a Fix holds each node along each axis, shape (n, 3)."""
+        mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
+        for i, support in enumerate(self.supports):
+            if isinstance(support, Fix):
+                nodes = self._nodes_of(i, support)
+                for axis in support.axes:
+                    mask[nodes, AXES.index(axis)] = True
+        return mask
+
+    def _nodes_of(self, i: int, support: Fix | Impose) -> NDArray[np.int64]:
+        return resolve_nodes(self.structure, support.nodes, f"supports[{i}].nodes")
 
     @cached_property
     def free_dofs(self) -> NDArray[np.int64]:
@@ -106,15 +150,68 @@ class Case:
         return np.flatnonzero(self.fixed.ravel()).astype(np.int64)
 
     @cached_property
-    def load_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
-        """Forces (N) on all nodes, shape (n, 3), each with its history."""
+    def imposed_terms(self) -> Terms:
+        """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
         terms: list[tuple[NDArray[np.float64], History]] = []
-        for i, load in enumerate(self.loads):
-            _add(terms, as_history(load.history), self._forces_of(i, load))
+        for i, support in enumerate(self.supports):
+            if isinstance(support, Impose):
+                vector = np.zeros((len(self.structure.nodes), 3))
+                vector[self._nodes_of(i, support), AXES.index(support.axis)] = support.value
+                _add(terms, as_history(support.history), vector)
         return _frozen(terms)
 
     @cached_property
-    def force_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+    def base_terms(self) -> Terms:
+        """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
+        terms: list[tuple[NDArray[np.float64], History]] = []
+        base = self.fixed & ~self.imposed
+        for i, support in enumerate(self.supports):
+            if not isinstance(support, BaseMotion):
+                continue
+            axis = AXES.index(support.axis)
+            if not base[:, axis].any():
+                raise InputError(
+                    f"supports[{i}]: the base moves along {support.axis}, but no support holds a "
+                    f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
+                    "out the base motion"
+                )
+            vector = np.zeros(base.shape)
+            vector[base[:, axis], axis] = support.value
+            _add(terms, as_history(support.history), vector)
+        return _frozen(terms)
+
+    @cached_property
+    def actuation_terms(self) -> Terms:
+        """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
+        terms: list[tuple[NDArray[np.float64], History]] = []
+        first: dict[int, int] = {}  # the load that actuates a crease
+        for i, load in enumerate(self.loads):
+            if not isinstance(load, Actuate):
+                continue
+            creases, change = rest_changes(self.structure, load, f"loads[{i}]")
+            for crease in creases.tolist():
+                if crease in first:
+                    raise InputError(
+                        f"loads[{i}].creases: crease {crease} is actuated by loads[{first[crease]}]"
+                        " already; leave it out of one of the two"
+                    )
+                first[crease] = i
+            vector = np.zeros(len(self.structure.folds))
+            vector[creases] = change
+            _add(terms, as_history(load.history), vector)
+        return _frozen(terms)
+
+    @cached_property
+    def load_terms(self) -> Terms:
+        """Forces (N) on all nodes, shape (n, 3), each with its history."""
+        terms: list[tuple[NDArray[np.float64], History]] = []
+        for i, load in enumerate(self.loads):
+            if not isinstance(load, Actuate):
+                _add(terms, as_history(load.history), self._forces_of(i, load))
+        return _frozen(terms)
+
+    @cached_property
+    def force_terms(self) -> Terms:
         """The terms of `load_terms` without gravity."""
         terms: list[tuple[NDArray[np.float64], History]] = []
         for i, load in enumerate(self.loads):
@@ -123,7 +220,7 @@ class Case:
         return _frozen(terms)
 
     @cached_property
-    def gravity_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:
+    def gravity_terms(self) -> Terms:
         """Accelerations of gravity (m/s2), shape (3,), each with its history."""
         terms: list[tuple[NDArray[np.float64], History]] = []
         for load in self.loads:
@@ -140,6 +237,16 @@ class Case:
             if isinstance(load, Force)
         ]
         return np.unique(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=np.int64)
+
+    @cached_property
+    def actuated_creases(self) -> NDArray[np.int64]:
+        """Creases that a load actuates, increasing."""
+        chosen = [
+            resolve_creases(self.structure, load.creases, f"loads[{i}].creases")
+            for i, load in enumerate(self.loads)
+            if isinstance(load, Actuate)
+        ]
+        return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=np.int64)
 
     def _forces_of(self, i: int, load: Force | Gravity) -> NDArray[np.float64]:
         """Forces (n, 3), N, of one load at factor 1."""
@@ -192,9 +299,7 @@ def _add(
     terms.append((vector, history))
 
 
-def _frozen(
-    terms: list[tuple[NDArray[np.float64], History]],
-) -> tuple[tuple[NDArray[np.float64], History], ...]:
+def _frozen(terms: list[tuple[NDArray[np.float64], History]]) -> Terms:
     for vector, _ in terms:
         vector.flags.writeable = False
     return tuple(terms)

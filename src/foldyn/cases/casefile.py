@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,15 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from foldyn.cases.actuation import Actuate
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import call_from
+from foldyn.cases.initial import Initial, rigid_motion
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
-from foldyn.cases.schema import CaseSchema, LoadSection
+from foldyn.cases.schema import CaseSchema, InitialSection, LoadSection, SupportSection
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import Fix
-from foldyn.cases.values import choice
+from foldyn.cases.state import State
+from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
+from foldyn.cases.values import choice, show
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import read_pattern
 from foldyn.patterns import GENERATORS, Pattern
@@ -87,6 +90,8 @@ class CaseFile:
         Mass rules, one or several to compare.
     analysis : Analysis
     output : Output
+    start : Initial or None
+        How the motion starts if not at rest; `initial` makes a state of it.
     """
 
     path: Path
@@ -96,6 +101,7 @@ class CaseFile:
     masses: list[str]
     analysis: Analysis
     output: Output
+    start: Initial | None
     _parts: Mapping[str, Any] = field(repr=False)
     _cases: dict[str, Case] = field(repr=False)
 
@@ -105,6 +111,54 @@ class CaseFile:
         if rule not in self._cases:
             self._cases[rule] = _build(self.path, self.pattern, self.sheet, rule, self._parts)
         return self._cases[rule]
+
+    def initial(
+        self, mass: str | None = None, read: Callable[[Path, int], State] | None = None
+    ) -> State | None:
+        """State that the motion starts from; None for rest.
+
+        Parameters
+        ----------
+        mass : str, optional
+            Mass rule, by default the first that the file names: it decides where the center of
+            mass is.
+        read : callable, optional
+            Gives the state of a result's file at a sample, for files that start from one:
+            ``lambda path, at: fd.initial_state(fd.load(path), at)``.
+
+        Raises
+        ------
+        InputError
+            A support holds a node that the rigid motion moves; the result cannot be read or has
+            other nodes.
+        """
+        if self.start is None:
+            return None
+        case = self.case(mass)
+        if self.start.file is None:
+            with _placed(self.path, "initial: "):
+                return rigid_motion(case, self.start)
+        if read is None:
+            raise InputError(
+                f"{self.path}: initial.file: needs a reader: case_file.initial(read=lambda path, "
+                "at: foldyn.initial_state(foldyn.load(path), at))"
+            )
+        place = f"{self.path}: initial.file = {show(self.start.file)}: "
+        try:
+            state = read(self.path.parent / self.start.file, self.start.at)
+        except InputError as error:
+            of_sample = str(error).startswith("at =")
+            raise InputError(
+                f"{self.path}: initial.{error}" if of_sample else f"{place}{error}"
+            ) from None
+        wanted = len(case.structure.nodes)
+        for array in (state.displacement, state.velocity):
+            if array is not None and len(np.asarray(array)) != wanted:
+                raise InputError(
+                    f"{place}holds a motion of {len(np.asarray(array))} nodes, but this structure "
+                    f"has {wanted}; give a result of the same pattern and scheme"
+                )
+        return state
 
 
 def read_case(path: str | os.PathLike[str]) -> CaseFile:
@@ -147,7 +201,7 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     parts["supports"] = []
     for i, item in enumerate(schema.supports):
         with _placed(path, f"supports[{i}]."):
-            parts["supports"].append(Fix(item.nodes, item.axes))
+            parts["supports"].append(_support(item))
     parts["loads"] = [_load(item) for item in schema.loads]
 
     cases = {masses[0]: _build(path, pattern, sheet, masses[0], parts)}
@@ -161,7 +215,7 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     every = schema.analysis.duration / SAMPLES if every is None else every
     with _placed(path, ""):
         nodes = _output_nodes(case, schema.output.nodes)
-    return CaseFile(
+    case_file = CaseFile(
         path=path,
         title=schema.title,
         pattern=pattern,
@@ -169,9 +223,14 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
         masses=masses,
         analysis=Analysis(analysis.pop("kind"), {**analysis, "every": every}),
         output=Output(nodes, every, schema.output.axis, schema.output.max_frequency),
+        start=_start(schema.initial),
         _parts=parts,
         _cases=cases,
     )
+    if case_file.start is not None and case_file.start.file is None:
+        for rule in masses:
+            case_file.initial(rule)  # a support may hold what the rigid motion moves
+    return case_file
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -203,10 +262,25 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         raise InputError(f"{place}{error}") from None
 
 
-def _load(item: LoadSection) -> Force | Gravity:
+def _support(item: SupportSection) -> Support:
+    if item.base is not None:
+        value = 1.0 if item.displacement is None else item.displacement
+        return BaseMotion(item.base, item.history, value)
+    if item.axis is not None:
+        return Impose(item.nodes, item.axis, item.displacement, item.history)
+    return Fix(item.nodes, item.axes)
+
+
+def _load(item: LoadSection) -> Force | Gravity | Actuate:
     if item.gravity is not None:
         return Gravity(item.gravity, item.history)
+    if item.creases is not None:
+        return Actuate(item.creases, item.angle, item.history)
     return Force(item.nodes, item.force, item.history)
+
+
+def _start(item: InitialSection | None) -> Initial | None:
+    return None if item is None else Initial(item.velocity, item.spin, item.file, item.at)
 
 
 def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:

@@ -109,7 +109,7 @@ def _kind_of(table: Any, kinds: Mapping[str, Any]) -> tuple[str, dict[str, Any]]
 
 
 def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
-    check_keys(arguments, ["file", "time", "value", "unit", "times", "values"])
+    check_keys(arguments, ["file", "time", "value", "unit", "smooth", "times", "values"])
     if "file" not in arguments:
         raise InputError(": give times and values, or file (CSV)")
     file = arguments["file"]

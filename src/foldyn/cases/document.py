@@ -17,13 +17,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.actuation import Actuate
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import history_from, law_from
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.loads import Force, Gravity
-from foldyn.cases.supports import Fix
+from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
@@ -97,7 +98,7 @@ class _Writer:
         self.stage_times = stage_times
         self.arrays: dict[str, NDArray] = {}
         self.obstacles: list[str] = []
-        self.histories: list[tuple[History, dict[str, Any]]] = []
+        self.histories: list[tuple[History, bool, dict[str, Any]]] = []
 
     def document(self) -> Document:
         case, structure = self.case, self.case.structure
@@ -111,7 +112,7 @@ class _Writer:
             },
             "model": self._model(structure.options),
             "damping": {"alpha": case.damping.alpha, "beta": case.damping.beta},
-            "supports": [{"nodes": _nodes(fix.nodes), "axes": fix.axes} for fix in case.supports],
+            "supports": [self._support(support) for support in case.supports],
             "loads": [self._load(load) for load in case.loads],
         }
         if not self.obstacles and not _same(structure, _structure(_resolve(sections, self.arrays))):
@@ -171,34 +172,51 @@ class _Writer:
         }
         return {"kind": kind, **{key: _plain(value) for key, value in arguments.items()}}
 
-    def _load(self, load: Force | Gravity) -> dict[str, Any]:
+    def _support(self, support: Support) -> dict[str, Any]:
+        section: dict[str, Any]
+        if isinstance(support, Fix):
+            return {"nodes": _plain(support.nodes), "axes": support.axes}
+        if isinstance(support, Impose):
+            section = {"nodes": _plain(support.nodes), "axis": support.axis}
+        else:
+            section = {"base": support.axis}
+        section["displacement"] = _plain(support.value)
+        return self._with_history(section, support.history, moves=True)
+
+    def _load(self, load: Force | Gravity | Actuate) -> dict[str, Any]:
         section: dict[str, Any]
         if isinstance(load, Gravity):
             section = {"gravity": list(load.acceleration)}
+        elif isinstance(load, Actuate):
+            section = {"creases": _plain(load.creases), "angle": _plain(load.angle)}
         else:
-            section = {"nodes": _nodes(load.nodes), "force": list(load.vector)}
-        history = as_history(load.history)
+            section = {"nodes": _plain(load.nodes), "force": list(load.vector)}
+        return self._with_history(section, load.history, moves=isinstance(load, Actuate))
+
+    def _with_history(self, section: dict[str, Any], given: Any, moves: bool) -> dict[str, Any]:
+        history = as_history(given)
         if history != Constant():
-            section["history"] = self._history(history)
+            section["history"] = self._history(history, moves)
         return section
 
-    def _history(self, history: History) -> dict[str, Any]:
-        known = next((table for other, table in self.histories if other == history), None)
-        if known is None:
-            known = self._new_history(history)
-            self.histories.append((history, known))
-        return known
+    def _history(self, history: History, moves: bool) -> dict[str, Any]:
+        for other, moved, table in self.histories:
+            if other == history and moved == moves:
+                return table
+        table = self._new_history(history, moves)
+        self.histories.append((history, moves, table))
+        return table
 
-    def _new_history(self, history: History) -> dict[str, Any]:
+    def _new_history(self, history: History, moves: bool) -> dict[str, Any]:
         if HISTORIES.get(history.kind) is not type(history):  # a function of the user's own
             if self.stage_times is None:
                 self.obstacles.append(
-                    "a load has a function of time as history, and the time step of the run, at "
-                    "which it would be sampled, is not known"
+                    f"a {'motion' if moves else 'load'} has a function of time as history, and "
+                    "the time step of the run, at which it would be sampled, is not known"
                 )
                 return {"kind": "user"}
-            try:
-                history = Table(self.stage_times, history(self.stage_times))
+            try:  # the velocity of a motion counts too, so it must not jump at every sample
+                history = Table(self.stage_times, history(self.stage_times), smooth=moves)
             except InputError as error:
                 self.obstacles.append(str(error))
                 return {"kind": "user"}
@@ -212,7 +230,7 @@ class _Writer:
 
 
 def _read(sections: Mapping[str, Any]) -> Case:
-    supports = [Fix(item["nodes"], item["axes"]) for item in sections["supports"]]
+    supports = [_support(item) for item in sections["supports"]]
     loads = [_load(item) for item in sections["loads"]]
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were given when the case was first made
@@ -220,10 +238,21 @@ def _read(sections: Mapping[str, Any]) -> Case:
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
 
 
-def _load(item: Mapping[str, Any]) -> Force | Gravity:
+def _support(item: Mapping[str, Any]) -> Support:
+    history = history_from(item["history"]) if "history" in item else None
+    if "base" in item:
+        return BaseMotion(item["base"], history, item["displacement"])
+    if "axis" in item:
+        return Impose(item["nodes"], item["axis"], item["displacement"], history)
+    return Fix(item["nodes"], item["axes"])
+
+
+def _load(item: Mapping[str, Any]) -> Force | Gravity | Actuate:
     history = history_from(item["history"]) if "history" in item else None
     if "gravity" in item:
         return Gravity(item["gravity"], history)
+    if "creases" in item:
+        return Actuate(item["creases"], item["angle"], history)
     return Force(item["nodes"], item["force"], history)
 
 
@@ -277,9 +306,7 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
     return value
 
 
-def _nodes(nodes: Any) -> Any:
-    return nodes if isinstance(nodes, str) else list(nodes)
-
-
 def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return list(value)
     return value.item() if isinstance(value, np.generic) else value

@@ -21,8 +21,7 @@ class Function(History):
     Parameters
     ----------
     function : callable
-        Takes a time (s) and gives a factor; one that takes an array of times and gives an array
-        of the same shape is called once for all times.
+        Takes a time (s), a float, and gives a factor.
 
     Notes
     -----
@@ -34,37 +33,15 @@ class Function(History):
 
     def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `History.factor`."""
-        factors = self._at_once(time) if time.ndim else None
-        if factors is None:
-            flat = [self._at(t) for t in time.ravel().tolist()]
-            factors = np.array(flat, dtype=np.float64).reshape(time.shape)
-        bad = np.argwhere(~np.isfinite(factors))
-        if bad.size:
-            place = tuple(bad[0])
+        flat = [self._at(t) for t in time.ravel().tolist()]
+        factors = np.array(flat, dtype=np.float64).reshape(time.shape)
+        bad = ~np.isfinite(factors)
+        if bad.any():
             raise InputError(
-                f"history {self._name} gives {factors[place]} at t = {time[place]} s: must be a "
+                f"history {self._name} gives {factors[bad][0]} at t = {time[bad][0]} s: must be a "
                 "finite number at every time of the run"
             )
         return factors
-
-    def _at_once(self, time: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        try:
-            factors = np.array(self.function(time.copy()), dtype=np.float64)
-        except Exception:  # a scalar function may fail on an array in any way of its own
-            return None
-        return factors if factors.shape == time.shape and self._agrees(time, factors) else None
-
-    def _agrees(self, time: NDArray[np.float64], factors: NDArray[np.float64]) -> bool:
-        """Whether the answer to an array is that to its entries; `if` in a function spoils it."""
-        entries = time.ravel()
-        for k in {0, entries.size // 2, entries.size - 1}:
-            try:
-                one = float(self.function(entries[k]))
-            except Exception:  # a function of arrays only
-                return True
-            if not np.isclose(one, factors.ravel()[k], rtol=1e-9, atol=1e-300, equal_nan=True):
-                return False
-        return True
 
     def _at(self, time: float) -> float:
         try:

@@ -1,59 +1,33 @@
-"""Histories: how a load varies in time, as a factor of time.
+"""The built-in histories but tables, and the registry of all.
 
-A history is called with times (s), a number or an array of any shape, and gives factors of the
-same shape. To add one: a frozen dataclass with `kind` and `factor`, and its line in `HISTORIES`.
+To add one: its formula in `waveforms`, a frozen dataclass with `kind`, `code` and `parameters`,
+and its line in `HISTORIES`.
 """
 
 from __future__ import annotations
 
 import math
-import os
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from foldyn.cases.csv_table import read_columns
-from foldyn.cases.values import number, numbers, show
+from foldyn.cases import waveforms
+from foldyn.cases.history import Formula, History, check_flag, set_field
+from foldyn.cases.table import Table
+from foldyn.cases.values import number
 from foldyn.errors import InputError
 
 
-class History(ABC):
-    """A factor of time.
-
-    A subclass computes `factor` for an array of times (s) and, as a frozen dataclass, compares
-    equal to another with the same arguments: loads with equal histories are summed.
-    """
-
-    kind: ClassVar[str]
-
-    @abstractmethod
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Factors at an array of times (s), of the same shape."""
-
-    def __call__(self, time: ArrayLike) -> Any:
-        """Factor at each time (s): a float for a number, else an array of the same shape."""
-        times = np.asarray(time, dtype=np.float64)
-        factors = self.factor(times)
-        return factors if times.ndim else float(factors)
-
-
 @dataclass(frozen=True)
-class Constant(History):
+class Constant(Formula):
     """Factor 1 at all times."""
 
     kind: ClassVar[str] = "constant"
-
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.ones_like(time)
+    code: ClassVar[int] = waveforms.CONSTANT
 
 
 @dataclass(frozen=True)
-class Pulse(History):
+class Pulse(Formula):
     """Factor 1 for 0 <= t < duration, else 0.
 
     Parameters
@@ -69,18 +43,23 @@ class Pulse(History):
 
     duration: float
     kind: ClassVar[str] = "pulse"
+    code: ClassVar[int] = waveforms.PULSE
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        _set(self, "duration", number("duration", self.duration, above=0.0))
+        set_field(self, "duration", number("duration", self.duration, above=0.0))
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.where((time >= 0.0) & (time < self.duration), 1.0, 0.0)
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
+        return (self.duration,)
+
+    def jumps(self) -> tuple[float, ...]:
+        """See `History.jumps`."""
+        return 0.0, self.duration
 
 
 @dataclass(frozen=True)
-class HalfSine(History):
+class HalfSine(Formula):
     """Factor sin(pi t / duration) for 0 <= t < duration, else 0.
 
     Parameters
@@ -91,41 +70,58 @@ class HalfSine(History):
 
     duration: float
     kind: ClassVar[str] = "half_sine"
+    code: ClassVar[int] = waveforms.HALF_SINE
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        _set(self, "duration", number("duration", self.duration, above=0.0))
+        set_field(self, "duration", number("duration", self.duration, above=0.0))
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        inside = (time >= 0.0) & (time < self.duration)
-        return np.where(inside, np.sin(np.pi * time / self.duration), 0.0)
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
+        return (self.duration,)
 
 
 @dataclass(frozen=True)
-class Ramp(History):
+class Ramp(Formula):
     """Factor t / duration, held at 0 before t = 0 and at 1 from t = duration on.
 
     Parameters
     ----------
     duration : float
         Length of the rise (s), greater than 0.
+    smooth : bool
+        Rise without a jump of the first two derivatives: x^3 (10 - 15 x + 6 x^2) with
+        x = t / duration. The smooth ramp starts and ends a motion without a jolt.
+
+    Examples
+    --------
+    >>> Ramp(duration=2.0)([0.5, 1.0, 3.0])
+    array([0.25, 0.5 , 1.  ])
+    >>> Ramp(duration=2.0, smooth=True)([0.5, 1.0, 3.0])
+    array([0.10351562, 0.5       , 1.        ])
     """
 
     duration: float
+    smooth: bool = False
     kind: ClassVar[str] = "ramp"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        _set(self, "duration", number("duration", self.duration, above=0.0))
+        set_field(self, "duration", number("duration", self.duration, above=0.0))
+        check_flag("smooth", self.smooth)
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.clip(time / self.duration, 0.0, 1.0)
+    @property
+    def code(self) -> int:  # type: ignore[override]
+        """Code of the compiled formula."""
+        return waveforms.SMOOTH_RAMP if self.smooth else waveforms.RAMP
+
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
+        return (self.duration,)
 
 
 @dataclass(frozen=True)
-class Step(History):
+class Step(Formula):
     """Factor 0 before `time`, 1 from then on.
 
     Parameters
@@ -136,18 +132,23 @@ class Step(History):
 
     time: float = 0.0
     kind: ClassVar[str] = "step"
+    code: ClassVar[int] = waveforms.STEP
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        _set(self, "time", number("time", self.time))
+        set_field(self, "time", number("time", self.time))
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.where(time >= self.time, 1.0, 0.0)
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
+        return (self.time,)
+
+    def jumps(self) -> tuple[float, ...]:
+        """See `History.jumps`."""
+        return (self.time,)
 
 
 @dataclass(frozen=True)
-class Harmonic(History):
+class Harmonic(Formula):
     """Factor sin(2 pi frequency t + phase).
 
     Parameters
@@ -161,19 +162,20 @@ class Harmonic(History):
     frequency: float
     phase: float = 0.0
     kind: ClassVar[str] = "harmonic"
+    code: ClassVar[int] = waveforms.HARMONIC
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        _set(self, "frequency", number("frequency", self.frequency, above=0.0))
-        _set(self, "phase", number("phase", self.phase))
+        set_field(self, "frequency", number("frequency", self.frequency, above=0.0))
+        set_field(self, "phase", number("phase", self.phase))
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.sin(2.0 * np.pi * self.frequency * time + math.radians(self.phase))
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
+        return self.frequency, math.radians(self.phase)
 
 
 @dataclass(frozen=True)
-class Chirp(History):
+class Chirp(Formula):
     """Factor sin(2 pi (start t + (end - start) t^2 / (2 duration)) + phase), 0 <= t < duration.
 
     The frequency goes from `start` to `end` in a straight line; before and after, the factor is 0.
@@ -199,116 +201,33 @@ class Chirp(History):
     duration: float
     phase: float = 0.0
     kind: ClassVar[str] = "chirp"
+    code: ClassVar[int] = waveforms.CHIRP
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         for name in ("start", "end"):
-            _set(self, name, number(name, getattr(self, name), least=0.0))
+            set_field(self, name, number(name, getattr(self, name), least=0.0))
         if self.start == self.end == 0.0:
             raise InputError(f"end = {self.end}: start or end must be greater than 0")
-        _set(self, "duration", number("duration", self.duration, above=0.0))
-        _set(self, "phase", number("phase", self.phase))
+        set_field(self, "duration", number("duration", self.duration, above=0.0))
+        set_field(self, "phase", number("phase", self.phase))
 
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        inside = (time >= 0.0) & (time < self.duration)
+    def parameters(self) -> tuple[float, ...]:
+        """See `History.parameters`."""
         slope = (self.end - self.start) / self.duration
-        turns = (self.start + 0.5 * slope * time) * time
-        return np.where(inside, np.sin(2.0 * np.pi * turns + math.radians(self.phase)), 0.0)
+        return self.start, slope, math.radians(self.phase), self.duration
 
-
-@dataclass(frozen=True, eq=False)
-class Table(History):
-    """Factors given at times, linear between them, the first and the last held outside.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Times (s), strictly increasing, n >= 2.
-    values : array_like, shape (n,)
-        Factors at these times.
-    """
-
-    times: Any
-    values: Any
-    kind: ClassVar[str] = "table"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        times, values = numbers("times", self.times), numbers("values", self.values)
-        if times.ndim != 1 or times.size < 2:
-            raise InputError(f"times = {show(self.times)}: must be a list of at least two numbers")
-        if values.shape != times.shape:
-            raise InputError(
-                f"values = {show(self.values)}: must be a list of as many numbers as times "
-                f"({times.size})"
-            )
-        back = np.flatnonzero(np.diff(times) <= 0.0)
-        if back.size:
-            i = int(back[0]) + 1
-            raise InputError(
-                f"times[{i}] = {times[i]}: must be greater than the time before it ({times[i - 1]})"
-            )
-        _set(self, "times", times)
-        _set(self, "values", values)
-
-    @classmethod
-    def from_csv(
-        cls,
-        path: str | os.PathLike[str],
-        time: str | None = None,
-        value: str | None = None,
-        unit: str = "-",
-    ) -> Table:
-        """Table from two columns of a CSV file, whose units are checked and converted.
-
-        The file is a text in UTF-8: a line with the names of the columns and their units in
-        brackets, as in ``time [ms],force [mN]``, then lines of numbers. Cells are separated by
-        tabs, semicolons or commas, whichever of these the header has first in this order. Empty
-        lines and lines that begin with # are skipped.
-
-        Parameters
-        ----------
-        path : path
-            The file.
-        time, value : str, optional
-            Headings of the two columns, with or without the unit; the first and the second column
-            by default. The unit of the time is s, ms, us or min.
-        unit : str
-            What the values become. The default "-" is a factor without unit, from a column with
-            [-], [1], [%] or no unit. With "N", "mN" or "kN" the column must be a force in one of
-            these and is converted: the load's vector is then a direction, (1, 0, 0) for a force
-            along x. Likewise "m", "cm", "mm" and "m/s2", "mm/s2".
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, a column is missing or ambiguous, a unit is missing, unknown
-            or of another quantity, a cell is not a finite number, times do not increase, or there
-            are fewer than two lines of numbers. The message names the file and the line.
-        """
-        return cls(*read_columns(path, time, value, unit))
-
-    def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """See `History.factor`."""
-        return np.asarray(np.interp(time, self.times, self.values))
-
-    def __eq__(self, other: object) -> bool:
-        """Tell whether the other is a table of the same numbers."""
-        if not isinstance(other, Table):
-            return NotImplemented
-        return np.array_equal(self.times, other.times) and np.array_equal(self.values, other.values)
-
-    def __hash__(self) -> int:
-        """Hash of the numbers."""
-        return hash((self.times.tobytes(), self.values.tobytes()))
+    def jumps(self) -> tuple[float, ...]:
+        """See `History.jumps`."""
+        ends = (0.0, math.nextafter(self.duration, 0.0))
+        return tuple(
+            time
+            for time, end in zip((0.0, self.duration), ends, strict=True)
+            if abs(self(end)) > 1e-9
+        )
 
 
 HISTORIES: Mapping[str, type[History]] = {
     history.kind: history
     for history in (Constant, Pulse, HalfSine, Ramp, Step, Harmonic, Chirp, Table)
 }
-
-
-def _set(instance: Any, name: str, value: Any) -> None:
-    object.__setattr__(instance, name, value)  # the dataclasses are frozen

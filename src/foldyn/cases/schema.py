@@ -20,9 +20,11 @@ from pydantic import (
     model_validator,
 )
 
+from foldyn.cases.actuation import check_angles, check_creases
 from foldyn.cases.decode import check_keys, history_from, law_from
 from foldyn.cases.histories import History
 from foldyn.cases.selection import check_nodes
+from foldyn.cases.supports import check_axis, check_per_node
 from foldyn.cases.values import choice, number, numbers, show, vector
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
@@ -33,7 +35,7 @@ from foldyn.structures.options import CALIBRATIONS, SCHEMES
 ANALYSES = ("dynamics",)
 LATER_ANALYSES = ("statics", "modes", "frf")
 AXES = ("x", "y", "z")
-METHODS = ("rk4", "central_difference")
+METHODS = ("rk4", "central_difference", "dormand_prince")
 """Integrators that a case file may name."""
 
 
@@ -115,6 +117,12 @@ def _every(value: Any) -> int | float:
     return number("", value, above=0.0)
 
 
+def _result_file(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc")
+    return value
+
+
 def _history(value: Any, info: ValidationInfo) -> History:
     return history_from(value, (info.context or {}).get("folder"))
 
@@ -133,6 +141,8 @@ def _analysis(value: Any) -> Any:
 
 Positive = Annotated[float, Field(gt=0)]
 Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
+Creases = Annotated[Any, PlainValidator(lambda value: check_creases("", value))]
+Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_creases)]
@@ -172,33 +182,116 @@ class DampingSection(Section):
 
 
 class SupportSection(Section):
-    """One of [[supports]]."""
+    """One of [[supports]]: nodes held, nodes moved as prescribed, or a motion of the base."""
 
-    nodes: Nodes
+    nodes: Nodes = None
     axes: str = "xyz"
+    axis: Any = None
+    displacement: Any = None
+    base: Annotated[Any, PlainValidator(lambda value: check_axis("", value))] = None
+    history: HistorySpec = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        if "base" in given:
+            self._check_base(given)
+        elif not given:
+            raise InputError(
+                ": give nodes and axes (held), nodes, axis and displacement (moved), or base and "
+                "history (a base that moves)"
+            )
+        elif "nodes" not in given:
+            raise InputError(".nodes: missing; give its value")
+        elif given & {"axis", "displacement", "history"}:
+            self._check_impose(given)
+        return self
+
+    def _check_base(self, given: set[str]) -> None:
+        for key in ("nodes", "axes", "axis"):
+            if key in given:
+                raise InputError(
+                    f".base: moves all nodes that other [[supports]] hold along {self.base}; "
+                    f"leave out {key}, and give nodes their own [[supports]]"
+                )
+        if "history" not in given:
+            raise InputError(".history: missing; give the motion of the base over time")
+        if "displacement" in given:
+            self.displacement = number(".displacement", self.displacement)
+
+    def _check_impose(self, given: set[str]) -> None:
+        if "axes" in given:
+            moved = next(key for key in ("displacement", "history", "axis") if key in given)
+            raise InputError(
+                f".axes: holds nodes at rest, but {moved} moves them; give either axes alone, or "
+                'axis, as in axis = "x", with displacement'
+            )
+        if "axis" not in given:
+            raise InputError('.axis: missing; give the axis of the displacement, as in axis = "x"')
+        if "displacement" not in given:
+            raise InputError(
+                ".displacement: missing; give it (m), or write axes instead of axis to hold nodes"
+            )
+        check_axis(".axis", self.axis)
+        self.displacement = check_per_node(".displacement", self.displacement, self.nodes)
 
 
 class LoadSection(Section):
-    """One of [[loads]]: a force on nodes, or gravity."""
+    """One of [[loads]]: a force on nodes, gravity, or an actuation of creases."""
 
     nodes: Nodes = None
-    force: Annotated[Any, PlainValidator(lambda value: vector("", value))] = None
+    force: Vector = None
     gravity: Annotated[Any, PlainValidator(lambda value: vector("", value, nonzero=True))] = None
+    creases: Creases = None
+    angle: Annotated[Any, PlainValidator(lambda value: check_angles("", value))] = None
     history: HistorySpec = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         given = self.model_fields_set - {"history"}
-        if "gravity" in given and len(given) > 1:
-            raise InputError(
-                ".gravity: acts on the whole structure; leave out nodes and force, and give a "
-                "force its own [[loads]]"
-            )
         if not given:
-            raise InputError(": give nodes and force, or gravity")
-        for key in ("nodes", "force"):
-            if "gravity" not in given and key not in given:
+            raise InputError(": give nodes and force, or gravity, or creases and angle")
+        if "gravity" in given:
+            others = given - {"gravity"}
+            what = "creases and angle" if others & {"creases", "angle"} else "nodes and force"
+            if others:
+                raise InputError(
+                    f".gravity: acts on the whole structure; leave out {what}, and give these "
+                    "their own [[loads]]"
+                )
+            return self
+        actuation = given & {"creases", "angle"}
+        if actuation and given & {"nodes", "force"}:
+            raise InputError(
+                f".{max(actuation)}: creases and angle are a load of their own; leave out nodes "
+                "and force, and give these their own [[loads]]"
+            )
+        for key in ("creases", "angle") if actuation else ("nodes", "force"):
+            if key not in given:
                 raise InputError(f".{key}: missing; give its value")
+        return self
+
+
+class InitialSection(Section):
+    """[initial]: the rigid motion or the stored state that a motion starts from."""
+
+    velocity: Vector = None
+    spin: Vector = None
+    file: Annotated[Any, PlainValidator(_result_file)] = None
+    at: int = -1
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        rigid = sorted(given & {"velocity", "spin"})
+        if not given:
+            raise InputError(": give velocity or spin or both, or file (a result)")
+        if "file" in given and rigid:
+            raise InputError(
+                f".file: holds the velocities too; leave out {' and '.join(reversed(rigid))}"
+            )
+        if "at" in given and "file" not in given:
+            raise InputError(".at: is the number of a sample of a result; give file too")
         return self
 
 
@@ -210,6 +303,8 @@ class DynamicsSection(Section):
     method: Annotated[str, PlainValidator(lambda value: choice("", value, METHODS))] = "rk4"
     dt: Positive | None = None
     force: bool = False
+    tolerance: Positive | None = None
+    start: float = 0.0
 
 
 class OutputSection(Section):
@@ -231,5 +326,6 @@ class CaseSchema(Section):
     damping: DampingSection = DampingSection()
     supports: list[SupportSection] = []
     loads: list[LoadSection] = []
+    initial: InitialSection | None = None
     analysis: Annotated[DynamicsSection, BeforeValidator(_analysis)]
     output: OutputSection = OutputSection()

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.values import show
+from foldyn.cases.values import indices, show
 from foldyn.errors import InputError
 
 TOLERANCE = 1e-9
@@ -110,20 +110,7 @@ def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
         if not nodes.strip():
             raise InputError(f'{field} = "{nodes}": selects nothing; {_REMEDY}')
         return nodes
-    array = np.atleast_1d(np.asarray(nodes, dtype=object))
-    if array.ndim != 1 or array.size == 0:
-        raise InputError(
-            f"{field} = {show(nodes)}: must be node numbers, as in [0, 1], or a selection such as "
-            '"xmin"'
-        )
-    for item in array:
-        if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
-            raise InputError(f"{field} = {show(nodes)}: {show(item)} is not a node number")
-    numbers = tuple(int(item) for item in array)
-    if len(set(numbers)) < len(numbers):
-        twice = next(item for item in numbers if numbers.count(item) > 1)
-        raise InputError(f"{field} = {show(nodes)}: node {twice} is listed twice")
-    return numbers
+    return indices(field, nodes, "node", 'or a selection such as "xmin"')
 
 
 class _Selector:

@@ -1,13 +1,18 @@
-"""Supports: nodes held at rest."""
+"""Supports: nodes held at rest, nodes moved as prescribed, and a base that moves."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from foldyn.cases.function import as_history
+from foldyn.cases.histories import History
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.values import show
+from foldyn.cases.values import number, number_or_list, show
 from foldyn.errors import InputError
+
+AXES = "xyz"
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,96 @@ class Fix:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
         axes = self.axes
-        if not isinstance(axes, str) or not axes or set(axes) - set("xyz"):
+        if not isinstance(axes, str) or not axes or set(axes) - set(AXES):
             raise InputError(f'axes = {show(axes)}: must be letters of "xyz", as in "xz"')
         if len(set(axes)) < len(axes):
             raise InputError(f"axes = {show(axes)}: an axis is listed twice")
+
+
+@dataclass(frozen=True)
+class Impose:
+    """Nodes moved along one axis as prescribed, whatever force that takes.
+
+    The displacement from the rest position is the value times the factor of the history.
+
+    Parameters
+    ----------
+    nodes : int, sequence of int, or str
+        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+    axis : {"x", "y", "z"}
+        The axis; give one `Impose` for each.
+    value : float or sequence of float
+        Displacement (m) at factor 1 of all these nodes, or of each of them in the order of
+        `nodes`, which then are numbers.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    nodes: int | str | Sequence[int]
+    axis: str
+    value: float | Sequence[float]
+    history: History | Callable[[Any], Any] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        object.__setattr__(self, "axis", check_axis("axis", self.axis))
+        object.__setattr__(self, "value", check_per_node("value", self.value, self.nodes))
+        object.__setattr__(self, "history", as_history(self.history))
+
+
+@dataclass(frozen=True)
+class BaseMotion:
+    """The base moves along one axis: all that `Fix` holds along it moves together.
+
+    Each of these nodes moves by the value times the factor of the history from where it stands at
+    the start of the motion. Several base motions along an axis add up; nodes of an `Impose` follow
+    their own displacement.
+
+    Parameters
+    ----------
+    axis : {"x", "y", "z"}
+        The axis; give one `BaseMotion` for each.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    value : float
+        Displacement (m) at factor 1.
+    """
+
+    axis: str
+    history: History | Callable[[Any], Any] | None = None
+    value: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "axis", check_axis("axis", self.axis))
+        object.__setattr__(self, "history", as_history(self.history))
+        object.__setattr__(self, "value", number("value", self.value))
+
+
+Support = Fix | Impose | BaseMotion
+
+
+def check_axis(name: str, axis: Any) -> str:
+    """Return the name of one axis."""
+    if not isinstance(axis, str) or axis not in tuple(AXES):
+        raise InputError(f'{name} = {show(axis)}: must be one of "x", "y" and "z"')
+    return axis
+
+
+def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ...]:
+    """Return one finite number for all the checked `nodes`, or a tuple of one for each."""
+    checked = number_or_list(name, value, "node")
+    if not isinstance(checked, tuple):
+        return checked
+    if isinstance(nodes, str):
+        raise InputError(
+            f"{name} = {show(value)}: one displacement per node needs node numbers, but nodes is "
+            f'the selection "{nodes}"; give one number, or the nodes by number'
+        )
+    if len(checked) != len(nodes):
+        raise InputError(
+            f"{name} = {show(value)}: {len(checked)} values for {len(nodes)} nodes; give one, or "
+            "one for each"
+        )
+    return checked

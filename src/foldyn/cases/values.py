@@ -101,6 +101,49 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
     return result
 
 
+def number_or_list(name: str, value: Any, what: str) -> float | tuple[float, ...]:
+    """Return `value` as a finite float, or a list of them as a tuple.
+
+    Parameters
+    ----------
+    what : str
+        What the list has one number for, for messages: "node".
+    """
+    if not isinstance(value, list | tuple | np.ndarray):
+        return number(name, value)
+    array = numbers(name, value)
+    if array.ndim == 0:
+        return float(array)
+    if array.ndim > 1 or not array.size:
+        raise InputError(f"{name} = {show(value)}: must be a number, or a list of one per {what}")
+    return tuple(array.tolist())
+
+
+def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ...]:
+    """Return `value`, a whole number or a list of them, as a tuple of distinct whole numbers.
+
+    Parameters
+    ----------
+    what : str
+        What the numbers count, for messages: "node".
+    alternative : str
+        What may be given instead of numbers, for messages.
+    """
+    array = np.atleast_1d(np.asarray(value, dtype=object))
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(
+            f"{name} = {show(value)}: must be {what} numbers, as in [0, 1], {alternative}"
+        )
+    for item in array:
+        if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
+            raise InputError(f"{name} = {show(value)}: {show(item)} is not a {what} number")
+    chosen = tuple(int(item) for item in array)
+    if len(set(chosen)) < len(chosen):
+        twice = next(item for item in chosen if chosen.count(item) > 1)
+        raise InputError(f"{name} = {show(value)}: {what} {twice} is listed twice")
+    return chosen
+
+
 def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, float, float]:
     """Return `value` as three finite floats, if asked not all of them zero."""
     array = numbers(name, value)

@@ -76,18 +76,20 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
 
 def _motions(case_file: CaseFile, figures: bool) -> dict[str, Motion]:
     """Motions by mass rule, checked and ready to run."""
-    from foldyn.dynamics import prepare
+    from foldyn.dynamics import initial_state, prepare
     from foldyn.dynamics.timing import check_memory
+    from foldyn.results import load
     from foldyn.signals.spectrum import MINIMUM_SAMPLES
 
     motions: dict[str, Motion] = {}
     for rule in case_file.masses:
         place = _place(case_file, rule)
+        start = case_file.initial(rule, read=lambda path, at: initial_state(load(path), at))
         try:
-            motion = prepare(case_file.case(rule), **case_file.analysis.arguments)
+            motion = prepare(case_file.case(rule), initial=start, **case_file.analysis.arguments)
         except InputError as error:
             raise InputError(place + _with_key(str(error))) from None
-        samples = motion.plan.samples
+        samples = motion.expected_samples
         if figures and samples < MINIMUM_SAMPLES:
             raise InputError(
                 f"{place}output.every: gives {samples} samples, spectra need {MINIMUM_SAMPLES}: "
@@ -97,7 +99,7 @@ def _motions(case_file: CaseFile, figures: bool) -> dict[str, Motion]:
     case = case_file.case()
     try:  # all of them together
         check_memory(
-            sum(motion.plan.samples for motion in motions.values()),
+            sum(motion.expected_samples for motion in motions.values()),
             len(case.structure.nodes),
             len(case.supported_dofs),
         )

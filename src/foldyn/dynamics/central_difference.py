@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from foldyn.dynamics.course import observe
 from foldyn.dynamics.outcome import DONE, NOT_FINITE
-from foldyn.dynamics.system import acceleration, observe
+from foldyn.dynamics.system import acceleration
 from foldyn.materials.compiled import kernel
+from foldyn.mechanics.flat import flat
 
 ORDER = 2
-STAGES = np.array([0.0])
 
 
 def growth(omega, damping, dt):
@@ -38,51 +39,44 @@ def growth(omega, damping, dt):
 
 
 @kernel
-def advance(
-    model, system, mass, u, v, carry, tally, dt, first, last, every, factors, angle,
-    displacement, velocity, reaction, energy, work, s,
-):  # fmt: skip
-    """Advance u, v (n, 3) from step `first` to step `last`, in place; see `rk4.advance`.
+def advance(model, system, mass, course, plan, out, work, s, stretch):
+    """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    carry (n, 3) is the acceleration at step `first`, kept from one stretch to the next; at step
-    0 it is computed.
+    `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
+    the powers beside the energies.
     """
-    n = u.shape[0]
-    ahead = np.empty_like(u)
-    offset = (first + every - 1) // every
-    power_in, power_out = tally[2], tally[3]
-    for step in range(first, last + 1):
-        if step == 0:
-            power_in, power_out = acceleration(
-                model, system, mass, u, v, factors[0, 0], carry, work, s
-            )
-        elif step > first:
-            before_in, before_out = power_in, power_out
-            power_in, power_out = acceleration(
-                model, system, mass, u, ahead, factors[step - first, 0], carry, work, s
-            )
-            tally[0] += 0.5 * dt * (before_in + power_in)
-            tally[1] += 0.5 * dt * (before_out + power_out)
-            total = 0.0
-            for i in range(n):
-                for c in range(3):
-                    v[i, c] += 0.5 * dt * carry[i, c]  # the kick that ends the step
-                    total += v[i, c]
-            if not np.isfinite(total):
-                return NOT_FINITE, step, -1
-        if step == 0 or step > first:  # else the last stretch has done this
-            found, hinge = observe(
-                model, system, mass, u, v, carry, tally, step, every, offset, angle,
-                displacement, velocity, reaction, energy, work, s,
-            )  # fmt: skip
-            if found != DONE:
-                return found, step, hinge
-        if step == last:
-            break
-        for i in range(n):
-            for c in range(3):
-                v[i, c] += 0.5 * dt * carry[i, c]
-                u[i, c] += dt * v[i, c]
-                ahead[i, c] = v[i, c] + 0.5 * dt * carry[i, c]
-    tally[2], tally[3] = power_in, power_out
-    return DONE, last, -1
+    dt, tally, a = plan.dt, course.tally, course.carry
+    ahead = np.empty_like(course.v)
+    u, v, fa, fahead = flat(course.u), flat(course.v), flat(a), flat(ahead)
+    last = min(course.count[0] + stretch, plan.steps)
+    if course.count[0] == 0:
+        tally[2], tally[3] = acceleration(
+            model, system, mass, course.u, course.v, plan.start, a, work, s
+        )
+        found, hinge = observe(model, system, mass, course, a, plan.start, plan, out, work, s)
+        if found != DONE:
+            return found, hinge
+    while course.count[0] < last:
+        for i in range(u.size):
+            v[i] += 0.5 * dt * fa[i]
+            u[i] += dt * v[i]
+            fahead[i] = v[i] + 0.5 * dt * fa[i]
+        course.count[0] += 1
+        course.count[3] += 1
+        course.clock[0] = plan.start + course.count[0] * dt
+        power_in, power_out = acceleration(
+            model, system, mass, course.u, ahead, course.clock[0], a, work, s
+        )
+        tally[0] += 0.5 * dt * (tally[2] + power_in)
+        tally[1] += 0.5 * dt * (tally[3] + power_out)
+        tally[2], tally[3] = power_in, power_out
+        wrong = 0
+        for i in range(u.size):
+            v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
+            wrong += not abs(v[i]) < np.inf
+        if wrong > 0:
+            return NOT_FINITE, -1
+        found, hinge = observe(model, system, mass, course, a, course.clock[0], plan, out, work, s)
+        if found != DONE:
+            return found, hinge
+    return DONE, -1

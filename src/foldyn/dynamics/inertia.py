@@ -41,24 +41,22 @@ class Inertia(NamedTuple):
     pivot: NDArray  # 1 / diagonal of U
 
 
-def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
-    """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3).
-
-    Raises
-    ------
-    InputError
-        A free node has no mass.
-    """
-    mass = sparse.csr_array(mass)
-    mass.sort_indices()
-    diagonal = mass.diagonal()
-    massless = np.flatnonzero((diagonal <= 0.0) & ~fixed.all(axis=1))
+def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
+    """Refuse a free node without mass."""
+    massless = np.flatnonzero((mass.diagonal() <= 0.0) & ~fixed.all(axis=1))
     if len(massless):
         shown = ", ".join(map(str, massless[:8])) + (", ..." if len(massless) > 8 else "")
         raise InputError(
             f"node {shown} is free but has no mass: fix it along x, y and z, attach a panel to "
             "it, or choose a mass rule that gives it mass"
         )
+
+
+def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
+    """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3)."""
+    mass = sparse.csr_array(mass)
+    mass.sort_indices()
+    diagonal = mass.diagonal()
     lumped = sparse.csr_array(mass - sparse.diags_array(diagonal)).count_nonzero() == 0
     if lumped:
         inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])

@@ -7,37 +7,44 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from numpy.typing import NDArray
-
-from foldyn.dynamics import central_difference, rk4
+from foldyn.dynamics import central_difference, dormand_prince, rk4
 from foldyn.dynamics.stability import Growth
 from foldyn.errors import InputError
 
 
 class Method(NamedTuple):
-    """An explicit integrator with a fixed step.
+    """An explicit integrator.
 
-    `advance` is a compiled function with the arguments of `rk4.advance`, `stages` the abscissas
-    at which it wants the factors of the histories, `growth(omega, damping, dt)` the largest
-    factor by which a step multiplies a free vibration, and `order` what tests hold it to.
+    `advance` is a compiled function with the arguments of `rk4.advance`, `growth(omega, damping,
+    dt)` the largest factor by which a step multiplies a free vibration, `order` what tests hold it
+    to, and `adaptive` whether it chooses its steps by their error.
     """
 
     name: str
     order: int
-    stages: NDArray
     growth: Growth
-    advance: Callable[..., tuple[int, int, int]]
+    advance: Callable[..., tuple[int, int]]
+    adaptive: bool = False
 
 
 METHODS: Mapping[str, Method] = {
-    "rk4": Method("rk4", rk4.ORDER, rk4.STAGES, rk4.growth, rk4.advance),
-    "central_difference": Method(
-        "central_difference",
-        central_difference.ORDER,
-        central_difference.STAGES,
-        central_difference.growth,
-        central_difference.advance,
-    ),
+    method.name: method
+    for method in (
+        Method("rk4", rk4.ORDER, rk4.growth, rk4.advance),
+        Method(
+            "central_difference",
+            central_difference.ORDER,
+            central_difference.growth,
+            central_difference.advance,
+        ),
+        Method(
+            "dormand_prince",
+            dormand_prince.ORDER,
+            dormand_prince.growth,
+            dormand_prince.advance,
+            adaptive=True,
+        ),
+    )
 }
 
 

@@ -1,40 +1,32 @@
-"""`simulate`: the motion of a case from an initial state, and what makes it ready to run."""
+"""`Motion`: a motion that is ready to be computed, in stretches of compiled steps."""
 
 from __future__ import annotations
 
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Rayleigh, State
+from foldyn.cases import Case
 from foldyn.dynamics import outcome
 from foldyn.dynamics.audit import AUDITED, energy_error, energy_scale
-from foldyn.dynamics.critical_step import MARGIN, critical_step, largest_frequency
-from foldyn.dynamics.methods import Method, method_of
+from foldyn.dynamics.course import Course, Plan, Samples, samples
+from foldyn.dynamics.critical_step import MARGIN, largest_frequency
+from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.stability import is_stable, stability_limit
-from foldyn.dynamics.system import pack, scratch
-from foldyn.dynamics.timing import Schedule, check_memory, positive, schedule
-from foldyn.errors import (
-    FoldynWarning,
-    InputError,
-    InstabilityError,
-    MotionInterrupted,
-    PenetrationError,
-)
-from foldyn.mechanics import angles, workspace
+from foldyn.dynamics.system import Packed, place, scratch
+from foldyn.dynamics.timing import expected_samples
+from foldyn.errors import FoldynWarning, InstabilityError, MotionInterrupted, PenetrationError
+from foldyn.mechanics import workspace
 from foldyn.results import trajectory_dataset
 
 if TYPE_CHECKING:
     import xarray
 
-DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
-MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
@@ -42,233 +34,92 @@ INACCURATE = 1e-2  # relative energy error above which the user is warned
 EXPLODED = 1.0  # and above which the motion is stopped
 
 
-def simulate(
-    case: Case,
-    duration: float,
-    method: str = "rk4",
-    dt: float | None = None,
-    every: int | float = 1,
-    initial: State | None = None,
-    force: bool = False,
-    progress: bool | Reporter | None = None,
-) -> xarray.Dataset:
-    """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
-
-    Parameters
-    ----------
-    case : Case
-    duration : float
-        Simulated time (s). The last step is the last that does not go beyond it.
-    method : {"rk4", "central_difference"}
-        Integrator.
-    dt : float, optional
-        Time step (s). Without it, half the critical step, shortened to divide `every`.
-    every : int or float, default 1
-        Sampling interval: an int counts steps, a float is seconds.
-    initial : State, optional
-        Displacement and velocity at t = 0; rest by default. Supported nodes stay where it
-        puts them.
-    force : bool, default False
-        Integrate even with a step above the critical one.
-    progress : bool or callable, optional
-        True shows a bar; a callable gets a `Progress` several times a second.
-
-    Returns
-    -------
-    xarray.Dataset
-        `displacement` (m) and `velocity` (m/s) with dimensions time, node, axis; `reaction` (N)
-        at supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`,
-        `strain_bends`, `dissipated`, `work`. First sample at t = 0. Attributes hold the
-        statistics of the run; the case travels along (`foldyn.case_of`).
-
-    Raises
-    ------
-    InputError
-        An argument out of range, a step above the critical one, a free node without mass.
-    InstabilityError, PenetrationError
-        The motion grew without bound or became NaN; panel passed through panel. What was
-        computed until then is in the exception's `partial`.
-
-    Warns
-    -----
-    FoldynWarning
-        The energy balance is off by more than 1 % of the energies at play.
-
-    Notes
-    -----
-    Histories are evaluated at every stage time t_n + c dt with t_n = n dt. Damping is
-    C = alpha M + beta K0, K0 the tangent at rest.
-    """
-    return prepare(case, duration, method, dt, every, initial, force).run(progress)
-
-
-def prepare(
-    case: Case,
-    duration: float,
-    method: str = "rk4",
-    dt: float | None = None,
-    every: int | float = 1,
-    initial: State | None = None,
-    force: bool = False,
-) -> Motion:
-    """Check everything that `simulate` checks and choose the step, without computing a motion.
-
-    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`.
-    """
-    if not isinstance(case, Case):
-        raise InputError(f"case: got {type(case).__name__}, give a Case")
-    integrator = method_of(method)
-    positive("duration", duration)
-    if not isinstance(force, bool):
-        raise InputError(f"force = {force!r}: give True or False")
-    if not len(case.free_dofs):
-        raise InputError(
-            "supports: hold every node along x, y and z, so that nothing can move: free one"
-        )
-    start = _start(case, initial)
-    packed = pack(case)
-    critical = critical_step(case, method, start[0])
-    plan = schedule(duration, dt, every, critical)
-    _warn_of_damping(case, method, start[0], critical)
-    if not force and plan.dt > critical:
-        raise InputError(
-            f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
-            "one or leave dt out (force = true integrates all the same)"
-        )
-    check_memory(plan.samples, len(start[0]), len(case.supported_dofs))
-    if plan.steps > MANY_STEPS:
-        warnings.warn(
-            f"{plan.steps:.3g} steps of {plan.dt:.3g} s are a long way (critical step "
-            f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
-            FoldynWarning,
-            stacklevel=3,
-        )
-    return Motion(case, integrator, plan, critical, force, start, packed)
-
-
-def _start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
-    """Displacement and velocity at t = 0, checked."""
-    if initial is not None and not isinstance(initial, State):
-        raise InputError(
-            f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
-            "velocity=...) or fd.initial_state(result)"
-        )
-    shape = case.structure.nodes.shape
-    pair = []
-    for name in ("displacement", "velocity"):
-        value = getattr(initial, name, None)
-        array = np.zeros(shape) if value is None else np.array(value, float)
-        if array.shape != shape:
-            raise InputError(f"initial: {name} of shape {array.shape}: the case has {shape}")
-        pair.append(np.ascontiguousarray(array))
-    if (pair[1][case.fixed] != 0.0).any():
-        node = int(np.argwhere((pair[1] != 0.0) & case.fixed)[0][0])
-        raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
-    return pair[0], pair[1]
-
-
-def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
-    """Say so where stiffness-proportional damping makes an explicit step very small."""
-    if case.damping.beta == 0.0:
-        return
-    without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
-    if without > DAMPING_COST * critical:
-        warnings.warn(
-            f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "
-            f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
-            "resolve the damping of the fastest vibration; alpha costs nothing",
-            FoldynWarning,
-            stacklevel=4,
-        )
-
-
 class Motion:
     """A motion that is ready to be computed; made by `prepare`."""
 
     def __init__(
-        self, case: Case, method: Method, plan: Schedule, critical: float, force: bool,
-        start: tuple[NDArray, NDArray], packed: Any,
+        self, case: Case, method: Method, plan: Plan, critical: float, force: bool,
+        begin: Callable[[], Course], packed: Packed,
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force = critical, force
-        self._start, self._packed = start, packed
-        self.stored = 0
+        self._begin, self._packed = begin, packed
+        self._course, self._out = begin(), self._room(0)
+        self.at_rest = not (self._course.u.any() or self._course.v.any())
         self.seconds = 0.0
+
+    @property
+    def expected_samples(self) -> int:
+        """Number of samples; where steps vary and are counted, the least."""
+        return expected_samples(self.plan)
+
+    @property
+    def stored(self) -> int:
+        """Samples computed so far."""
+        return int(self._course.count[1])
 
     def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """Integrate the motion; see `simulate`."""
-        n, samples = len(self.case.structure.nodes), self.plan.samples
-        self.displacement = np.empty((samples, n, 3))
-        self.velocity = np.empty((samples, n, 3))
-        self.reaction = np.empty((samples, len(self.case.supported_dofs)))
-        self.energy = np.empty((samples, len(AUDITED)))
-        self.stored = 0
+        self._course, self._out = self._begin(), self._room(self.expected_samples)
         self._integrate(*reporter(progress))
         return self._finish()
 
+    def _room(self, count: int) -> Samples:
+        nodes = len(self.case.structure.nodes)
+        return samples(count, nodes, len(self.case.supported_dofs), len(AUDITED))
+
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
-        """Advance in stretches between which histories are tabulated and progress is told."""
-        model, system, mass = self._packed
-        u, v = self._start[0].copy(), self._start[1].copy()
-        plan, work, memory = self.plan, workspace(model), scratch(len(u))
-        tally, carry = np.zeros(4), np.zeros_like(u)
-        angle = angles(model.rest + u, model.hinges)
+        """Advance in stretches, between which progress is told and the motion is audited."""
+        model, system, mass, callbacks = self._packed
+        plan, course = self.plan, self._course
+        work, memory = workspace(model), scratch(len(course.u), len(system.waves.code))
         recheck = max(1000, -(-plan.steps // RECHECKS))
-        first, length = 0, 0  # the first call only records t = 0: it may have to compile
+        length = 0  # the first call only records the start: it may have to compile
         began = None
         try:
             while True:
-                last = min(first + length, plan.steps, (first // recheck + 1) * recheck)
-                row = -(-first // plan.every)
-                rows = slice(row, last // plan.every + 1)
+                done = int(course.count[0])
+                stretch = min(length, recheck - done % recheck)
                 clock = time.perf_counter()
-                code, step, hinge = self.method.advance(
-                    model, system, mass, u, v, carry, tally, plan.dt, first, last, plan.every,
-                    self._factors(first, last), angle, self.displacement[rows],
-                    self.velocity[rows], self.reaction[rows], self.energy[rows], work, memory,
-                )  # fmt: skip
+                code, hinge = self.method.advance(
+                    model, system, mass, course, plan, self._out, work, memory, stretch
+                )
                 clock = time.perf_counter() - clock
                 began = time.perf_counter() if began is None else began
                 self.seconds = time.perf_counter() - began
-                self.stored = max(self.stored, self._complete(step, code))
-                if code != outcome.DONE:
-                    self._fail(code, step, hinge, model)
-                report(Progress(last * plan.dt, plan.steps * plan.dt, last, self._audit()))
-                if last == plan.steps:
+                if callbacks.error is not None:
+                    self._raise(callbacks.error)
+                if code == outcome.FULL:
+                    self._out = _enlarged(self._out)
+                elif code != outcome.DONE:
+                    self._fail(code, hinge)
+                step, now = int(course.count[0]), float(course.clock[0])
+                ended = step == plan.steps if plan.steps else now >= plan.end
+                report(Progress(now - plan.start, plan.end - plan.start, step, self._audit()))
+                if ended:
                     return
-                if last and last % recheck == 0 and not self.force:
-                    self._recheck(last, u)
-                first = last
+                if plan.steps and step % recheck == 0 and step > done and not self.force:
+                    place(system, course.u, course.v, now, memory)
+                    moved = len(system.moved.dof) > 0
+                    self._recheck(memory.displacement if moved else course.u)
                 growth = REPORT_EVERY / max(clock, 1e-9)
                 length = max(CHUNK, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:
             raise MotionInterrupted(
-                f"interrupted at t = {first * plan.dt:.6g} s", self._dataset()
+                f"interrupted at t = {course.clock[0]:.6g} s", self._dataset()
             ) from None
         finally:
             close()
 
-    def _factors(self, first: int, last: int) -> NDArray:
-        """Factors (steps, stages, histories) at t_n + c dt, t_n = n dt."""
-        start = np.arange(first, last + 1) * self.plan.dt
-        times = start[:, None] + self.method.stages[None, :] * self.plan.dt
-        histories = [history for _, history in self.case.load_terms]
-        try:
-            columns = [np.asarray(history(times), float) for history in histories]
-        except InputError as error:  # a callable that fails at some time during the motion
+    def _raise(self, error: BaseException) -> None:
+        """Raise what a function of time of the user's has raised."""
+        if isinstance(error, Exception):
             raise InstabilityError(str(error), self._dataset()) from error
-        return np.stack(columns, -1) if columns else np.zeros((*times.shape, 0))
-
-    def _complete(self, step: int, code: int) -> int:
-        """Samples that are known to be good after a stretch that ended at `step`."""
-        done = step // self.plan.every + 1
-        if code != outcome.DONE and step % self.plan.every == 0:
-            done -= 1
-        return done
+        raise error
 
     def _audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        energy = self.energy[: self.stored]
+        energy = self._out.energy[: self.stored]
         error, scale = energy_error(energy), energy_scale(energy)
         stiffness = self.case.structure.model.bar_stiffness
         negligible = 1e-24 * float((stiffness * self.case.structure.bar_length.max() ** 2).sum())
@@ -278,31 +129,46 @@ class Motion:
         worst = float(relative.max())
         if worst > EXPLODED:
             bad = int(np.argmax(relative > EXPLODED))
-            self.stored = bad
+            self._course.count[1] = bad
             raise InstabilityError(
-                f"the motion is unstable: at t = {bad * self.plan.every * self.plan.dt:.6g} s the "
-                f"energy balance is off by more than the energies at play; use a step below "
-                f"{self.plan.dt:.3g} s (critical at the start: {self.critical:.3g} s)",
+                f"the motion is unstable: at t = {self._out.time[bad]:.6g} s the energy balance is "
+                f"off by more than the energies at play; {self._smaller_step()}",
                 self._dataset(),
             )
         return worst
 
-    def _recheck(self, step: int, u: NDArray) -> None:
+    def _smaller_step(self) -> str:
+        if self.method.adaptive:
+            return f"use a tolerance below {self.plan.tolerance:.3g}"
+        return (
+            f"use a step below {self.plan.dt:.3g} s (critical at the start: {self.critical:.3g} s)"
+        )
+
+    def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
         damping = self.case.damping.alpha, self.case.damping.beta
         omega = largest_frequency(self.case, u)
         if not is_stable(self.method.growth, omega, *damping, self.plan.dt):
             limit = stability_limit(self.method.growth, omega, *damping)
             raise InstabilityError(
-                f"the structure has stiffened: at t = {step * self.plan.dt:.6g} s the step of "
+                f"the structure has stiffened: at t = {self._course.clock[0]:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
                 f"dt = {0.5 * MARGIN * limit:.3g} or smaller",
                 self._dataset(),
             )
 
-    def _fail(self, code: int, step: int, hinge: int, model: Any) -> None:
-        moment = f"t = {step * self.plan.dt:.6g} s (step {step})"
-        if self.plan.dt > self.critical:
+    def _fail(self, code: int, hinge: int) -> None:
+        model, plan, course = self._packed.model, self.plan, self._course
+        moment = f"t = {course.clock[0]:.6g} s (step {course.count[0]})"
+        turned = np.flatnonzero(np.isnan(model.hinge_rest))
+        if len(turned):
+            j, k = model.hinges[turned[0], :2].tolist()
+            raise InstabilityError(
+                f"at {moment} the rest dihedral of the crease between nodes {j} and {k} leaves 0 "
+                "to 360 degrees: change the angle or the history that actuates it",
+                self._dataset(),
+            )
+        if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
         if code == outcome.PENETRATION:
             j, k, i, l = model.hinges[hinge].tolist()  # noqa: E741
@@ -312,38 +178,61 @@ class Motion:
                 "smaller step keeps panels apart",
                 self._dataset(),
             )
+        if code == outcome.STUCK:
+            raise InstabilityError(
+                f"at {moment} the error asks for a step of {course.clock[1]:.3g} s: a load jumps "
+                "too often, or the motion is too violent; raise the tolerance, or use rk4",
+                self._dataset(),
+            )
+        reason = "a load is not finite"
+        if not self.method.adaptive:
+            reason = (
+                f"the step of {plan.dt:.3g} s is too large (critical at the start: "
+                f"{self.critical:.3g} s) or {reason}"
+            )
         raise InstabilityError(
-            f"at {moment} the motion is no longer finite: the step of {self.plan.dt:.3g} s is too "
-            f"large (critical at the start: {self.critical:.3g} s) or a load is not finite",
-            self._dataset(),
+            f"at {moment} the motion is no longer finite: {reason}", self._dataset()
         )
 
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
-        plan, n = self.plan, self.stored
-        statistics = {
+        plan, n, out = self.plan, self.stored, self._out
+        energies: dict[str, NDArray] = dict(zip(AUDITED, out.energy[:n].T, strict=True))
+        return trajectory_dataset(
+            self.case, out.time[:n], out.displacement[:n], out.velocity[:n], out.reaction[:n],
+            energies, self._statistics(plan),
+        )  # fmt: skip
+
+    def _statistics(self, plan: Plan) -> dict[str, Any]:
+        course = self._course
+        steps = int(course.count[0])
+        told: dict[str, Any] = {
             "method": self.method.name,
             "dt": plan.dt,
             "steps": plan.steps,
-            "duration": plan.steps * plan.dt,
+            "start": plan.start,
+            "duration": plan.end - plan.start,
             "every": plan.every,
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "energy_error": self._relative_error(),
-            "started_from": "rest" if self._at_rest() else "state",
+            "started_from": "rest" if self.at_rest else "state",
         }
-        energies: dict[str, NDArray] = dict(zip(AUDITED, self.energy[:n].T, strict=True))
-        times = np.arange(n) * plan.every * plan.dt
-        return trajectory_dataset(
-            self.case, times, self.displacement[:n], self.velocity[:n], self.reaction[:n],
-            energies, statistics,
-        )  # fmt: skip
-
-    def _at_rest(self) -> bool:
-        return not (self._start[0].any() or self._start[1].any())
+        if self.method.adaptive:
+            told |= {
+                "dt": float(course.clock[0] - plan.start) / max(steps, 1),
+                "steps": steps,
+                "every": plan.every or plan.interval,
+                "tolerance": plan.tolerance,
+                "refused_steps": int(course.count[2]),
+                "smallest_step": float(course.clock[5]) if steps else 0.0,
+                "largest_step": float(course.clock[6]),
+            }
+        told["force_evaluations"] = int(course.count[3])
+        return told
 
     def _relative_error(self) -> float:
-        energy = self.energy[: self.stored]
+        energy = self._out.energy[: self.stored]
         if not len(energy):
             return 0.0
         scale = energy_scale(energy)
@@ -353,10 +242,16 @@ class Motion:
         """Dataset of the whole motion; warns where its energy balance is poor."""
         error = self._audit()
         if error > INACCURATE:
+            remedy = self._smaller_step()
             warnings.warn(
                 f"the energy balance of the motion is off by {error:.1%} of the energies at play: "
-                f"use a step smaller than {self.plan.dt:.3g} s",
+                f"{remedy}",
                 FoldynWarning,
                 stacklevel=3,
             )
         return self._dataset()
+
+
+def _enlarged(out: Samples) -> Samples:
+    """Samples with room for twice as many."""
+    return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in out))

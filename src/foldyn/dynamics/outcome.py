@@ -3,3 +3,5 @@
 DONE = 0
 NOT_FINITE = 1
 PENETRATION = 2
+FULL = 3  # no room for another sample
+STUCK = 4  # the error asks for a step that time cannot resolve

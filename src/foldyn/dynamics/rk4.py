@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from foldyn.dynamics.course import observe
 from foldyn.dynamics.outcome import DONE, NOT_FINITE
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration, observe
+from foldyn.dynamics.system import acceleration
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.flat import flat
 
 ORDER = 4
-# abscissas of the stages; the loop needs each history's factors at these
-STAGES = np.array([0.0, 0.5, 1.0])
 
 
 def growth(omega, damping, dt):
@@ -26,46 +25,37 @@ def growth(omega, damping, dt):
 
 
 @kernel
-def advance(
-    model, system, mass, u, v, carry, tally, dt, first, last, every, factors, angle,
-    displacement, velocity, reaction, energy, work, s,
-):  # fmt: skip
-    """Advance u, v (n, 3) from step `first` to step `last`, in place.
+def advance(model, system, mass, course, plan, out, work, s, stretch):
+    """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    Every `every` steps, counted from step 0, a sample goes to row step / every - ceil(first /
-    every) of the output arrays. tally holds the work of the loads and the energy dissipated (J),
-    integrated with the method's own weights. factors is (last - first + 1, 3 stages, histories);
-    angle (nh,) the dihedrals at the last step seen, compared to find panels that passed through
-    each other. carry (n, 3) is for methods that keep an acceleration. Returns (outcome, step,
-    hinge).
+    Work and dissipated energy are integrated with the method's own weights.
     """
+    u, v, dt = course.u, course.v, plan.dt
     n = u.size
     ut, vt = np.empty_like(u), np.empty_like(u)
     du, dv, a = np.empty_like(u), np.empty_like(u), np.empty_like(u)
     fu, fv, fut, fvt = flat(u), flat(v), flat(ut), flat(vt)
     fdu, fdv, fa = flat(du), flat(dv), flat(a)
-    offset = (first + every - 1) // every
+    last = min(course.count[0] + stretch, plan.steps)
     for i in range(n):
         fut[i], fvt[i] = fu[i], fv[i]
-    for step in range(first, last + 1):
-        f = factors[step - first]
+    while True:
+        step = course.count[0]
+        course.clock[0] = plan.start + step * dt
         work_in, work_out, wrong = 0.0, 0.0, 0
         for stage in range(4):
-            column = (stage + 1) // 2
-            power_in, power_out = acceleration(model, system, mass, ut, vt, f[column], a, work, s)
+            t = course.clock[0] + 0.5 * ((stage + 1) // 2) * dt
+            power_in, power_out = acceleration(model, system, mass, ut, vt, t, a, work, s)
             weight = 2.0 if 0 < stage < 3 else 1.0
             work_in += weight * power_in
             work_out += weight * power_out
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
-                found, hinge = observe(
-                    model, system, mass, u, v, a, tally, step, every, offset, angle,
-                    displacement, velocity, reaction, energy, work, s,
-                )  # fmt: skip
+                found, hinge = observe(model, system, mass, course, a, t, plan, out, work, s)
                 if found != DONE:
-                    return found, step, hinge
+                    return found, hinge
                 if step == last:
-                    return DONE, last, -1
+                    return DONE, -1
                 for i in range(n):
                     fdu[i], fdv[i] = fvt[i], fa[i]
                     fut[i] = fu[i] + ahead * fvt[i]
@@ -82,8 +72,9 @@ def advance(
                     fv[i] += dt / 6.0 * (fdv[i] + fa[i])
                     fut[i], fvt[i] = fu[i], fv[i]
                     wrong += not abs(fv[i]) < np.inf
-        tally[0] += dt / 6.0 * work_in
-        tally[1] += dt / 6.0 * work_out
+        course.tally[0] += dt / 6.0 * work_in
+        course.tally[1] += dt / 6.0 * work_out
+        course.count[0] += 1
+        course.count[3] += 4
         if wrong > 0:
-            return NOT_FINITE, step + 1, -1
-    return DONE, last, -1
+            return NOT_FINITE, -1

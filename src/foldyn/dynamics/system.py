@@ -1,4 +1,11 @@
-"""A case as arrays: M a + C v + F_int(u) = sum of load vectors times their factors."""
+"""A case as arrays: M a + C v + F_int(u, rest angles) = sum of load vectors times their factors.
+
+Where supports move, displacements follow u = q + S f(t) and velocities v = w + S f'(t), with f the
+factors of the histories and S their displacements: at the supports what is prescribed there, at the
+free nodes -M_ff^-1 M_fs times it (none with a lumped matrix). Then M_ff q'' = -(F_int + C v - p)_f
+holds without an acceleration of the supports, even where their velocity jumps, and every integrator
+advances q and w as if the supports stood still.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases import Case
-from foldyn.dynamics.inertia import Inertia, inertia, kinetic_energy, solve_mass, times_mass
-from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
+from foldyn.cases import Case, History
+from foldyn.cases.waveforms import Callbacks, Waveforms, waveform
+from foldyn.cases.waveforms import pack as pack_waveforms
+from foldyn.dynamics.actuation import Actuators, actuator_power, actuators, turn
+from foldyn.dynamics.inertia import (
+    Inertia,
+    inertia,
+    kinetic_energy,
+    solve_mass,
+    substitute,
+    times_mass,
+)
 from foldyn.materials.compiled import kernel, scalar
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
 from foldyn.mechanics.flat import flat
+
+
+class Entries(NamedTuple):
+    """Nodal vectors times histories: value[k] stands at dof[k] and belongs to history row[k]."""
+
+    dof: NDArray  # (l,) 3 node + axis
+    value: NDArray  # (l,)
+    row: NDArray  # (l,) of the waveforms
 
 
 class System(NamedTuple):
@@ -24,9 +48,11 @@ class System(NamedTuple):
     stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
     stiff_indices: NDArray
     stiff_data: NDArray
-    load_dof: NDArray  # (l,)
-    load_value: NDArray  # (l,) N
-    load_history: NDArray  # (l,) row of the factors
+    waves: Waveforms
+    loads: Entries  # N
+    moved: Entries  # S, m
+    moved_mass: NDArray  # (h, h) S_k M S_l, kg m2
+    actuators: Actuators
 
 
 class Scratch(NamedTuple):
@@ -36,53 +62,144 @@ class Scratch(NamedTuple):
     product: NDArray  # (n, 3) the mass matrix times a vector
     line: NDArray  # (n,)
     energy: NDArray  # (3,)
+    factor: NDArray  # (h, 3) factors of the histories and their two derivatives
+    displacement: NDArray  # (n, 3) u where supports move; else unused
+    velocity: NDArray  # (n, 3) v likewise
 
 
-def pack(case: Case) -> tuple[BarsHinges, System, Inertia]:
-    """Arrays of a case: the model, the system and its inertia."""
+class Packed(NamedTuple):
+    """A case for compiled integrators; `callbacks` must live as long as the others serve."""
+
+    model: BarsHinges
+    system: System
+    mass: Inertia
+    callbacks: Callbacks
+
+
+def pack(case: Case, span: float) -> Packed:
+    """Arrays of a case; `span` (s) is short against the variations of the loads."""
     structure = case.structure
-    dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
-    for row, (vector, _) in enumerate(case.load_terms):
-        flat = np.asarray(vector).ravel()
-        where = np.flatnonzero(flat)
-        dofs.append(where)
-        values.append(flat[where])
-        rows.append(np.full(len(where), row))
+    mass = inertia(structure.mass, case.fixed)
+    histories: list[History] = []
+    for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms):
+        if term[1] not in histories:
+            histories.append(term[1])
+    moves = [
+        (follow(mass, np.asarray(shape)), history)
+        for shape, history in (*case.imposed_terms, *case.base_terms)
+    ]
+    callbacks = Callbacks()
     if case.damping.beta > 0.0:
         k0 = structure.tangent(np.zeros_like(structure.nodes)) * case.damping.beta
     else:
         k0 = sparse.csr_array((0, 0))
+    model, turned = actuators(structure, case.actuation_terms, histories)
     system = System(
         supported=np.asarray(case.supported_dofs, np.int64),
         alpha=float(case.damping.alpha),
         stiff_indptr=k0.indptr.astype(np.int64),
         stiff_indices=k0.indices.astype(np.int64),
         stiff_data=np.asarray(k0.data, float),
-        load_dof=np.concatenate(dofs).astype(np.int64),
-        load_value=np.concatenate(values),
-        load_history=np.concatenate(rows).astype(np.int64),
+        waves=pack_waveforms(histories, callbacks, span),
+        loads=_entries(case.load_terms, histories),
+        moved=_entries(moves, histories),
+        moved_mass=_moved_mass(structure.mass, moves, histories),
+        actuators=turned,
     )
-    return structure.model, system, inertia(structure.mass, case.fixed)
+    return Packed(model, system, mass, callbacks)
 
 
-def scratch(nodes: int) -> Scratch:
-    """Memory for a model of so many nodes."""
-    return Scratch(np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros(nodes), np.zeros(3))
+def _entries(terms, histories) -> Entries:
+    dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
+    for vector, history in terms:
+        entries = np.asarray(vector).ravel()
+        where = np.flatnonzero(entries)
+        dofs.append(where)
+        values.append(entries[where])
+        rows.append(np.full(len(where), histories.index(history)))
+    return Entries(
+        np.concatenate(dofs).astype(np.int64),
+        np.concatenate(values),
+        np.concatenate(rows).astype(np.int64),
+    )
+
+
+def follow(mass: Inertia, shape: NDArray) -> NDArray:
+    """Motion (n, 3) of all nodes with supports that move by `shape`: S of the module's text."""
+    if mass.lumped:
+        return shape
+    product, out = np.empty_like(shape), np.empty_like(shape)
+    times_mass(mass, shape, product)
+    substitute(mass, product, out, np.zeros(len(shape)))
+    return shape - out
+
+
+def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
+    out = np.zeros((len(histories), len(histories)))
+    for one, first in moves:
+        for other, second in moves:
+            value = float((one * (mass @ other)).sum())
+            out[histories.index(first), histories.index(second)] += value
+    return out
+
+
+def scratch(nodes: int, histories: int) -> Scratch:
+    """Memory for a model of so many nodes and histories."""
+    force, product, displacement, velocity = np.zeros((4, nodes, 3))
+    energy, factor = np.zeros(3), np.zeros((histories, 3))
+    return Scratch(force, product, np.zeros(nodes), energy, factor, displacement, velocity)
+
+
+@kernel
+def place(system, q, w, t, s):
+    """Evaluate the histories at time t; displacement and velocity go to `s` where supports move."""
+    derive = system.moved.dof.size > 0 or system.actuators.hinge.size > 0
+    for row in range(s.factor.shape[0]):
+        s.factor[row, 0], s.factor[row, 1], s.factor[row, 2] = waveform(
+            system.waves, row, t, derive
+        )
+    if system.moved.dof.size > 0:
+        u, v = flat(s.displacement), flat(s.velocity)
+        fixed_u, fixed_v = flat(q), flat(w)
+        for i in range(u.size):
+            u[i], v[i] = fixed_u[i], fixed_v[i]
+        for k in range(system.moved.dof.size):
+            dof, row = system.moved.dof[k], system.moved.row[k]
+            u[dof] += system.moved.value[k] * s.factor[row, 0]
+            v[dof] += system.moved.value[k] * s.factor[row, 1]
+
+
+@kernel
+def moving_energy(system, s):
+    """Kinetic energy (J) of S f'."""
+    total = 0.0
+    for k in range(system.moved_mass.shape[0]):
+        for l in range(system.moved_mass.shape[0]):  # noqa: E741
+            total += system.moved_mass[k, l] * s.factor[k, 1] * s.factor[l, 1]
+    return 0.5 * total
 
 
 @scalar
-def acceleration(model, system, mass, u, v, factors, out, work, s):
-    """Acceleration (n, 3) at displacement u and velocity v under the histories' factors.
+def acceleration(model, system, mass, q, w, t, out, work, s):
+    """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
-    a = - M^-1 (F_int + beta K0 v - p) - alpha v. Returns the power of the loads and the power
-    dissipated (W). The bracket stays in `s.force`.
+    q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
+    supports and actuators, and the power dissipated (W). The bracket stays in `s.force`.
     """
+    if s.factor.shape[0] > 0:
+        place(system, q, w, t, s)
+    moved = system.moved.dof.size > 0
+    u = s.displacement if moved else q
+    v = s.velocity if moved else w
+    if system.actuators.hinge.size > 0:
+        turn(model, system.actuators, s.factor)
     internal_force(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
-    for q in range(system.load_dof.size):
-        dof = system.load_dof[q]
-        load = system.load_value[q] * factors[system.load_history[q]]
+    loads = system.loads
+    for k in range(loads.dof.size):
+        dof = loads.dof[k]
+        load = loads.value[k] * s.factor[loads.row[k], 0]
         force[dof] -= load
         power_in += load * speed[dof]
     for i in range(system.stiff_indptr.size - 1):
@@ -92,74 +209,52 @@ def acceleration(model, system, mass, u, v, factors, out, work, s):
         force[i] += viscous
         power_out += viscous * speed[i]
     solve_mass(mass, s.force, out, s.line)
-    accelerated, alpha = flat(out), system.alpha
-    for i in range(speed.size):
-        accelerated[i] = -accelerated[i] - alpha * speed[i]
+    accelerated, alpha, relative = flat(out), system.alpha, flat(w)
+    for i in range(relative.size):
+        accelerated[i] = -accelerated[i] - alpha * relative[i]
     if alpha > 0.0:
         power_out += 2.0 * alpha * kinetic_energy(mass, v, s.product)
+    if moved:
+        for k in range(system.moved.dof.size):
+            rate = system.moved.value[k] * s.factor[system.moved.row[k], 1]
+            power_in += force[system.moved.dof[k]] * rate
+        power_in += 2.0 * alpha * moving_energy(system, s)
+    if system.actuators.hinge.size > 0:
+        power_in += actuator_power(model, system.actuators, s.factor, work.angle)
     return power_in, power_out
 
 
 @kernel
-def record(model, system, mass, u, v, a, s, displacement, velocity, reaction, energy):
-    """Write one sample after `acceleration`; energy[:4] gets strain energies and kinetic energy.
+def record(model, system, mass, q, w, a, tally, s, displacement, velocity, reaction, energy):
+    """Write one sample after `acceleration`.
 
-    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there.
+    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
+    gets the strain energies, the kinetic energy, what was dissipated and the work.
     """
-    n = u.shape[0]
-    times_mass(mass, a, s.product)
-    for q in range(system.supported.size):
-        i, c = system.supported[q] // 3, system.supported[q] % 3
-        reaction[q] = s.product[i, c] + s.force[i, c]
-    energy[3] = kinetic_energy(mass, v, s.product)
-    times_mass(mass, v, s.product)
-    for q in range(system.supported.size):
-        i, c = system.supported[q] // 3, system.supported[q] % 3
-        reaction[q] += system.alpha * s.product[i, c]
+    moved, n = system.moved, q.shape[0]
     for i in range(n):
         for c in range(3):
-            displacement[i, c] = u[i, c]
-            velocity[i, c] = v[i, c]
-    strain_energies(model, u, s.energy)
+            displacement[i, c], velocity[i, c] = q[i, c], w[i, c]
+            s.velocity[i, c] = a[i, c]
+    accelerated = flat(s.velocity)
+    for k in range(moved.dof.size):
+        i, c = moved.dof[k] // 3, moved.dof[k] % 3
+        row, value = moved.row[k], moved.value[k]
+        displacement[i, c] += value * s.factor[row, 0]
+        velocity[i, c] += value * s.factor[row, 1]
+        accelerated[moved.dof[k]] += value * s.factor[row, 2]
+    times_mass(mass, s.velocity, s.product)
+    for k in range(system.supported.size):
+        i, c = system.supported[k] // 3, system.supported[k] % 3
+        reaction[k] = s.product[i, c] + s.force[i, c]
+    energy[3] = kinetic_energy(mass, velocity, s.product)
+    times_mass(mass, velocity, s.product)
+    for k in range(system.supported.size):
+        i, c = system.supported[k] // 3, system.supported[k] % 3
+        reaction[k] += system.alpha * s.product[i, c]
+    strain_energies(model, displacement, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
-
-
-@scalar
-def passed_through(now, before):
-    """Hinge whose dihedral jumped by more than pi, or -1; `before` (nh,) becomes `now`."""
-    jumps = 0
-    for e in range(now.size):
-        jumps += abs(now[e] - before[e]) > np.pi
-    if jumps > 0:
-        for e in range(now.size):
-            if abs(now[e] - before[e]) > np.pi:
-                return e
-    for e in range(now.size):
-        before[e] = now[e]
-    return -1
-
-
-@scalar
-def observe(
-    model, system, mass, u, v, a, tally, step, every, offset, angle,
-    displacement, velocity, reaction, energy, work, s,
-):  # fmt: skip
-    """Look for panels that passed through each other, and write a sample every `every` steps.
-
-    Every method calls it at t_n after `acceleration`; the sample goes to row step / every -
-    offset. Returns (outcome, hinge).
-    """
-    hinge = passed_through(work.angle, angle)
-    if hinge >= 0:
-        return PENETRATION, hinge
-    if step % every == 0:
-        k = step // every - offset
-        record(
-            model, system, mass, u, v, a, s,
-            displacement[k], velocity[k], reaction[k], energy[k],
-        )  # fmt: skip
-        energy[k, 4], energy[k, 5] = tally[1], tally[0]
-        if not np.isfinite(energy[k].sum()):
-            return NOT_FINITE, -1
-    return DONE, -1
+    energy[4] = tally[1]
+    # what brought the moving supports to their speed belongs to the work: it may come in jolts
+    energy[5] = tally[0] + moving_energy(system, s)

@@ -5,25 +5,12 @@ from __future__ import annotations
 import math
 import os
 from numbers import Integral, Real
-from typing import NamedTuple
 
+from foldyn.dynamics.course import Plan
 from foldyn.errors import InputError
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
-
-
-class Schedule(NamedTuple):
-    """A motion of `steps` steps of `dt` seconds, sampled every `every` steps from t = 0."""
-
-    dt: float
-    steps: int
-    every: int
-
-    @property
-    def samples(self) -> int:
-        """Number of samples, the first at t = 0."""
-        return self.steps // self.every + 1
 
 
 def positive(name: str, value: object) -> float:
@@ -36,22 +23,16 @@ def positive(name: str, value: object) -> float:
     return number
 
 
-def schedule(duration: float, dt: float | None, every: int | float, critical: float) -> Schedule:
+def fixed_steps(
+    duration: float, dt: float | None, every: int | float, critical: float, start: float = 0.0
+) -> Plan:
     """Fit a time step and the sampling to a duration.
 
     `every` counts steps if it is an int and seconds if it is a float. Without `dt` the step is
     half the critical one, shortened so that it divides the sampling interval and the duration.
     """
     duration = positive("duration", duration)
-    if isinstance(every, bool) or not isinstance(every, Real):
-        raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")
-    in_seconds = not isinstance(every, Integral)
-    if in_seconds:
-        every = positive("every", every)
-        if every > duration * (1.0 + 1e-9):
-            raise InputError(f"every = {every:g} s: longer than the duration of {duration:g} s")
-    elif every < 1:
-        raise InputError(f"every = {every}: must be at least 1 step")
+    in_seconds = _in_seconds(duration, every)
     if dt is None:
         target = DEFAULT_FRACTION * critical
         if not math.isfinite(target):
@@ -62,10 +43,7 @@ def schedule(duration: float, dt: float | None, every: int | float, critical: fl
         dt = span / count
         per_sample = count if in_seconds else int(every)
     else:
-        dt = positive("dt", dt)
-        _check_count(duration, dt)
-        if dt > duration * (1.0 + 1e-9):
-            raise InputError(f"dt = {dt:g} s: longer than the duration of {duration:g} s")
+        dt = _given_step(duration, dt)
         per_sample = max(1, round(every / dt)) if in_seconds else int(every)
         if in_seconds and abs(per_sample * dt - every) > 1e-9 * every:
             near = every / max(1, math.ceil(every / dt))
@@ -76,7 +54,55 @@ def schedule(duration: float, dt: float | None, every: int | float, critical: fl
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
         raise InputError(f"every = {every}: longer than the motion of {steps} steps")
-    return Schedule(dt, steps, per_sample)
+    return Plan(start, start + steps * dt, dt, steps, per_sample, per_sample * dt, 0.0)
+
+
+def variable_steps(
+    duration: float, dt: float | None, every: int | float, largest: float, start: float,
+    tolerance: float,
+) -> Plan:  # fmt: skip
+    """Plan of a motion whose steps follow their error; `dt` is the largest step.
+
+    Without `dt` it is `largest`, at most a tenth of the motion.
+    """
+    duration = positive("duration", duration)
+    in_seconds = _in_seconds(duration, every)
+    dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
+    _check_count(duration, dt)
+    interval = float(every) if in_seconds else 0.0
+    return Plan(
+        start, start + duration, dt, 0, 0 if in_seconds else int(every), interval, tolerance
+    )
+
+
+def expected_samples(plan: Plan) -> int:
+    """Number of samples, the first at the start; where steps vary and are counted, the least."""
+    if plan.steps:
+        return plan.steps // plan.every + 1
+    if plan.every:
+        return int((plan.end - plan.start) / plan.dt / plan.every) + 2
+    return math.floor((plan.end - plan.start) / plan.interval * (1.0 + 1e-12) + 1e-9) + 1
+
+
+def _in_seconds(duration: float, every: int | float) -> bool:
+    """Whether a sampling interval is in seconds; refuses one that fits no motion."""
+    if isinstance(every, bool) or not isinstance(every, Real):
+        raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")
+    if isinstance(every, Integral):
+        if every < 1:
+            raise InputError(f"every = {every}: must be at least 1 step")
+        return False
+    if positive("every", every) > duration * (1.0 + 1e-9):
+        raise InputError(f"every = {every:g} s: longer than the duration of {duration:g} s")
+    return True
+
+
+def _given_step(duration: float, dt: float) -> float:
+    dt = positive("dt", dt)
+    _check_count(duration, dt)
+    if dt > duration * (1.0 + 1e-9):
+        raise InputError(f"dt = {dt:g} s: longer than the duration of {duration:g} s")
+    return dt
 
 
 def _check_count(duration: float, dt: float) -> None:

@@ -79,6 +79,22 @@ def hinge_slope(code, theta, rest, a, b, address):
     return call2(address, theta, rest)
 
 
+@scalar
+def hinge_rest_slope(code, theta, rest, a, b, stress_free, address):
+    """Derivative of energy / k with respect to the rest angle; `address` is that of the energy.
+
+    stress_free : whether the enhanced law's moment and energy at rest are subtracted.
+    """
+    if code == 1:
+        return -superlinear.moment(theta, rest)
+    if code == 2 and stress_free:
+        return enhanced_linear.slope(rest, a, b) * (rest - theta)
+    if code >= 0:
+        return rest - theta
+    h = 1e-5  # error 1e-10 of the energy's third derivative
+    return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
+
+
 @kernel
 def bar_table(code, e, address):
     """Energy, stress and slope rows (3, n) of one law at e (n,)."""

@@ -1,13 +1,16 @@
-"""Load histories of a case."""
+"""Histories of a case: its loads and the motions that it imposes."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from foldyn.cases import Actuate, Impose, resolve_nodes
+from foldyn.cases.actuation import resolve_creases
 from foldyn.errors import InputError
 from foldyn.plots import style
 
@@ -15,24 +18,45 @@ if TYPE_CHECKING:
     from foldyn.cases import Case
 
 _SAMPLES = 2001
-_LISTED_NODES = 3
+_LISTED = 3
+_MOST_CURVES = 4
+"""Curves of one history at most; imposed displacements and rest angles may differ at each place."""
 
 
-def plot_load_history(case: Case, duration: float, title: str = "") -> Figure:
-    """Draw the loads of a case over time.
+@dataclass(frozen=True)
+class _Curve:
+    """A quantity over time: offset + amplitude * factor."""
 
-    One curve per load history: the force at the most heavily loaded of its nodes, that is the
-    largest magnitude among the nodes times the factor of the history. Gravity has axes of its
-    own, with the magnitude of its acceleration times the factor.
+    amplitude: float
+    text: str
+    history: Any
+    offset: float = 0.0
+
+
+def plot_load_history(case: Case, duration: float, title: str = "", start: float = 0.0) -> Figure:
+    """Draw the loads of a case and the motions it imposes over time.
+
+    Each kind has axes of its own:
+
+    - one curve per history of forces: the force at the most heavily loaded of its nodes, that is
+      the largest magnitude among the nodes times the factor of the history;
+    - gravity: the magnitude of its acceleration times the factor;
+    - imposed displacements and displacements of the base, one curve per value and axis;
+    - rest angles of actuated creases, one curve per pair of first and last angle.
+
+    Of the last two, at most four curves per history are drawn.
 
     Parameters
     ----------
     case : Case
-        The loads are its ``force_terms`` and ``gravity_terms``.
+        The curves are its ``force_terms``, ``gravity_terms``, ``imposed_terms``, ``base_terms``
+        and ``actuation_terms``.
     duration : float
-        End of the time axis (s).
+        Length of the time axis (s).
     title : str
         Title of the figure.
+    start : float
+        Beginning of the time axis (s).
 
     Returns
     -------
@@ -46,31 +70,49 @@ def plot_load_history(case: Case, duration: float, title: str = "") -> Figure:
     if not (np.isfinite(duration) and duration > 0.0):
         raise InputError(f"duration: {duration!r}; give a positive number of seconds")
     panels = [
-        ("force at a node (N)", [(f, describe_load(f), h) for f, h in case.force_terms]),
-        ("gravity (m/s2)", [(g, describe_gravity(g), h) for g, h in case.gravity_terms]),
+        (
+            "force at a node (N)",
+            [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms],
+        ),
+        (
+            "gravity (m/s2)",
+            [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms],
+        ),
+        (
+            "imposed displacement (m)",
+            [curve for u, h in case.imposed_terms for curve in _imposed_curves(case, u, h)],
+        ),
+        ("base displacement (m)", [c for u, h in case.base_terms for c in _base_curves(u, h)]),
+        (
+            "rest angle (degrees)",
+            [curve for d, h in case.actuation_terms for curve in _angle_curves(case, d, h)],
+        ),
     ]
     panels = [panel for panel in panels if panel[1]] or panels[:1]
-    figure = style.new_figure(6.5, 2.9 + 1.7 * (len(panels) - 1))
+    entries = sum(len(curves) for _, curves in panels)
+    height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
+    figure = style.new_figure(6.5, height)
     style.title_above(figure, title)
     rows = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
-    time = np.linspace(0.0, duration, _SAMPLES)
+    time = np.linspace(start, start + duration, _SAMPLES)
     handles = []
-    for axes, (ylabel, terms) in zip(rows, panels, strict=True):
+    for axes, (ylabel, curves) in zip(rows, panels, strict=True):
         style.frame(axes, "time (s)" if axes is rows[-1] else "", ylabel)
-        for vectors, text, history in terms:
-            peak = np.linalg.norm(vectors, axis=-1).max()
-            factor = np.broadcast_to(np.asarray(history(time), dtype=np.float64), time.shape)
+        for curve in curves:
+            factor = np.broadcast_to(np.asarray(curve.history(time), dtype=np.float64), time.shape)
             (line,) = axes.plot(
                 time,
-                peak * factor,
-                label=f"{text}: {history_name(history)}",
+                curve.offset + curve.amplitude * factor,
+                label=f"{curve.text}: {history_name(curve.history)}",
                 **style.line_style(len(handles)),
             )
             line.set_linewidth(1.6)
             handles.append(line)
-        axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
+        if not any(curve.offset for curve in curves):
+            axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
         style.exponents(axes)
-    rows[-1].set_xlim(0.0, duration)
+    rows[-1].set_xlim(time[0], time[-1])
+    figure.align_ylabels(rows)
     if handles:
         style.legend_below(figure, handles, columns=1)
     else:
@@ -86,21 +128,111 @@ def plot_load_history(case: Case, duration: float, title: str = "") -> Figure:
     return style.finish(figure)
 
 
+def _peak(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=-1).max())
+
+
+def _imposed_curves(case: Case, vectors: np.ndarray, history: Any) -> list[_Curve]:
+    """Curves of displacements (n, 3), one for each value and axis."""
+    groups: dict[tuple[int, float], list[int]] = {}
+    for support in case.supports:
+        if isinstance(support, Impose) and support.history == history:
+            axis = "xyz".index(support.axis)
+            for node in resolve_nodes(case.structure, support.nodes).tolist():
+                groups.setdefault((axis, float(vectors[node, axis])), []).append(node)
+    curves = [
+        _Curve(
+            value,
+            f"moved {value:.4g} m along {'xyz'[axis]} on {_listed('node', nodes)}",
+            history,
+        )
+        for (axis, value), nodes in groups.items()
+    ]
+    return _some(curves)
+
+
+def _base_curves(vectors: np.ndarray, history: Any) -> list[_Curve]:
+    """Curves of a base that moves by (n, 3), one for each axis."""
+    return [
+        _Curve(value, f"base moved {value:.4g} m along {axis}", history)
+        for axis, value in zip("xyz", signed_peak(vectors).tolist(), strict=True)
+        if value
+    ]
+
+
+def _angle_curves(case: Case, change: np.ndarray, history: Any) -> list[_Curve]:
+    """Curves of rest angles (degrees), one for each pair of first and last angle."""
+    first = np.degrees(case.structure.fold_rest)
+    last = first + np.degrees(change)
+    groups: dict[tuple[float, float], list[int]] = {}
+    for load in case.loads:
+        if isinstance(load, Actuate) and load.history == history:
+            for crease in resolve_creases(case.structure, load.creases).tolist():
+                pair = round(float(first[crease]), 6), round(float(last[crease]), 6)
+                groups.setdefault(pair, []).append(crease)
+    curves = [
+        _Curve(
+            end - start,
+            f"rest angle {start:.4g} to {end:.4g} degrees on {_listed('crease', creases)}",
+            history,
+            start,
+        )
+        for (start, end), creases in groups.items()
+    ]
+    return _some(curves)
+
+
+def _some(curves: list[_Curve]) -> list[_Curve]:
+    """The first curves; the last of them tells how many are left out."""
+    hidden = len(curves) - _MOST_CURVES
+    if hidden <= 0:
+        return curves
+    last = curves[_MOST_CURVES - 1]
+    return [
+        *curves[: _MOST_CURVES - 1],
+        replace(last, text=f"{last.text} (and {hidden} more, not drawn)"),
+    ]
+
+
+def signed_peak(vectors: np.ndarray) -> np.ndarray:
+    """Component (3,) of the largest magnitude along each axis of vectors (n, 3)."""
+    return vectors[np.abs(vectors).argmax(axis=0), np.arange(3)]
+
+
 def describe_load(vectors: np.ndarray) -> str:
     """Say in words where a load acts, in which direction, and how large it is at a node."""
+    return _describe(vectors, "N")
+
+
+def describe_imposed(vectors: np.ndarray) -> str:
+    """Say in words which nodes are moved, in which direction, and how far."""
+    return f"moved {_describe(vectors, 'm')}"
+
+
+def describe_base(vector: np.ndarray) -> str:
+    """Say in words how far the base moves (3,) and where to."""
+    size = float(np.linalg.norm(vector))
+    return f"base moved {size:.4g} m along {_direction(vector / size)}" if size else "base at rest"
+
+
+def _describe(vectors: np.ndarray, unit_name: str) -> str:
     size = np.linalg.norm(vectors, axis=1)
     nodes = np.flatnonzero(size > 0.0)
-    listed = ", ".join(str(node) for node in nodes[:_LISTED_NODES])
-    if nodes.size > _LISTED_NODES:
-        listed += f" and {nodes.size - _LISTED_NODES} more"
-    where = f"node {listed}" if nodes.size == 1 else f"nodes {listed}"
     unit = vectors[nodes] / size[nodes, None]
-    text = f"{size.max():.4g} N"
+    text = f"{size.max():.4g} {unit_name}"
     if nodes.size and np.abs(unit - unit[0]).max() < 1e-9:
         text += f" along {_direction(unit[0])}"
     if nodes.size and np.ptp(size[nodes]) > 1e-9 * size.max():
         text = "up to " + text
-    return f"{text} on {where}"
+    return f"{text} on {_listed('node', nodes.tolist())}"
+
+
+def _listed(what: str, numbers: list[int]) -> str:
+    """Name the first of some nodes or creases, "nodes 1, 2, 5 and 4 more"."""
+    listed = ", ".join(str(number) for number in numbers[:_LISTED])
+    if len(numbers) > _LISTED:
+        listed += f" and {len(numbers) - _LISTED} more"
+    return f"{what} {listed}" if len(numbers) == 1 else f"{what}s {listed}"
 
 
 def describe_gravity(acceleration: np.ndarray) -> str:
@@ -122,13 +254,14 @@ def history_name(history: Any) -> str:
     """Name a history by its class and numbers, "half sine (duration 0.5)"."""
     history = getattr(history, "function", history)  # a user's function is known by its own name
     kind = type(history)
-    fields = getattr(kind, "__dataclass_fields__", None)
-    if fields is None:
+    if not is_dataclass(history):
         return str(getattr(history, "__name__", kind.__name__)).strip("<>")
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
     numbers = []
-    for name in fields:
-        value = getattr(history, name)
-        if isinstance(value, int | float | np.number):
-            numbers.append(f"{name} {float(value):.4g}")
+    for item in fields(history):
+        value = getattr(history, item.name)
+        if isinstance(value, bool):
+            words = f"{item.name} {words}" if value else words
+        elif isinstance(value, int | float | np.number):
+            numbers.append(f"{item.name} {float(value):.4g}")
     return f"{words} ({', '.join(numbers)})" if numbers else words

@@ -28,7 +28,11 @@ def _billboard(
 
 
 def support_triangles(
-    points: NDArray[np.float64], fixed: NDArray[np.bool_], size: float, view: View
+    points: NDArray[np.float64],
+    fixed: NDArray[np.bool_],
+    size: float,
+    view: View,
+    moves: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], list[tuple[int, str]]]:
     """Return one triangle per held direction, its tip at the node, and each node's axes.
 
@@ -40,6 +44,8 @@ def support_triangles(
     size : float
         Length of a triangle (m).
     view : View
+    moves : ndarray, shape (n, 3)
+        Displacements (m) that the supports impose: their triangles push the nodes.
 
     Returns
     -------
@@ -54,7 +60,8 @@ def support_triangles(
         for k in np.flatnonzero(fixed[node]):
             along = np.zeros(3)
             # The triangle stands outside the sheet; on the middle plane, below or before it.
-            along[k] = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
+            outside = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
+            along[k] = np.sign(moves[node, k]) or outside
             triangles.append(_billboard(points[node], along, size, 0.38 * size, view))
     return np.array(triangles).reshape(-1, 3, 3), held
 

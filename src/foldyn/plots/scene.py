@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from foldyn.plots import style
 
 PAPER = "#F2DFB8"
+WIDTH = 7.0
+"""Width of a figure, in inches."""
 # Margins around the seen box, and its largest height, in inches.
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
@@ -90,6 +92,13 @@ class Sheet3D:
         bars = np.sort(np.asarray(self.structure.bars, dtype=np.int64), axis=1).tolist()
         return np.array([bar for bar in bars if tuple(bar) not in edges]).reshape(-1, 2)
 
+    @cached_property
+    def actuated(self) -> NDArray[np.int64]:
+        """Creases that the case actuates, shape (k, 2)."""
+        if self.case is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        return np.asarray(self.pattern.creases, dtype=np.int64)[self.case.actuated_creases]
+
     def creases(self) -> dict[str, NDArray[np.int64]]:
         """Return the creases (k, 2) of each assignment that occurs."""
         creases = np.asarray(self.pattern.creases, dtype=np.int64).reshape(-1, 2)
@@ -126,7 +135,7 @@ def view_figure(
     view: View,
     title: str = "",
     legend_rows: int = 0,
-    width: float = 7.0,
+    width: float = WIDTH,
 ) -> tuple[Figure, Axes3D]:
     """Return a figure with orthographic axes of equal scale that hold all the points (p, 3).
 

@@ -34,9 +34,14 @@ class EdgeKind:
     dashes: Any
 
 
-def edge_kinds(sheet: Sheet3D, elements: bool) -> list[EdgeKind]:
-    """Return the kinds of edges that a sheet has; with its inner bars where `elements`."""
+def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[EdgeKind]:
+    """Return the kinds of edges that a sheet has, from the lowest to the topmost.
+
+    Its inner bars are among them where `elements`, the glow of actuated creases where `actuated`.
+    """
     kinds = []
+    if actuated and len(sheet.actuated):
+        kinds.append(EdgeKind("actuated crease", sheet.actuated, style.ACTUATED, 6.0, "solid"))
     if elements and len(sheet.inner_bars):
         kinds.append(EdgeKind("bar inside a panel", sheet.inner_bars, style.GRAY, 0.7, "solid"))
     kinds.append(EdgeKind("boundary", sheet.boundary, style.BLACK, 1.1, "solid"))
@@ -46,11 +51,11 @@ def edge_kinds(sheet: Sheet3D, elements: bool) -> list[EdgeKind]:
     return kinds
 
 
-def edge_keys(sheet: Sheet3D, elements: bool = False) -> list[Line2D]:
+def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> list[Line2D]:
     """Return legend entries of a sheet's edges."""
     return [
         Line2D([], [], color=k.color, linewidth=k.width, linestyle=k.dashes, label=k.name)
-        for k in edge_kinds(sheet, elements)
+        for k in edge_kinds(sheet, elements, actuated)
     ]
 
 
@@ -66,6 +71,8 @@ class DrawnSheet:
     view : View
     elements : bool
         Draw the bars inside the panels too.
+    actuated : bool
+        Let actuated creases glow.
     """
 
     def __init__(
@@ -75,11 +82,12 @@ class DrawnSheet:
         points: NDArray[np.float64],
         view: View,
         elements: bool = False,
+        actuated: bool = True,
     ) -> None:
         self._sheet, self._view = sheet, view
         self._panels = scene.add_panels(axes, points, sheet.triangles)
         self._lines: list[tuple[Any, Any, NDArray[np.int64]]] = []
-        for kind in edge_kinds(sheet, elements):
+        for kind in edge_kinds(sheet, elements, actuated):
             visible, hidden = self._split(kind.edges, points)
             look = kind.color, 0.7 * kind.width, kind.dashes
             behind = scene.add_segments(axes, hidden, *look, zorder=1.5, alpha=_HIDDEN)

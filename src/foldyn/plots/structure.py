@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,7 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import marks, scene, style
-from foldyn.plots.loads import describe_gravity, describe_load
+from foldyn.plots.loads import (
+    describe_base,
+    describe_gravity,
+    describe_imposed,
+    describe_load,
+    signed_peak,
+)
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 
@@ -48,10 +56,12 @@ def draw_structure(
     numbers : bool or "all"
         Write the numbers of the pattern's vertices; "all" also those of the panels' inner nodes.
     supports : bool
-        Mark held nodes: one triangle per held direction, and the names of the directions.
+        Mark held and moved nodes: one triangle per direction, and the names of the directions. An
+        arrow from each node with an imposed displacement, and one from the middle of a moving
+        base.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
-        and one from the center of mass along gravity.
+        and one from the center of mass along gravity. Actuated creases glow.
     elements : bool
         Draw the bars inside the panels too.
     scale : float
@@ -79,26 +89,14 @@ def draw_structure(
     size = sheet.size
     # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
-    triangles, held = np.zeros((0, 3, 3)), []
-    shafts, heads, forces, gravity = np.zeros((0, 2, 3)), np.zeros((0, 3, 3)), [], []
-    if sheet.case is not None and supports:
-        triangles, held = marks.support_triangles(
-            points, np.asarray(sheet.case.fixed), min(0.055 * size, 0.25 * edge), sight
-        )
-    if sheet.case is not None and loads:
-        forces = [np.asarray(vectors, dtype=np.float64) for vectors, _ in sheet.case.force_terms]
-        gravity = [vector for vector, _ in sheet.case.gravity_terms]
+    marked = min(0.055 * size, 0.25 * edge)
+    groups = _supports(sheet, points, marked, sight) if supports else []
     length = min(0.17 * size, 0.8 * edge)
-    longest = max((np.linalg.norm(f, axis=1).max() for f in forces), default=0.0)
-    for vectors in forces:
-        more = marks.load_arrows(points, vectors, longest, length, sight)
-        shafts, heads = np.vstack([shafts, more[0]]), np.vstack([heads, more[1]])
-    own = len(shafts)  # arrows of forces; those of gravity follow
-    if gravity:
-        middle = np.tile(_center_of_mass(sheet, points), (len(gravity), 1))
-        strongest = max(float(np.linalg.norm(g)) for g in gravity)
-        more = marks.load_arrows(middle, np.array(gravity), strongest, 1.5 * length, sight)
-        shafts, heads = np.vstack([shafts, more[0]]), np.vstack([heads, more[1]])
+    arrows = _motions(sheet, points, length, sight) if supports else []
+    arrows += _loads(sheet, points, length, sight) if loads else []
+    triangles = np.concatenate([group.triangles for group in groups] or [np.zeros((0, 3, 3))])
+    heads = np.concatenate([group.heads for group in arrows] or [np.zeros((0, 3, 3))])
+    shafts = np.concatenate([group.shafts for group in arrows] or [np.zeros((0, 2, 3))])
 
     # The names of the held directions stand beyond the triangles' feet.
     feet = triangles[:, :1] + 1.6 * (triangles - triangles[:, :1])
@@ -111,25 +109,24 @@ def draw_structure(
         keys.append(Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed"))
         if scale != 1.0:
             keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
-    keys += edge_keys(sheet, elements)
-    if len(triangles):
-        keys.append(Patch(facecolor=style.SUPPORT, label="support (directions held)"))
-    keys += _load_keys(forces)
-    keys += [_arrow_key(style.GRAVITY, describe_gravity(g)) for g in gravity]
+    keys += edge_keys(sheet, elements, loads)
+    keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
+    keys += [key for group in arrows for key in group.keys]
 
-    rows = -(-len(keys) // _LEGEND_COLUMNS)
+    labels = [str(key.get_label()) for key in keys]
+    columns = style.columns_that_fit(labels, scene.WIDTH, _LEGEND_COLUMNS)
+    rows = -(-len(keys) // columns)
     figure, axes = scene.view_figure(np.vstack(everything), sight, title, rows)
     if displacement is not None:
         add_undeformed(axes, sheet)
-    DrawnSheet(axes, sheet, points, sight, elements)
-    if len(triangles):
-        marks.add_triangles(axes, triangles, style.SUPPORT, 6.0)
-    for part, color in ((slice(own), style.LOAD), (slice(own, None), style.GRAVITY)):
-        if len(heads[part]):
-            scene.add_segments(axes, shafts[part], color, 1.8, zorder=7.0)
-            marks.add_triangles(axes, heads[part], color, 7.5)
-    _write_labels(axes, sheet, points, numbers, held, (triangles, shafts, heads), sight)
-    style.legend_below(figure, keys, _LEGEND_COLUMNS)
+    DrawnSheet(axes, sheet, points, sight, elements, loads)
+    for group in groups:
+        marks.add_triangles(axes, group.triangles, group.color, 6.0)
+    for group in arrows:
+        scene.add_segments(axes, group.shafts, group.color, 1.8, zorder=7.0)
+        marks.add_triangles(axes, group.heads, group.color, 7.5)
+    _write_labels(axes, sheet, points, numbers, groups, (triangles, shafts, heads), sight)
+    style.legend_below(figure, keys, columns)
     return style.finish(figure)
 
 
@@ -148,13 +145,113 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDAr
     return u
 
 
-def _load_keys(forces: list[NDArray[np.float64]]) -> list[Line2D]:
-    """Return the legend entries of the loads, one per history."""
-    keys = [_arrow_key(style.LOAD, describe_load(f)) for f in forces[:_MOST_LOADS_LISTED]]
-    hidden = len(forces) - _MOST_LOADS_LISTED
+@dataclass(frozen=True)
+class _Supports:
+    """Marks of one kind of support: triangles (k, 3, 3), and the axes of each node."""
+
+    triangles: NDArray[np.float64]
+    axes: list[tuple[int, str]]
+    color: str
+    ink: str  # of the axes' names
+    text: str
+
+
+@dataclass(frozen=True)
+class _Arrows:
+    """Arrows of one color, and their legend entries."""
+
+    shafts: NDArray[np.float64]
+    heads: NDArray[np.float64]
+    color: str
+    keys: list[Line2D]
+
+
+def _supports(
+    sheet: Sheet3D, points: NDArray[np.float64], size: float, sight: View
+) -> list[_Supports]:
+    """Return the marks of the nodes that are held, and of those that are moved."""
+    if sheet.case is None:
+        return []
+    fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
+    moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
+    kinds = [
+        (fixed & ~imposed, style.SUPPORT, style.SUPPORT, "support (directions held)"),
+        (imposed, style.IMPOSED, style.IMPOSED_TEXT, "imposed displacement (directions)"),
+    ]
+    return [
+        _Supports(*marks.support_triangles(points, mask, size, sight, moves), *look)
+        for mask, *look in kinds
+        if mask.any()
+    ]
+
+
+def _motions(
+    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
+) -> list[_Arrows]:
+    """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
+    if sheet.case is None:
+        return []
+    base = [vectors for vectors, _ in sheet.case.base_terms]
+    middle = [points[np.any(vectors != 0.0, axis=1)].mean(axis=0) for vectors in base]
+    moves = np.array([signed_peak(vectors) for vectors in base])
+    imposed = [vectors for vectors, _ in sheet.case.imposed_terms]
+    return [
+        *_nodal(points, imposed, length, sight, style.IMPOSED, describe_imposed),
+        *_single(np.array(middle), moves, length, sight, style.BASE, describe_base),
+    ]
+
+
+def _loads(
+    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
+) -> list[_Arrows]:
+    """Return arrows of forces, and of gravity at the center of mass."""
+    if sheet.case is None:
+        return []
+    forces = [vectors for vectors, _ in sheet.case.force_terms]
+    gravity = np.array([vector for vector, _ in sheet.case.gravity_terms])
+    middle = [_center_of_mass(sheet, points)] * len(gravity) if len(gravity) else []
+    return [
+        *_nodal(points, forces, length, sight, style.LOAD, describe_load),
+        *_single(np.array(middle), gravity, 1.5 * length, sight, style.GRAVITY, describe_gravity),
+    ]
+
+
+def _nodal(
+    points: NDArray[np.float64],
+    terms: list[NDArray[np.float64]],
+    length: float,
+    sight: View,
+    color: str,
+    describe: Callable[[NDArray[np.float64]], str],
+) -> list[_Arrows]:
+    """Return arrows from nodes along the vectors (n, 3) of several terms, one legend entry each."""
+    terms = [vectors for vectors in terms if vectors.any()]
+    if not terms:
+        return []
+    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for vectors in terms)
+    drawn = [marks.load_arrows(points, vectors, longest, length, sight) for vectors in terms]
+    keys = [_arrow_key(color, describe(vectors)) for vectors in terms[:_MOST_LOADS_LISTED]]
+    hidden = len(terms) - _MOST_LOADS_LISTED
     if hidden > 0:
         keys.append(Line2D([], [], linestyle="none", label=f"and {hidden} more loads"))
-    return keys
+    shafts, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    return [_Arrows(shafts, heads, color, keys)]
+
+
+def _single(
+    starts: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    length: float,
+    sight: View,
+    color: str,
+    describe: Callable[[NDArray[np.float64]], str],
+) -> list[_Arrows]:
+    """Return one arrow from each start (k, 3) along its vector (k, 3)."""
+    if not vectors.any():
+        return []
+    longest = float(np.linalg.norm(vectors, axis=1).max())
+    keys = [_arrow_key(color, describe(vector)) for vector in vectors]
+    return [_Arrows(*marks.load_arrows(starts, vectors, longest, length, sight), color, keys)]
 
 
 def _arrow_key(color: str, text: str) -> Line2D:
@@ -172,11 +269,11 @@ def _write_labels(
     sheet: Sheet3D,
     points: NDArray[np.float64],
     numbers: bool | str,
-    held: list[tuple[int, str]],
+    groups: list[_Supports],
     drawn: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     sight: View,
 ) -> None:
-    """Write node numbers and held directions where they hide least."""
+    """Write node numbers and the directions of supports where they hide least."""
     count = len(sheet.pattern.vertices)
     shown = len(points) if numbers == "all" else count if numbers else 0
     # Large sheets get smaller numbers, closer to their nodes.
@@ -196,9 +293,11 @@ def _write_labels(
         inner = node >= count
         color = style.GRAY if inner else style.BLACK
         labels.add(points[node], str(node), color, crowd * (style.TICK if inner else style.LABEL))
-    for node, names in held:
-        corners = triangles[[np.allclose(t[0], points[node]) for t in triangles]]
-        # Beside the foot of the lowest triangle, away from the node's own number.
-        foot = corners[:, 1:].mean(axis=1)
-        lowest = foot[np.argmin(sight.flat(foot)[:, 1])]
-        labels.add(lowest, names, style.SUPPORT, max(crowd, 0.75) * style.TICK)
+    for group in groups:
+        for node, names in group.axes:
+            tips = group.triangles[:, 0]
+            corners = group.triangles[[np.allclose(tip, points[node]) for tip in tips]]
+            # Beside the foot of the lowest triangle, away from the node's own number.
+            foot = corners[:, 1:].mean(axis=1)
+            lowest = foot[np.argmin(sight.flat(foot)[:, 1])]
+            labels.add(lowest, names, group.ink, max(crowd, 0.75) * style.TICK)

@@ -34,7 +34,11 @@ DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)
 CREASES = {"M": VERMILLION, "V": BLUE, "F": GRAY, "U": PURPLE}
 CREASE_NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned"}
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
+ACTUATED = YELLOW
 SUPPORT = GREEN
+IMPOSED = ORANGE
+IMPOSED_TEXT = "#8A5A00"  # the same, dark enough to be read
+BASE = SKY
 LOAD = PURPLE
 GRAVITY = BLACK
 
@@ -97,6 +101,18 @@ def exponents(axes: Axes, ticks: int = 6) -> None:
     axes.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
     axes.yaxis.get_offset_text().set(fontsize=TICK, color=BLACK)
     axes.locator_params(axis="y", nbins=ticks)
+
+
+def columns_that_fit(labels: Sequence[str], width: float, most: int) -> int:
+    """Columns of a legend, at most `most`, that fit a width (inches) by the length of its texts."""
+    letter, handle, gap = 0.065, 0.38, 0.22  # inches, at the size of the legend's font
+    for columns in range(most, 1, -1):
+        rows = -(-len(labels) // columns)
+        filled = [labels[k : k + rows] for k in range(0, len(labels), rows)]
+        longest = [max(len(label) for label in column) for column in filled]
+        if sum(letter * n + handle + gap for n in longest) - gap <= width:
+            return columns
+    return 1
 
 
 def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:

@@ -46,7 +46,7 @@ def write_motion(
         draw().savefig(path, dpi=DPI)
         return Picture(path, caption)
 
-    duration = float(trajectory.attrs["duration"])
+    start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
     rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
     sections: list[Section] = [
         Heading("The structure"),
@@ -62,12 +62,12 @@ def write_motion(
             lambda: plots.plot_laws(case.structure),
         ),
     ]
-    if case.loads:
+    if case.loads or case.imposed_terms or case.base_terms:
         sections.append(
             figure(
                 "load",
-                "The load over time.",
-                lambda: plots.plot_load_history(case, duration),
+                "Loads and imposed motions over time.",
+                lambda: plots.plot_load_history(case, duration, start=start),
             )
         )
     sections += [

@@ -2,6 +2,7 @@
 
 from foldyn.results.dataset import trajectory_dataset
 from foldyn.results.origin import case_of, check_result
+from foldyn.results.path import path_dataset
 from foldyn.results.store import load, save
 
-__all__ = ["case_of", "check_result", "load", "save", "trajectory_dataset"]
+__all__ = ["case_of", "check_result", "load", "path_dataset", "save", "trajectory_dataset"]

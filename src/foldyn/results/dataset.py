@@ -12,7 +12,7 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import HISTORIES, Case
+from foldyn.cases import HISTORIES, Case, Fix
 from foldyn.cases.document import Document, to_document
 
 FORMAT = 1
@@ -55,8 +55,8 @@ def trajectory_dataset(
     energies : mapping of str to array_like, shape (nt,)
         kinetic, strain_bars, strain_folds, strain_bends, dissipated, work (J).
     statistics : mapping
-        Facts about the run, each stored as an attribute. `dt` (s) and `steps` give the stage
-        times t_n and t_n + dt/2 at which functions of time are sampled.
+        Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the
+        stage times t_n and t_n + dt/2 at which functions of time are sampled.
 
     Returns
     -------
@@ -69,48 +69,82 @@ def trajectory_dataset(
         case, else 0, and `not_rerunnable_because` says why.
     """
     time = np.array(time, dtype=np.float64)
-    node_axis = ("node", "axis")
-    support = case.supported_dofs
-    data: dict[str, Any] = {
-        "displacement": _variable(
-            ("time", *node_axis), displacement, "m", "displacement from the rest position"
-        ),
-        "velocity": _variable(("time", *node_axis), velocity, "m/s", "velocity"),
-        "reaction": _variable(("time", "support"), reaction, "N", "force of the support"),
-    }
+    data = motion_variables("time", displacement, reaction)
+    data["velocity"] = variable(("time", "node", "axis"), velocity, "m/s", "velocity")
     for name, text in ENERGIES.items():
-        data[name] = _variable(("time",), energies[name], "J", text)
-    sampled = any(type(load.history) not in HISTORIES.values() for load in case.loads)
-    document = to_document(case, stage_times(statistics) if sampled else None)
-    data.update(_case_variables(document))
+        data[name] = variable(("time",), energies[name], "J", text)
+    varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
+    sampled = any(type(part.history) not in HISTORIES.values() for part in varying)
+    times = stage_times(statistics) if sampled else None
+    along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
+    return result_dataset("trajectory", case, data, along, statistics, times)
+
+
+def motion_variables(along: str, displacement: ArrayLike, reaction: ArrayLike) -> dict[str, Any]:
+    """Displacements (m) and reactions (N) along a dimension, as variables of a result."""
+    text = "displacement from the rest position"
+    return {
+        "displacement": variable((along, "node", "axis"), displacement, "m", text),
+        "reaction": variable((along, "support"), reaction, "N", "force of the support"),
+    }
+
+
+def result_dataset(
+    kind: str,
+    case: Case,
+    data: Mapping[str, Any],
+    along: Mapping[str, Any],
+    statistics: Mapping[str, Any],
+    times: NDArray[np.float64] | None = None,
+    obstacles: tuple[str, ...] = (),
+) -> xr.Dataset:
+    """Variables of a result, with its case and the facts about its run.
+
+    Parameters
+    ----------
+    kind : str
+        Attribute `foldyn_result`.
+    case : Case
+    data, along : mapping
+        Variables, and the coordinates of the dimension along which the result runs.
+    statistics : mapping
+        Facts about the run.
+    times : ndarray, optional
+        Times (s) at which functions of time are sampled.
+    obstacles : tuple of str
+        Why the result cannot be run again from itself, beside what the case says.
+    """
+    support = case.supported_dofs
+    document = to_document(case, times)
+    obstacles = (*document.obstacles, *obstacles)
     attributes: dict[str, Any] = {
-        "foldyn_result": "trajectory",
+        "foldyn_result": kind,
         "foldyn_format": FORMAT,
         "foldyn_version": _version(),
-        "rerunnable": 0 if document.obstacles else 1,
+        "rerunnable": 0 if obstacles else 1,
     }
-    if document.obstacles:
-        attributes["not_rerunnable_because"] = "; ".join(document.obstacles)
+    if obstacles:
+        attributes["not_rerunnable_because"] = "; ".join(obstacles)
     attributes.update(_attributes(statistics))
     coordinates = {
-        "time": ("time", time, {"units": "s", "long_name": "time"}),
+        **along,
         "node": np.arange(len(case.structure.nodes)),
         "axis": AXIS,
         "support_node": ("support", support // 3),
         "support_axis": ("support", AXIS[support % 3]),
     }
-    return xr.Dataset(data, coordinates, attributes)
+    return xr.Dataset({**data, **_case_variables(document)}, coordinates, attributes)
 
 
 def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
-    """Return the times n dt and n dt + dt/2 of a run from its `dt` (s) and `steps`, else None."""
+    """Return t_n = start + n dt and t_n + dt/2 of a run from `start`, `dt` (s) and `steps`."""
     dt, steps = statistics.get("dt"), statistics.get("steps")
     if dt is None or steps is None or int(steps) < 1:
         return None
-    steps = int(steps)
+    steps, dt = int(steps), float(dt)
     times = np.empty(2 * steps + 1)
-    times[::2] = np.arange(steps + 1) * float(dt)
-    times[1::2] = np.arange(steps) * float(dt) + 0.5 * float(dt)
+    times[::2] = float(statistics.get("start", 0.0)) + np.arange(steps + 1) * dt
+    times[1::2] = times[:-1:2] + 0.5 * dt
     return times
 
 
@@ -135,7 +169,8 @@ def _case_variables(document: Document) -> dict[str, Any]:
     return variables
 
 
-def _variable(dimensions: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
+def variable(dimensions: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
+    """Variable of a result with its units and a text for axes of figures."""
     return dimensions, np.asarray(values), {"units": units, "long_name": text}
 
 

@@ -1,0 +1,185 @@
+"""Histories inside compiled loops: the formulas of all built-in ones, and calls of the user's own.
+
+A formula stands here once; `History.factor` and the integrators both evaluate it. Each gives the
+factor and its first and second derivative in time, which imposed motions need; where a derivative
+jumps, the value after the jump.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.materials.call import call1
+from foldyn.materials.compiled import kernel
+
+CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
+CALLED = -1
+PARAMETERS = 4
+
+
+class Waveforms(NamedTuple):
+    """h histories as arrays; tables are cubic polynomials between k knots."""
+
+    code: NDArray  # (h,)
+    parameters: NDArray  # (h, 4)
+    first: NDArray  # (h + 1,) first knot of each
+    knot: NDArray  # (k,) times, s
+    cubic: NDArray  # (k, 4) coefficients of (t - knot)^3, ^2, ^1, ^0 after each knot
+    address: NDArray  # (h,) of the user's functions
+    span: float  # distance (s) of the points from which their derivatives are taken
+
+
+class Callbacks:
+    """User functions of time made callable from compiled code.
+
+    An exception cannot pass through compiled code: the first is kept in `error`, and the factor
+    becomes nan, which the integrators notice. The object must live as long as the addresses serve.
+    """
+
+    def __init__(self) -> None:
+        self.error: BaseException | None = None
+        self._kept: list[Any] = []
+
+    def address(self, function: Callable[[float], float]) -> int:
+        """Address of a compiled function float64(float64) that calls `function`."""
+
+        def guarded(time: float) -> float:
+            if self.error is not None:
+                return math.nan
+            try:
+                return float(function(time))
+            except BaseException as error:
+                self.error = error
+                return math.nan
+
+        entry = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(guarded)
+        self._kept.append(entry)
+        return ctypes.cast(entry, ctypes.c_void_p).value or 0
+
+
+def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> Waveforms:
+    """Histories as arrays for compiled code.
+
+    A history has `code` and `parameters()`, tables also `polynomials()`; one whose code is
+    `CALLED` is called through `callbacks`. `span` is a time (s) short against its variations.
+    """
+    parameters = np.zeros((len(histories), PARAMETERS))
+    knots, cubics = [np.zeros(0)], [np.zeros((0, 4))]
+    for row, history in enumerate(histories):
+        given = history.parameters()
+        parameters[row, : len(given)] = given
+        knot, cubic = history.polynomials()
+        knots.append(knot)
+        cubics.append(cubic)
+    return Waveforms(
+        code=np.array([history.code for history in histories], np.int64),
+        parameters=parameters,
+        first=np.cumsum([0, *map(len, knots[1:])]).astype(np.int64),
+        knot=np.concatenate(knots),
+        cubic=np.ascontiguousarray(np.concatenate(cubics)),
+        address=np.array(
+            [callbacks.address(h) if h.code == CALLED else 0 for h in histories], np.int64
+        ),
+        span=float(span),
+    )
+
+
+@kernel
+def waveform(w, row, t, derive):
+    """Factor of a history at time t and its two derivatives (per s and s2).
+
+    derive : whether the derivatives are wanted; without it those of the user's functions, which
+    cost several calls, are 0.
+    """
+    code = w.code[row]
+    a, b, c, d = w.parameters[row, 0], w.parameters[row, 1], w.parameters[row, 2], 0.0
+    if code == CALLED:
+        return _called(w.address[row], t, w.span, derive)
+    if code == PULSE:
+        return (1.0 if 0.0 <= t < a else 0.0), 0.0, 0.0
+    if code == HALF_SINE:
+        if not 0.0 <= t < a:
+            return 0.0, 0.0, 0.0
+        p = math.pi / a
+        s = math.sin(math.pi * t / a)
+        return s, p * math.cos(math.pi * t / a), -p * p * s
+    if code == RAMP:
+        return min(max(t / a, 0.0), 1.0), (1.0 / a if 0.0 <= t < a else 0.0), 0.0
+    if code == SMOOTH_RAMP:
+        x = min(max(t / a, 0.0), 1.0)
+        d = x * (1.0 - x)
+        factor = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+        return factor, 30.0 * d * d / a, 60.0 * d * (1.0 - 2.0 * x) / (a * a)
+    if code == STEP:
+        return (1.0 if t >= a else 0.0), 0.0, 0.0
+    if code == HARMONIC:
+        omega = 2.0 * math.pi * a
+        s = math.sin(omega * t + b)
+        return s, omega * math.cos(omega * t + b), -omega * omega * s
+    if code == CHIRP:  # start, slope of the frequency, phase, duration
+        d = w.parameters[row, 3]
+        if not 0.0 <= t < d:
+            return 0.0, 0.0, 0.0
+        phase = 2.0 * math.pi * ((a + 0.5 * b * t) * t) + c
+        omega = 2.0 * math.pi * (a + b * t)
+        s, r = math.sin(phase), math.cos(phase)
+        return s, omega * r, 2.0 * math.pi * b * r - omega * omega * s
+    if code == TABLE:
+        return _tabulated(w, row, t)
+    return 1.0, 0.0, 0.0
+
+
+@kernel
+def _tabulated(w, row, t):
+    """Piecewise polynomial, its first and last value held outside."""
+    low, high = w.first[row], w.first[row + 1] - 1
+    if t < w.knot[low]:
+        return w.cubic[low, 3], 0.0, 0.0
+    while high - low > 1:  # the last knot has a constant of its own
+        middle = (low + high) // 2
+        low, high = (middle, high) if t >= w.knot[middle] else (low, middle)
+    if t >= w.knot[high]:
+        low = high
+    x, p = t - w.knot[low], w.cubic[low]
+    return (
+        ((p[0] * x + p[1]) * x + p[2]) * x + p[3],
+        (3.0 * p[0] * x + 2.0 * p[1]) * x + p[2],
+        6.0 * p[0] * x + 2.0 * p[1],
+    )
+
+
+@kernel
+def _called(address, t, h, derive):
+    """A user's function and its derivatives by differences of the fourth order.
+
+    Before 2h the points lie ahead: a function of time need not be defined before 0.
+    """
+    f = call1(address, t)
+    if not derive:
+        return f, 0.0, 0.0
+    if t >= 2.0 * h:
+        a, b = call1(address, t - 2.0 * h), call1(address, t - h)
+        c, d = call1(address, t + h), call1(address, t + 2.0 * h)
+        rate = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
+        return f, rate, (16.0 * (b + c) - a - d - 30.0 * f) / (12.0 * h * h)
+    a, b = call1(address, t + h), call1(address, t + 2.0 * h)
+    c, d = call1(address, t + 3.0 * h), call1(address, t + 4.0 * h)
+    rate = (48.0 * a - 25.0 * f - 36.0 * b + 16.0 * c - 3.0 * d) / (12.0 * h)
+    e = call1(address, t + 5.0 * h)
+    second = (45.0 * f - 154.0 * a + 214.0 * b - 156.0 * c + 61.0 * d - 10.0 * e) / (12.0 * h * h)
+    return f, rate, second
+
+
+@kernel
+def waveform_table(w, row, times):
+    """Factors of a history and their derivatives (3, n) at times (n,)."""
+    out = np.empty((3, times.size))
+    for i in range(times.size):
+        out[0, i], out[1, i], out[2, i] = waveform(w, row, times[i], True)
+    return out

@@ -1,0 +1,102 @@
+"""Where a motion stands, where it goes and what it leaves behind: the arguments of integrators."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
+from foldyn.dynamics.system import record
+from foldyn.materials.compiled import scalar
+
+
+class Plan(NamedTuple):
+    """Steps and samples. With a fixed step, step n is at start + n dt; `end` serves the others."""
+
+    start: float  # s
+    end: float  # s
+    dt: float  # the step, or the largest one, s
+    steps: int  # of a fixed step; else 0
+    every: int  # steps between samples; 0: samples are `interval` apart
+    interval: float  # s
+    tolerance: float  # relative error of a step; 0 with a fixed step
+
+
+class Course(NamedTuple):
+    """State of a motion between two stretches of steps, changed in place."""
+
+    u: NDArray  # (n, 3) displacement without that of moving supports, m
+    v: NDArray  # (n, 3) velocity likewise, m/s
+    carry: NDArray  # (n, 3) acceleration, for methods that keep it
+    tally: NDArray  # (4,) work of the loads, energy dissipated (J), and two more of the method
+    angle: NDArray  # (nh,) dihedrals at the last step seen, rad
+    count: NDArray  # (4,) int64: steps done, samples written, steps refused, force evaluations
+    clock: NDArray  # (8,) time reached (s), and what methods with a variable step keep
+
+
+class Samples(NamedTuple):
+    """Output of k samples, s supported dofs."""
+
+    time: NDArray  # (k,) s
+    displacement: NDArray  # (k, n, 3)
+    velocity: NDArray  # (k, n, 3)
+    reaction: NDArray  # (k, s)
+    energy: NDArray  # (k, 6) as in `audit.AUDITED`
+
+
+def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
+    """Room for `count` samples."""
+    return Samples(
+        np.empty(count),
+        np.empty((count, nodes, 3)),
+        np.empty((count, nodes, 3)),
+        np.empty((count, supported)),
+        np.empty((count, energies)),
+    )
+
+
+@scalar
+def passed_through(now, before):
+    """Hinge whose dihedral jumped by more than pi, or -1; `before` (nh,) becomes `now`."""
+    jumps = 0
+    for e in range(now.size):
+        jumps += abs(now[e] - before[e]) > np.pi
+    if jumps > 0:
+        for e in range(now.size):
+            if abs(now[e] - before[e]) > np.pi:
+                return e
+    for e in range(now.size):
+        before[e] = now[e]
+    return -1
+
+
+@scalar
+def sample(model, system, mass, u, v, a, t, course, out, s):
+    """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
+    k = course.count[1]
+    out.time[k] = t
+    record(
+        model, system, mass, u, v, a, course.tally, s,
+        out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
+    )  # fmt: skip
+    if not np.isfinite(out.energy[k].sum()):
+        return NOT_FINITE
+    course.count[1] += 1
+    return DONE
+
+
+@scalar
+def observe(model, system, mass, course, a, t, plan, out, work, s):
+    """Look for panels that passed through each other, and sample every `plan.every` steps.
+
+    Methods with a fixed step call it at t_n after `acceleration`, perhaps twice at the end of a
+    stretch. Returns (outcome, hinge).
+    """
+    hinge = passed_through(work.angle, course.angle)
+    if hinge >= 0:
+        return PENETRATION, hinge
+    if course.count[0] == course.count[1] * plan.every:
+        return sample(model, system, mass, course.u, course.v, a, t, course, out, s), -1
+    return DONE, -1

@@ -1,0 +1,234 @@
+"""The Runge-Kutta pair of order 5(4) of Dormand and Prince, with error control and dense output.
+
+Coefficients: Dormand and Prince, J. Comput. Appl. Math. 6, 1980; the interpolant of order 4:
+Shampine, Math. Comput. 46, 1986; the control of the step: Hairer, Norsett and Wanner, Solving
+Ordinary Differential Equations I, section II.4 (the proportional and integral control of
+Gustafsson). The last stage of a step is the first of the next one: six force evaluations a step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foldyn.dynamics.course import passed_through, sample
+from foldyn.dynamics.outcome import DONE, FULL, NOT_FINITE, PENETRATION, STUCK
+from foldyn.dynamics.stability import roots
+from foldyn.dynamics.system import acceleration
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics.flat import flat
+
+ORDER = 5
+
+C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+A = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
+        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+# weights of the solution of order 5 minus those of order 4
+E = np.array(
+    [71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
+)
+# column j: the weights of theta^(j+1) at the fraction theta of a step
+P = np.array(
+    [
+        [
+            1.0,
+            -8048581381 / 2820520608,
+            8663915743 / 2820520608,
+            -12715105075 / 11282082432,
+        ],
+        [0.0, 0.0, 0.0, 0.0],
+        [
+            0.0,
+            131558114200 / 32700410799,
+            -68118460800 / 10900136933,
+            87487479700 / 32700410799,
+        ],
+        [
+            0.0,
+            -1754552775 / 470086768,
+            14199869525 / 1410260304,
+            -10690763975 / 1880347072,
+        ],
+        [
+            0.0,
+            127303824393 / 49829197408,
+            -318862633887 / 49829197408,
+            701980252875 / 199316789632,
+        ],
+        [0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
+        [0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
+    ]
+)
+SMALLEST = 1e-13  # step relative to the end of the motion
+ROUNDING = 1e-9  # of a step: how far a sample may lie beyond its end
+
+
+def growth(omega, damping, dt):
+    """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
+
+    The exponential series to the fifth power, plus z^6 / 600.
+    """
+    z = roots(omega, damping) * dt
+    series = 1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z / 600)))
+    return np.abs(1.0 + z * (1.0 + z * series)).max(axis=0)
+
+
+@kernel
+def _combine(base, slopes, weights, h, count, out):
+    """out = base + h sum of weights times the first `count` slopes; all but weights (., n)."""
+    for i in range(base.size):
+        total = 0.0
+        for j in range(count):
+            total += weights[j] * slopes[j, i]
+        out[i] = base[i] + h * total
+
+
+@kernel
+def _largest(values):
+    out = 0.0
+    for i in range(values.size):
+        out = max(out, abs(values[i]))
+    return out
+
+
+@kernel
+def _error(slopes, h):
+    """Largest entry of h sum of E times slopes (7, n); nan where one is nan."""
+    out, wrong = 0.0, 0
+    for i in range(slopes.shape[1]):
+        total = 0.0
+        for j in range(7):
+            total += E[j] * slopes[j, i]
+        wrong += not abs(total) < np.inf
+        out = max(out, abs(total))
+    return np.nan if wrong > 0 else h * out
+
+
+@kernel
+def _weights(theta, out):
+    """Weights (7,) of the slopes at the fraction theta of a step, over the step."""
+    for j in range(7):
+        p = P[j]
+        out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))
+
+
+@kernel
+def advance(model, system, mass, course, plan, out, work, s, stretch):
+    """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
+
+    The error of a step is that of the worst node, relative to the largest displacement and the
+    largest velocity that the motion has had so far. clock: the time, the next step, the last
+    error, these two largest values, the smallest and the largest step, the end of the last step.
+    """
+    clock, count, tally = course.clock, course.count, course.tally
+    n = course.u.size
+    u, v = flat(course.u), flat(course.v)
+    speeds, accelerations = np.empty((7, n)), np.empty((7, n))
+    powers, weights, end_tally = np.empty((2, 7)), np.empty(7), np.empty(2)
+    ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
+    fut, fvt, fa = flat(ut), flat(vt), flat(a)
+    if count[0] == 0:
+        powers[0, 0], powers[1, 0] = acceleration(
+            model, system, mass, course.u, course.v, plan.start, a, work, s
+        )
+        if count[1] == 0:
+            clock[3], clock[4] = _largest(u), _largest(v)
+            found = sample(model, system, mass, course.u, course.v, a, plan.start, course, out, s)
+            if found != DONE:
+                return found, -1
+    else:
+        powers[0, 0], powers[1, 0] = tally[2], tally[3]
+        for i in range(n):
+            fa[i] = flat(course.carry)[i]
+    for i in range(n):
+        speeds[0, i], accelerations[0, i] = v[i], fa[i]
+    last = count[0] + stretch
+    while count[0] < last and clock[0] < plan.end:
+        if plan.every > 0 and count[1] == out.time.size:
+            break
+        t, h = clock[0], min(clock[1], plan.end - clock[0])
+        if t + 1.01 * h >= plan.end:  # no tiny step at the end
+            h = plan.end - t
+        if h < SMALLEST * max(abs(plan.end), abs(t)):
+            return STUCK, -1
+        for stage in range(1, 7):
+            _combine(u, speeds, A[stage], h, stage, fut)
+            _combine(v, accelerations, A[stage], h, stage, fvt)
+            powers[0, stage], powers[1, stage] = acceleration(
+                model, system, mass, ut, vt, t + C[stage] * h, a, work, s
+            )
+            for i in range(n):
+                speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
+        count[3] += 6
+        scale_u = max(clock[3], _largest(fut)) * plan.tolerance
+        scale_v = max(clock[4], _largest(fvt)) * plan.tolerance
+        error_u, error_v = _error(speeds, h), _error(accelerations, h)
+        error = 0.0
+        if error_u > 0.0 or error_v > 0.0:
+            error = max(error_u / scale_u, error_v / scale_v)
+        if not abs(error) < np.inf:  # too far: try less
+            clock[1] = 0.2 * h
+            count[2] += 1
+            if clock[1] < SMALLEST * max(abs(plan.end), abs(t)):
+                return NOT_FINITE, -1
+            continue
+        factor = 5.0 if error == 0.0 else 0.9 * error**-0.17 * clock[2] ** 0.04
+        if error > 1.0:
+            clock[1] = h * max(0.2, min(factor, 0.9))
+            count[2] += 1
+            continue
+        hinge = passed_through(work.angle, course.angle)
+        if hinge >= 0:
+            return PENETRATION, hinge
+        after = plan.end if h == plan.end - t else t + h
+        count[0] += 1
+        clock[5], clock[6] = min(clock[5], h), max(clock[6], h)
+        for k in range(2):
+            end_tally[k] = tally[k]
+            for j in range(6):
+                end_tally[k] += h * A[6, j] * powers[k, j]
+        due = plan.start + count[1] * plan.interval
+        begun = tally[0], tally[1]
+        while plan.every == 0 and count[1] < out.time.size and due <= after + ROUNDING * h:
+            _weights(min(1.0, (due - t) / h), weights)
+            _combine(u, speeds, weights, h, 7, fut)
+            _combine(v, accelerations, weights, h, 7, fvt)
+            for k in range(2):
+                tally[k] = begun[k]
+                for j in range(7):
+                    tally[k] += h * weights[j] * powers[k, j]
+            acceleration(model, system, mass, ut, vt, due, a, work, s)
+            count[3] += 1
+            found = sample(model, system, mass, ut, vt, a, due, course, out, s)
+            if found != DONE:
+                return found, -1
+            due = plan.start + count[1] * plan.interval
+        tally[0], tally[1] = end_tally[0], end_tally[1]
+        _combine(u, speeds, A[6], h, 6, fut)
+        for i in range(n):
+            u[i], v[i] = fut[i], speeds[6, i]
+            speeds[0, i], accelerations[0, i] = speeds[6, i], accelerations[6, i]
+        for k in range(2):
+            powers[k, 0] = powers[k, 6]
+        clock[0], clock[2] = after, max(error, 1e-4)
+        clock[3], clock[4] = scale_u / plan.tolerance, scale_v / plan.tolerance
+        clock[1] = min(plan.dt, h * max(0.2, min(factor, 5.0)))
+        if plan.every > 0 and count[0] % plan.every == 0:
+            acceleration(model, system, mass, course.u, course.v, after, a, work, s)
+            count[3] += 1
+            found = sample(model, system, mass, course.u, course.v, a, after, course, out, s)
+            if found != DONE:
+                return found, -1
+    tally[2], tally[3] = powers[0, 0], powers[1, 0]
+    for i in range(n):
+        flat(course.carry)[i] = accelerations[0, i]
+    full = plan.every > 0 and count[1] == out.time.size and clock[0] < plan.end
+    return (FULL if full else DONE), -1

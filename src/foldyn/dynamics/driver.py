@@ -1,0 +1,185 @@
+"""`simulate`: the motion of a case from an initial state, and what makes it ready to run."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from functools import partial
+from numbers import Real
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, Rayleigh, State
+from foldyn.dynamics.critical_step import critical_step
+from foldyn.dynamics.inertia import check_mass
+from foldyn.dynamics.methods import method_of
+from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.start import begin, check_start, check_steady
+from foldyn.dynamics.system import pack
+from foldyn.dynamics.timing import (
+    check_memory,
+    expected_samples,
+    fixed_steps,
+    positive,
+    variable_steps,
+)
+from foldyn.errors import FoldynWarning, InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+MANY_STEPS = 20_000_000  # beyond which the user is told before the run
+TOLERANCE = 1e-6  # relative error of a step that is chosen by it
+SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
+
+
+def simulate(
+    case: Case,
+    duration: float,
+    method: str = "rk4",
+    dt: float | None = None,
+    every: int | float = 1,
+    initial: State | None = None,
+    force: bool = False,
+    tolerance: float | None = None,
+    start: float = 0.0,
+    progress: bool | Reporter | None = None,
+) -> xarray.Dataset:
+    """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
+
+    Parameters
+    ----------
+    case : Case
+    duration : float
+        Simulated time (s). The last step is the last that does not go beyond it.
+    method : {"rk4", "central_difference", "dormand_prince"}
+        Integrator. The last one chooses its steps by their error.
+    dt : float, optional
+        Time step (s). Without it, half the critical step, shortened to divide `every`. With
+        `dormand_prince` the largest step; without it the critical one.
+    every : int or float, default 1
+        Sampling interval: an int counts steps, a float is seconds.
+    initial : State, optional
+        Displacement and velocity at the start; rest by default. Supported nodes stay where it
+        puts them, base motions start from there, and imposed displacements must agree with it.
+    force : bool, default False
+        Integrate even with a step above the critical one.
+    tolerance : float, optional
+        Relative error of a step with `dormand_prince`, 1e-6 by default: that of the worst node's
+        displacement and velocity, relative to the largest ones that the motion has had so far.
+    start : float, default 0.0
+        Time (s) at which the motion starts, that of the first sample: histories go on from there
+        when a stored motion is continued.
+    progress : bool or callable, optional
+        True shows a bar; a callable gets a `Progress` several times a second.
+
+    Returns
+    -------
+    xarray.Dataset
+        `displacement` (m) and `velocity` (m/s) with dimensions time, node, axis; `reaction` (N)
+        at supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`,
+        `strain_bends`, `dissipated`, `work` (of loads, moving supports and actuated folds). First
+        sample at the start. Attributes hold the statistics of the run; the case travels along
+        (`foldyn.case_of`).
+
+    Raises
+    ------
+    InputError
+        An argument out of range, a step above the critical one, a free node without mass.
+    InstabilityError, PenetrationError
+        The motion grew without bound or became NaN; panel passed through panel. What was
+        computed until then is in the exception's `partial`.
+
+    Warns
+    -----
+    FoldynWarning
+        The energy balance is off by more than 1 % of the energies at play.
+
+    Notes
+    -----
+    Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. Damping is
+    C = alpha M + beta K0, K0 the tangent at rest.
+    """
+    motion = prepare(case, duration, method, dt, every, initial, force, tolerance, start)
+    return motion.run(progress)
+
+
+def prepare(
+    case: Case,
+    duration: float,
+    method: str = "rk4",
+    dt: float | None = None,
+    every: int | float = 1,
+    initial: State | None = None,
+    force: bool = False,
+    tolerance: float | None = None,
+    start: float = 0.0,
+) -> Motion:
+    """Check everything that `simulate` checks and choose the step, without computing a motion.
+
+    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`.
+    """
+    if not isinstance(case, Case):
+        raise InputError(f"case: got {type(case).__name__}, give a Case")
+    integrator = method_of(method)
+    positive("duration", duration)
+    if not isinstance(force, bool):
+        raise InputError(f"force = {force!r}: give True or False")
+    if not len(case.free_dofs):
+        raise InputError(
+            "supports: hold every node along x, y and z, so that nothing can move: free one"
+        )
+    if isinstance(start, bool) or not isinstance(start, Real) or not math.isfinite(start):
+        raise InputError(f"start = {start!r}: give a finite time (s)")
+    u, v = check_start(case, initial)
+    check_mass(case.structure.mass, case.fixed)
+    critical = critical_step(case, method, u)
+    if integrator.adaptive:
+        tolerance = TOLERANCE if tolerance is None else positive("tolerance", tolerance)
+        largest = math.inf if force else critical
+        plan = variable_steps(duration, dt, every, largest, float(start), tolerance)
+    elif tolerance is not None:
+        raise InputError(
+            f"tolerance = {tolerance!r}: {method} has fixed steps; give dt, or choose "
+            "dormand_prince"
+        )
+    else:
+        plan = fixed_steps(duration, dt, every, critical, float(start))
+    _warn_of_damping(case, method, u, critical)
+    if not force and plan.dt > critical:
+        raise InputError(
+            f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
+            "one or leave dt out (force = true integrates all the same)"
+        )
+    check_memory(expected_samples(plan), len(u), len(case.supported_dofs))
+    check_steady(case, plan.start, plan.end)
+    steps = (plan.end - plan.start) / plan.dt
+    if steps > MANY_STEPS:
+        warnings.warn(
+            f"{steps:.3g} steps of {plan.dt:.3g} s are a long way (critical step "
+            f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    packed = pack(case, SPAN * min(plan.dt, critical))
+    beginning = partial(begin, case, u, v, plan, packed)
+    return Motion(case, integrator, plan, critical, force, beginning, packed)
+
+
+def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
+    """Say so where stiffness-proportional damping makes an explicit step very small."""
+    if case.damping.beta == 0.0:
+        return
+    without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
+    if without > DAMPING_COST * critical:
+        warnings.warn(
+            f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "
+            f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
+            "resolve the damping of the fastest vibration; alpha costs nothing",
+            FoldynWarning,
+            stacklevel=4,
+        )

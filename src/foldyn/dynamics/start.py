@@ -1,0 +1,88 @@
+"""How a motion starts: the initial state against the supports and their motions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, State
+from foldyn.dynamics.course import Course, Plan
+from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
+from foldyn.errors import InputError
+from foldyn.mechanics import angles
+
+AXES = "xyz"
+FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
+AGREES = 1e-9  # of the longest bar: how near a node must stand to where it is imposed
+
+
+def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
+    """Displacement and velocity (n, 3) at the start, checked."""
+    if initial is not None and not isinstance(initial, State):
+        raise InputError(
+            f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
+            "velocity=...) or fd.initial_state(result)"
+        )
+    shape = case.structure.nodes.shape
+    pair = []
+    for name in ("displacement", "velocity"):
+        value = getattr(initial, name, None)
+        array = np.zeros(shape) if value is None else np.array(value, float)
+        if array.shape != shape:
+            raise InputError(f"initial: {name} of shape {array.shape}: the case has {shape}")
+        pair.append(np.ascontiguousarray(array))
+    held = case.fixed & ~case.imposed
+    for vector, _ in case.base_terms:
+        held &= vector == 0.0
+    if (pair[1][held] != 0.0).any():
+        node = int(np.argwhere((pair[1] != 0.0) & held)[0][0])
+        raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
+    return pair[0], pair[1]
+
+
+def check_steady(case: Case, start: float, end: float) -> None:
+    """Refuse a support or a fold that is to move in no time."""
+    moved = [("supports: an imposed displacement", term) for term in case.imposed_terms]
+    moved += [("supports: a base motion", term) for term in case.base_terms]
+    moved += [("loads: an actuation", term) for term in case.actuation_terms]
+    for what, (_, history) in moved:
+        for time in history.jumps():
+            if start < time < end:
+                raise InputError(
+                    f"{what} with the history {history.kind} jumps at t = {time:g} s, but nothing "
+                    "moves in no time: use a ramp, a half sine or a table"
+                )
+
+
+def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Course:
+    """State of the integrators at the start of a motion with displacement u and velocity v."""
+    model, system, mass, callbacks = packed
+    s = scratch(len(u), len(system.waves.code))
+    place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
+    if callbacks.error is not None:
+        raise callbacks.error
+    q, w = u - s.displacement, v - follow(mass, np.where(case.fixed, v, 0.0))
+    imposed = case.imposed
+    apart = np.where(imposed, np.abs(q), 0.0)
+    if apart.max() > AGREES * case.structure.bar_length.max():
+        node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
+        raise InputError(
+            f"supports: node {node} is imposed {s.displacement[node, axis]:.6g} m along "
+            f"{AXES[axis]} at the start, but stands at {u[node, axis]:.6g} m: give a history that "
+            "begins there, as a ramp does from rest, or start from a state that has been brought "
+            "there"
+        )
+    q[imposed] = 0.0
+    tally = np.zeros(4)
+    tally[0] = -moving_energy(system, s)
+    first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
+    clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
+    return Course(
+        u=np.ascontiguousarray(q),
+        v=np.ascontiguousarray(w),
+        carry=np.zeros_like(u),
+        tally=tally,
+        angle=angles(model.rest + u, model.hinges),
+        count=np.zeros(4, np.int64),
+        clock=clock,
+    )

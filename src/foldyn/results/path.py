@@ -1,0 +1,75 @@
+"""Dataset of an equilibrium path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from foldyn.cases import Case
+from foldyn.results.dataset import motion_variables, result_dataset, variable
+
+PATH_ENERGIES: Mapping[str, str] = {
+    "strain_bars": "strain energy of the bars",
+    "strain_folds": "strain energy of the folds",
+    "strain_bends": "strain energy of the bends",
+    "work": "work of loads, supports and actuators since the first point",
+}
+_KINDS = ("regular", "limit", "bifurcation")
+
+
+def path_dataset(
+    case: Case,
+    load_factor: ArrayLike,
+    displacement: ArrayLike,
+    reaction: ArrayLike,
+    energies: Mapping[str, ArrayLike],
+    solution: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any],
+    obstacles: tuple[str, ...] = (),
+) -> xr.Dataset:
+    """Dataset of a sequence of equilibria, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What was loaded.
+    load_factor : array_like, shape (ns,)
+        Load factor of each point.
+    displacement : array_like, shape (ns, n, 3)
+        Displacement (m) of every node.
+    reaction : array_like, shape (ns, nd)
+        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+    energies : mapping of str to array_like, shape (ns,)
+        strain_bars, strain_folds, strain_bends, work (J).
+    solution : mapping of str to array_like, shape (ns,)
+        How each point was found: negative_eigenvalues (-1 if not counted), point ("regular",
+        "limit" or "bifurcation"), iterations, residual.
+    statistics : mapping
+        Facts about the run, each stored as an attribute.
+    obstacles : tuple of str
+        Why the path cannot be run again from itself, beside what the case says.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
+    """
+    factor = np.array(load_factor, dtype=np.float64)
+    data = motion_variables("step", displacement, reaction)
+    for name, text in PATH_ENERGIES.items():
+        data[name] = variable(("step",), energies[name], "J", text)
+    kinds = np.array(solution["point"], dtype=f"<U{max(map(len, _KINDS))}")
+    texts = {
+        "negative_eigenvalues": "negative eigenvalues of the tangent (unstable if any)",
+        "iterations": "Newton iterations",
+        "residual": "residual as a fraction of the forces at play",
+    }
+    for name, text in texts.items():
+        data[name] = ("step", np.asarray(solution[name]), {"long_name": text})
+    data["point"] = ("step", kinds, {"long_name": "kind of the point"})
+    along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
+    return result_dataset("path", case, data, along, statistics, None, obstacles)
