@@ -177,6 +177,13 @@ def _called(address, t, h, derive):
 
 
 @kernel
+def evaluate(w, t, derive, out):
+    """Factors of all histories and their derivatives (h, 3) at one time; see `waveform`."""
+    for row in range(out.shape[0]):
+        out[row, 0], out[row, 1], out[row, 2] = waveform(w, row, t, derive)
+
+
+@kernel
 def waveform_table(w, row, times):
     """Factors of a history and their derivatives (3, n) at times (n,)."""
     out = np.empty((3, times.size))

@@ -13,6 +13,7 @@ from foldyn.dynamics.course import observe
 from foldyn.dynamics.outcome import DONE, NOT_FINITE
 from foldyn.dynamics.system import acceleration
 from foldyn.materials.compiled import kernel
+from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 
 ORDER = 2
@@ -45,28 +46,32 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
     the powers beside the energies.
     """
-    dt, tally, a = plan.dt, course.tally, course.carry
+    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
+    course, out, s = borrowed(course), borrowed(out), borrowed(s)
+    dt, tally, count, a = plan.dt, course.tally, course.count, course.carry
+    angle, angle_now = course.angle, work.angle
     ahead = np.empty_like(course.v)
     u, v, fa, fahead = flat(course.u), flat(course.v), flat(a), flat(ahead)
-    last = min(course.count[0] + stretch, plan.steps)
-    if course.count[0] == 0:
+    last = min(count[0] + stretch, plan.steps)
+    if count[0] == 0:
         tally[2], tally[3] = acceleration(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        found, hinge = observe(model, system, mass, course, a, plan.start, plan, out, work, s)
+        found, hinge = observe(
+            model, system, mass, course, a, plan.start, count, plan.every, angle_now, angle, out, s
+        )
         if found != DONE:
             return found, hinge
-    while course.count[0] < last:
+    while count[0] < last:
         for i in range(u.size):
             v[i] += 0.5 * dt * fa[i]
             u[i] += dt * v[i]
             fahead[i] = v[i] + 0.5 * dt * fa[i]
-        course.count[0] += 1
-        course.count[3] += 1
-        course.clock[0] = plan.start + course.count[0] * dt
-        power_in, power_out = acceleration(
-            model, system, mass, course.u, ahead, course.clock[0], a, work, s
-        )
+        count[0] += 1
+        count[3] += 1
+        now = plan.start + count[0] * dt
+        course.clock[0] = now
+        power_in, power_out = acceleration(model, system, mass, course.u, ahead, now, a, work, s)
         tally[0] += 0.5 * dt * (tally[2] + power_in)
         tally[1] += 0.5 * dt * (tally[3] + power_out)
         tally[2], tally[3] = power_in, power_out
@@ -76,7 +81,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             wrong += not abs(v[i]) < np.inf
         if wrong > 0:
             return NOT_FINITE, -1
-        found, hinge = observe(model, system, mass, course, a, course.clock[0], plan, out, work, s)
+        found, hinge = observe(
+            model, system, mass, course, a, now, count, plan.every, angle_now, angle, out, s
+        )
         if found != DONE:
             return found, hinge
     return DONE, -1

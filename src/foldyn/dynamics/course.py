@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.dynamics.system import record
-from foldyn.materials.compiled import scalar
+from foldyn.materials.compiled import kernel, scalar
 
 
 class Plan(NamedTuple):
@@ -72,7 +72,7 @@ def passed_through(now, before):
     return -1
 
 
-@scalar
+@kernel
 def sample(model, system, mass, u, v, a, t, course, out, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
     k = course.count[1]
@@ -88,15 +88,16 @@ def sample(model, system, mass, u, v, a, t, course, out, s):
 
 
 @scalar
-def observe(model, system, mass, course, a, t, plan, out, work, s):
-    """Look for panels that passed through each other, and sample every `plan.every` steps.
+def observe(model, system, mass, course, a, t, count, every, now, before, out, s):
+    """Look for panels that passed through each other, and sample every `every` steps.
 
     Methods with a fixed step call it at t_n after `acceleration`, perhaps twice at the end of a
-    stretch. Returns (outcome, hinge).
+    stretch; now and before are the dihedrals (nh,) at this step and at the last. Returns
+    (outcome, hinge).
     """
-    hinge = passed_through(work.angle, course.angle)
+    hinge = passed_through(now, before)
     if hinge >= 0:
         return PENETRATION, hinge
-    if course.count[0] == course.count[1] * plan.every:
+    if count[0] == count[1] * every:
         return sample(model, system, mass, course.u, course.v, a, t, course, out, s), -1
     return DONE, -1

@@ -15,6 +15,7 @@ from foldyn.dynamics.outcome import DONE, FULL, NOT_FINITE, PENETRATION, STUCK
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
 from foldyn.materials.compiled import kernel
+from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 
 ORDER = 5
@@ -128,6 +129,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     largest velocity that the motion has had so far. clock: the time, the next step, the last
     error, these two largest values, the smallest and the largest step, the end of the last step.
     """
+    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
+    course, out, s = borrowed(course), borrowed(out), borrowed(s)
     clock, count, tally = course.clock, course.count, course.tally
     n = course.u.size
     u, v = flat(course.u), flat(course.v)

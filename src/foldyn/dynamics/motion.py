@@ -100,8 +100,7 @@ class Motion:
                     return
                 if plan.steps and step % recheck == 0 and step > done and not self.force:
                     place(system, course.u, course.v, now, memory)
-                    moved = len(system.moved.dof) > 0
-                    self._recheck(memory.displacement if moved else course.u)
+                    self._recheck(memory.displacement)
                 growth = REPORT_EVERY / max(clock, 1e-9)
                 length = max(CHUNK, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:

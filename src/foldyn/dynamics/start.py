@@ -74,7 +74,7 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
         )
     q[imposed] = 0.0
     tally = np.zeros(4)
-    tally[0] = -moving_energy(system, s)
+    tally[0] = -moving_energy(system.moved_mass, s.factor)
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
     return Course(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, History
-from foldyn.cases.waveforms import Callbacks, Waveforms, waveform
+from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuator_power, actuators, turn
 from foldyn.dynamics.inertia import (
@@ -43,6 +43,9 @@ class Entries(NamedTuple):
 class System(NamedTuple):
     """What compiled integrators need beside the model: n nodes, h histories, s supported dofs."""
 
+    varies: bool  # whether there are histories,
+    moves: bool  # supports that move,
+    turns: bool  # folds that are actuated
     supported: NDArray  # (s,) dof numbers 3 node + axis
     alpha: float
     stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
@@ -62,6 +65,7 @@ class Scratch(NamedTuple):
     product: NDArray  # (n, 3) the mass matrix times a vector
     line: NDArray  # (n,)
     energy: NDArray  # (3,)
+    time: NDArray  # (1,) when the histories were evaluated last, s
     factor: NDArray  # (h, 3) factors of the histories and their two derivatives
     displacement: NDArray  # (n, 3) u where supports move; else unused
     velocity: NDArray  # (n, 3) v likewise
@@ -95,6 +99,9 @@ def pack(case: Case, span: float) -> Packed:
         k0 = sparse.csr_array((0, 0))
     model, turned = actuators(structure, case.actuation_terms, histories)
     system = System(
+        varies=bool(histories),
+        moves=bool(moves),
+        turns=len(turned.hinge) > 0,
         supported=np.asarray(case.supported_dofs, np.int64),
         alpha=float(case.damping.alpha),
         stiff_indptr=k0.indptr.astype(np.int64),
@@ -146,37 +153,50 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 def scratch(nodes: int, histories: int) -> Scratch:
     """Memory for a model of so many nodes and histories."""
     force, product, displacement, velocity = np.zeros((4, nodes, 3))
-    energy, factor = np.zeros(3), np.zeros((histories, 3))
-    return Scratch(force, product, np.zeros(nodes), energy, factor, displacement, velocity)
+    line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
+    never = np.full(1, np.nan)
+    return Scratch(force, product, line, energy, never, factor, displacement, velocity)
 
 
 @kernel
 def place(system, q, w, t, s):
-    """Evaluate the histories at time t; displacement and velocity go to `s` where supports move."""
-    derive = system.moved.dof.size > 0 or system.actuators.hinge.size > 0
-    for row in range(s.factor.shape[0]):
-        s.factor[row, 0], s.factor[row, 1], s.factor[row, 2] = waveform(
-            system.waves, row, t, derive
-        )
-    if system.moved.dof.size > 0:
-        u, v = flat(s.displacement), flat(s.velocity)
-        fixed_u, fixed_v = flat(q), flat(w)
-        for i in range(u.size):
-            u[i], v[i] = fixed_u[i], fixed_v[i]
-        for k in range(system.moved.dof.size):
-            dof, row = system.moved.dof[k], system.moved.row[k]
-            u[dof] += system.moved.value[k] * s.factor[row, 0]
-            v[dof] += system.moved.value[k] * s.factor[row, 1]
+    """Displacement and velocity at time t, q + S f and w + S f', into `s`."""
+    evaluate(system.waves, t, True, s.factor)
+    s.time[0] = t
+    _carry(system.moved, s.factor, q, w, s.displacement, s.velocity)
 
 
 @kernel
-def moving_energy(system, s):
-    """Kinetic energy (J) of S f'."""
+def _carry(moved, factor, q, w, displacement, velocity):
+    """Add the motion of the supports, S f and S f', to q and w."""
+    u, v = flat(displacement), flat(velocity)
+    still_u, still_v = flat(q), flat(w)
+    for i in range(u.size):
+        u[i], v[i] = still_u[i], still_v[i]
+    for k in range(moved.dof.size):
+        dof, row = moved.dof[k], moved.row[k]
+        u[dof] += moved.value[k] * factor[row, 0]
+        v[dof] += moved.value[k] * factor[row, 1]
+
+
+@kernel
+def moving_energy(mass, factor):
+    """Kinetic energy (J) of S f', `mass` the system's `moved_mass`."""
     total = 0.0
-    for k in range(system.moved_mass.shape[0]):
-        for l in range(system.moved_mass.shape[0]):  # noqa: E741
-            total += system.moved_mass[k, l] * s.factor[k, 1] * s.factor[l, 1]
+    for k in range(mass.shape[0]):
+        for l in range(mass.shape[0]):  # noqa: E741
+            total += mass[k, l] * factor[k, 1] * factor[l, 1]
     return 0.5 * total
+
+
+@kernel
+def _moving_power(moved, moved_mass, alpha, force, factor):
+    """Power (W) of moving supports but for what changes the kinetic energy of S f'."""
+    power = 2.0 * alpha * moving_energy(moved_mass, factor)
+    bracket = flat(force)
+    for k in range(moved.dof.size):
+        power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]
+    return power
 
 
 @scalar
@@ -186,13 +206,15 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
     supports and actuators, and the power dissipated (W). The bracket stays in `s.force`.
     """
-    if s.factor.shape[0] > 0:
-        place(system, q, w, t, s)
-    moved = system.moved.dof.size > 0
-    u = s.displacement if moved else q
-    v = s.velocity if moved else w
-    if system.actuators.hinge.size > 0:
+    if system.varies and t != s.time[0]:  # two stages of a step may share their time
+        evaluate(system.waves, t, system.moves or system.turns, s.factor)
+        s.time[0] = t
+    if system.turns:
         turn(model, system.actuators, s.factor)
+    if system.moves:
+        _carry(system.moved, s.factor, q, w, s.displacement, s.velocity)
+    u = s.displacement if system.moves else q
+    v = s.velocity if system.moves else w
     internal_force(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
@@ -214,12 +236,9 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         accelerated[i] = -accelerated[i] - alpha * relative[i]
     if alpha > 0.0:
         power_out += 2.0 * alpha * kinetic_energy(mass, v, s.product)
-    if moved:
-        for k in range(system.moved.dof.size):
-            rate = system.moved.value[k] * s.factor[system.moved.row[k], 1]
-            power_in += force[system.moved.dof[k]] * rate
-        power_in += 2.0 * alpha * moving_energy(system, s)
-    if system.actuators.hinge.size > 0:
+    if system.moves:
+        power_in += _moving_power(system.moved, system.moved_mass, alpha, s.force, s.factor)
+    if system.turns:
         power_in += actuator_power(model, system.actuators, s.factor, work.angle)
     return power_in, power_out
 
@@ -257,4 +276,4 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
         energy[k] = s.energy[k]
     energy[4] = tally[1]
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[5] = tally[0] + moving_energy(system, s)
+    energy[5] = tally[0] + moving_energy(system.moved_mass, s.factor)
