@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.dynamics.numbering import Numbering
 from foldyn.materials import EnhancedLinear
 from foldyn.materials.compiled import kernel
 from foldyn.materials.enhanced_linear import TWO_PI, energy, moment
@@ -30,9 +31,11 @@ class Actuators(NamedTuple):
     stress_free: bool  # whether its moment at rest is subtracted and moves along
 
 
-def actuators(structure: Any, terms: Any, histories: list) -> tuple[BarsHinges, Actuators]:
+def actuators(
+    structure: Any, model: BarsHinges, by: Numbering, terms: Any, histories: list
+) -> tuple[BarsHinges, Actuators]:
     """Model with rest angles of its own, and the folds that turn."""
-    model, law = structure.model, structure.fold_law
+    law = structure.fold_law
     numbers, spans, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
     for span, history in terms:
         turned = np.flatnonzero(span)
@@ -45,7 +48,7 @@ def actuators(structure: Any, terms: Any, histories: list) -> tuple[BarsHinges, 
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
         )
     found = Actuators(
-        hinge=fold_rows(structure)[folds],
+        hinge=_fold_rows(model, by.rank[structure.folds])[folds],
         start=np.asarray(structure.fold_rest, float)[folds],
         span=np.concatenate(spans),
         row=np.concatenate(rows).astype(np.int64),
@@ -56,12 +59,11 @@ def actuators(structure: Any, terms: Any, histories: list) -> tuple[BarsHinges, 
     return model, found
 
 
-def fold_rows(structure: Any) -> NDArray:
-    """Row of each fold (nf,) in `model.hinges`, where folds and bends may be mixed."""
-    folds = np.flatnonzero(structure.model.hinge_group == 0)
+def _fold_rows(model: BarsHinges, folds: NDArray) -> NDArray:
+    """Row of each fold (nf, 4) in `model.hinges`, where folds and bends may be mixed."""
+    there = np.flatnonzero(model.hinge_group == 0)
     rows = np.empty(len(folds), np.int64)
-    there = structure.model.hinges[folds].astype(np.int64)
-    rows[np.lexsort(structure.folds.T)] = folds[np.lexsort(there.T)]
+    rows[np.lexsort(folds.T)] = there[np.lexsort(model.hinges[there].astype(np.int64).T)]
     return rows
 
 

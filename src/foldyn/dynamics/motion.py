@@ -70,7 +70,7 @@ class Motion:
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
         """Advance in stretches, between which progress is told and the motion is audited."""
-        model, system, mass, callbacks = self._packed
+        model, system, mass, callbacks, by = self._packed
         plan, course = self.plan, self._course
         work, memory = workspace(model), scratch(len(course.u), len(system.waves.code))
         recheck = max(1000, -(-plan.steps // RECHECKS))
@@ -100,7 +100,7 @@ class Motion:
                     return
                 if plan.steps and step % recheck == 0 and step > done and not self.force:
                     place(system, course.u, course.v, now, memory)
-                    self._recheck(memory.displacement)
+                    self._recheck(by.outward(memory.displacement))
                 growth = REPORT_EVERY / max(clock, 1e-9)
                 length = max(CHUNK, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:
@@ -157,11 +157,12 @@ class Motion:
             )
 
     def _fail(self, code: int, hinge: int) -> None:
-        model, plan, course = self._packed.model, self.plan, self._course
+        plan, course, order = self.plan, self._course, self._packed.numbering.order
+        model = self._packed.model
         moment = f"t = {course.clock[0]:.6g} s (step {course.count[0]})"
         turned = np.flatnonzero(np.isnan(model.hinge_rest))
         if len(turned):
-            j, k = model.hinges[turned[0], :2].tolist()
+            j, k = order[model.hinges[turned[0], :2]].tolist()
             raise InstabilityError(
                 f"at {moment} the rest dihedral of the crease between nodes {j} and {k} leaves 0 "
                 "to 360 degrees: change the angle or the history that actuates it",
@@ -170,7 +171,7 @@ class Motion:
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
         if code == outcome.PENETRATION:
-            j, k, i, l = model.hinges[hinge].tolist()  # noqa: E741
+            j, k, i, l = order[model.hinges[hinge]].tolist()  # noqa: E741
             raise PenetrationError(
                 f"at {moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
                 f"{i}, {l}) jumped by more than pi; a fold law that locks (EnhancedLinear) or a "

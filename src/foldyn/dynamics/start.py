@@ -56,18 +56,18 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Course:
     """State of the integrators at the start of a motion with displacement u and velocity v."""
-    model, system, mass, callbacks = packed
+    model, system, mass, callbacks, by = packed
     s = scratch(len(u), len(system.waves.code))
     place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
     if callbacks.error is not None:
         raise callbacks.error
-    q, w = u - s.displacement, v - follow(mass, np.where(case.fixed, v, 0.0))
-    imposed = case.imposed
+    carried, imposed = by.outward(s.displacement), case.imposed
+    q, w = u - carried, v - by.outward(follow(mass, by.inward(np.where(case.fixed, v, 0.0))))
     apart = np.where(imposed, np.abs(q), 0.0)
     if apart.max() > AGREES * case.structure.bar_length.max():
         node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
         raise InputError(
-            f"supports: node {node} is imposed {s.displacement[node, axis]:.6g} m along "
+            f"supports: node {node} is imposed {carried[node, axis]:.6g} m along "
             f"{AXES[axis]} at the start, but stands at {u[node, axis]:.6g} m: give a history that "
             "begins there, as a ramp does from rest, or start from a state that has been brought "
             "there"
@@ -78,11 +78,11 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
     return Course(
-        u=np.ascontiguousarray(q),
-        v=np.ascontiguousarray(w),
+        u=by.inward(q),
+        v=by.inward(w),
         carry=np.zeros_like(u),
         tally=tally,
-        angle=angles(model.rest + u, model.hinges),
+        angle=angles(model.rest + by.inward(u), model.hinges),
         count=np.zeros(4, np.int64),
         clock=clock,
     )

@@ -27,6 +27,7 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
+from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.materials.compiled import kernel, scalar
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
 from foldyn.mechanics.flat import flat
@@ -35,7 +36,7 @@ from foldyn.mechanics.flat import flat
 class Entries(NamedTuple):
     """Nodal vectors times histories: value[k] stands at dof[k] and belongs to history row[k]."""
 
-    dof: NDArray  # (l,) 3 node + axis
+    dof: NDArray  # (l,) 3 place + axis
     value: NDArray  # (l,)
     row: NDArray  # (l,) of the waveforms
 
@@ -46,7 +47,8 @@ class System(NamedTuple):
     varies: bool  # whether there are histories,
     moves: bool  # supports that move,
     turns: bool  # folds that are actuated
-    supported: NDArray  # (s,) dof numbers 3 node + axis
+    order: NDArray  # (n,) node number of each place in memory
+    supported: NDArray  # (s,) dofs 3 place + axis, in the order of the case's
     alpha: float
     stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
     stiff_indices: NDArray
@@ -67,8 +69,9 @@ class Scratch(NamedTuple):
     energy: NDArray  # (3,)
     time: NDArray  # (1,) when the histories were evaluated last, s
     factor: NDArray  # (h, 3) factors of the histories and their two derivatives
-    displacement: NDArray  # (n, 3) u where supports move; else unused
+    displacement: NDArray  # (n, 3) u, where supports move at every evaluation
     velocity: NDArray  # (n, 3) v likewise
+    moving: NDArray  # (n, 3) acceleration with that of the supports, at samples
 
 
 class Packed(NamedTuple):
@@ -78,48 +81,52 @@ class Packed(NamedTuple):
     system: System
     mass: Inertia
     callbacks: Callbacks
+    numbering: Numbering
 
 
 def pack(case: Case, span: float) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads."""
     structure = case.structure
-    mass = inertia(structure.mass, case.fixed)
+    model, by = renumbered(structure.model)
+    nodal = by.matrix(structure.mass)
+    mass = inertia(nodal, by.inward(case.fixed))
     histories: list[History] = []
     for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms):
         if term[1] not in histories:
             histories.append(term[1])
     moves = [
-        (follow(mass, np.asarray(shape)), history)
+        (follow(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
     ]
     callbacks = Callbacks()
     if case.damping.beta > 0.0:
-        k0 = structure.tangent(np.zeros_like(structure.nodes)) * case.damping.beta
+        k0 = by.matrix(structure.tangent(np.zeros_like(structure.nodes))) * case.damping.beta
     else:
         k0 = sparse.csr_array((0, 0))
-    model, turned = actuators(structure, case.actuation_terms, histories)
+    model, turned = actuators(structure, model, by, case.actuation_terms, histories)
     system = System(
         varies=bool(histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
-        supported=np.asarray(case.supported_dofs, np.int64),
+        order=by.order,
+        supported=by.dofs(case.supported_dofs),
         alpha=float(case.damping.alpha),
         stiff_indptr=k0.indptr.astype(np.int64),
         stiff_indices=k0.indices.astype(np.int64),
         stiff_data=np.asarray(k0.data, float),
         waves=pack_waveforms(histories, callbacks, span),
-        loads=_entries(case.load_terms, histories),
+        loads=_entries([(by.inward(p), history) for p, history in case.load_terms], histories),
         moved=_entries(moves, histories),
-        moved_mass=_moved_mass(structure.mass, moves, histories),
+        moved_mass=_moved_mass(nodal, moves, histories),
         actuators=turned,
     )
-    return Packed(model, system, mass, callbacks)
+    return Packed(model, system, mass, callbacks, by)
 
 
 def _entries(terms, histories) -> Entries:
     dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
     for vector, history in terms:
-        entries = np.asarray(vector).ravel()
+        entries = vector.ravel()
         where = np.flatnonzero(entries)
         dofs.append(where)
         values.append(entries[where])
@@ -152,10 +159,10 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 def scratch(nodes: int, histories: int) -> Scratch:
     """Memory for a model of so many nodes and histories."""
-    force, product, displacement, velocity = np.zeros((4, nodes, 3))
+    force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
     never = np.full(1, np.nan)
-    return Scratch(force, product, line, energy, never, factor, displacement, velocity)
+    return Scratch(force, product, line, energy, never, factor, displacement, velocity, moving)
 
 
 @kernel
@@ -250,28 +257,29 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
     gets the strain energies, the kinetic energy, what was dissipated and the work.
     """
-    moved, n = system.moved, q.shape[0]
-    for i in range(n):
-        for c in range(3):
-            displacement[i, c], velocity[i, c] = q[i, c], w[i, c]
-            s.velocity[i, c] = a[i, c]
-    accelerated = flat(s.velocity)
+    moved = system.moved
+    u, v, moving = flat(s.displacement), flat(s.velocity), flat(s.moving)
+    still_u, still_v, still_a = flat(q), flat(w), flat(a)
+    for i in range(u.size):
+        u[i], v[i], moving[i] = still_u[i], still_v[i], still_a[i]
     for k in range(moved.dof.size):
-        i, c = moved.dof[k] // 3, moved.dof[k] % 3
-        row, value = moved.row[k], moved.value[k]
-        displacement[i, c] += value * s.factor[row, 0]
-        velocity[i, c] += value * s.factor[row, 1]
-        accelerated[moved.dof[k]] += value * s.factor[row, 2]
+        dof, row, value = moved.dof[k], moved.row[k], moved.value[k]
+        u[dof] += value * s.factor[row, 0]
+        v[dof] += value * s.factor[row, 1]
+        moving[dof] += value * s.factor[row, 2]
+    for i in range(q.shape[0]):
+        for c in range(3):
+            displacement[system.order[i], c] = s.displacement[i, c]
+            velocity[system.order[i], c] = s.velocity[i, c]
+    product, force = flat(s.product), flat(s.force)
+    times_mass(mass, s.moving, s.product)
+    for k in range(system.supported.size):
+        reaction[k] = product[system.supported[k]] + force[system.supported[k]]
+    energy[3] = kinetic_energy(mass, s.velocity, s.product)
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
-        i, c = system.supported[k] // 3, system.supported[k] % 3
-        reaction[k] = s.product[i, c] + s.force[i, c]
-    energy[3] = kinetic_energy(mass, velocity, s.product)
-    times_mass(mass, velocity, s.product)
-    for k in range(system.supported.size):
-        i, c = system.supported[k] // 3, system.supported[k] % 3
-        reaction[k] += system.alpha * s.product[i, c]
-    strain_energies(model, displacement, s.energy)
+        reaction[k] += system.alpha * product[system.supported[k]]
+    strain_energies(model, s.displacement, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
     energy[4] = tally[1]
