@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 from problem import Problem
 
-from foldyn import mechanics
 from foldyn.dynamics import rk4
+from foldyn.dynamics.course import Plan, samples
+from foldyn.dynamics.start import begin
 from foldyn.dynamics.system import pack, scratch
+from foldyn.mechanics import internal_force, workspace
 
 
 class FoldynEngine:
@@ -21,53 +22,33 @@ class FoldynEngine:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.model, self.system, self.mass = pack(problem.case)
-        self.work = mechanics.workspace(self.model)
-        self.memory = scratch(len(problem.rest))
+        self.packed = pack(problem.case, problem.dt)
+        self.work = workspace(self.packed.model)
+        self.memory = scratch(len(problem.rest), len(self.packed.system.waves.code))
         self._back = np.argsort(problem.order)
 
     def force(self, u: NDArray) -> NDArray:
         """Internal force (n, 3) at displacement u (n, 3), both in the twins' order."""
-        out = np.empty_like(u)
-        displacement = np.ascontiguousarray(u[self._back])
-        mechanics.internal_force(self.model, displacement, out, self.work)
-        return out[self.problem.order]
+        out, by = np.empty_like(u), self.packed.numbering
+        internal_force(self.packed.model, by.inward(u[self._back]), out, self.work)
+        return by.outward(out)[self.problem.order]
 
     def run(self, steps: int) -> tuple[float, NDArray]:
         """Seconds for `steps` RK4 steps from the start, and the displacement then.
 
         The loop evaluates the force once more at its end; that part is taken off.
         """
-        u = np.ascontiguousarray(self.problem.start[self._back])
-        n, histories = len(u), len(self.problem.case.load_terms)
-        angle = mechanics.angles(self.model.rest + u, self.model.hinges)
-        arguments = {
-            "model": self.model,
-            "system": self.system,
-            "mass": self.mass,
-            "u": u,
-            "v": np.zeros((n, 3)),
-            "carry": np.zeros((n, 3)),
-            "tally": np.zeros(8),
-            "dt": self.problem.dt,
-            "first": 1,
-            "last": 1 + steps,
-            "every": 1 << 60,
-            "factors": np.ones((steps + 1, len(rk4.STAGES), histories)),
-            "angle": angle,
-            "displacement": np.empty((0, n, 3)),
-            "velocity": np.empty((0, n, 3)),
-            "reaction": np.empty((0, len(self.system.supported))),
-            "energy": np.empty((0, 6)),
-            "work": self.work,
-            "s": self.memory,
-        }
-        # by name: the order of the arguments is internal to Foldyn
-        wanted = inspect.signature(rk4.advance.py_func).parameters
-        values = [arguments[name] for name in wanted]
+        case, packed, dt = self.problem.case, self.packed, self.problem.dt
+        plan = Plan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0)
+        start = self.problem.start[self._back]
+        course = begin(case, start, np.zeros_like(start), plan, packed)
+        course.count[1] = 1  # so that no step is due for a sample
+        out = samples(0, len(start), len(packed.system.supported), 6)
+        arguments = packed.model, packed.system, packed.mass, course, plan, out
         began = time.perf_counter()
-        code, *_ = rk4.advance(*values)
+        code, _ = rk4.advance(*arguments, self.work, self.memory, steps)
         seconds = time.perf_counter() - began
         if code:
             raise RuntimeError(f"Foldyn's loop stopped with code {code}")
+        u = packed.numbering.outward(course.u)
         return seconds * 4 * steps / (4 * steps + 1), u[self.problem.order]
