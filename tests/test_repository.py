@@ -14,6 +14,7 @@ import pytest
 import foldyn as fd
 from foldyn.cases import schema
 from foldyn.kernel_cache import remove_stale_caches
+from foldyn.plots.writers import WRITERS
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))
@@ -100,6 +101,10 @@ def test_every_registry_row_has_a_docs_row(page, registry):
 
 def test_case_files_may_name_every_integrator():
     assert set(schema.METHODS) == set(fd.dynamics.METHODS)
+
+
+def test_case_files_may_name_every_kind_of_animation():
+    assert [f".{kind}" for kind in schema.ANIMATIONS] == list(WRITERS)
 
 
 def test_every_top_level_name_is_in_the_api_page():

@@ -69,11 +69,12 @@ def test_every_counts_steps_when_it_is_whole(read, short) -> None:
 
 
 def test_axis_and_range_of_the_figures(read, short) -> None:
-    output = read(short + "[output]\naxis = 'y'\nmax_frequency = 5").output
+    output = read(short + "[output]\naxis = 'y'\nmax_frequency = 5\nanimation = 'mp4'").output
+    assert output.animation == "mp4"
     assert (output.axis, output.max_frequency) == ("y", 5.0)
     assert isinstance(output.max_frequency, float)
     output = read(short).output
-    assert (output.axis, output.max_frequency) == (None, None)
+    assert (output.axis, output.max_frequency, output.animation) == (None, None, "gif")
 
 
 def test_a_byte_order_mark_is_no_obstacle(read, short) -> None:

@@ -246,6 +246,14 @@ BAD = {
         [("every = 0.01", "every = 0.01\nmax_frequency = 0")],
         "output.max_frequency = 0: must be greater than 0",
     ),
+    "animation": (
+        [("every = 0.01", 'every = 0.01\nanimation = "mp3"')],
+        "output.animation = \"mp3\": did you mean 'mp4'? choose one of gif, mp4",
+    ),
+    "animation truth": (
+        [("every = 0.01", "every = 0.01\nanimation = false")],
+        "output.animation = false: choose one of gif, mp4",
+    ),
     "max_frequency nan": (
         [("every = 0.01", "every = 0.01\nmax_frequency = nan")],
         "output.max_frequency = nan: must be a finite number",

@@ -265,7 +265,7 @@ def test_files_that_are_not_there(workplace) -> None:
         bad = workplace.call("run", name)
         assert (bad.status, bad.out, bad.new) == (2, "", [])
         (line,) = bad.err.splitlines()
-        assert "there is no such file; shipped cases are herkal/case1, herkal/case2" in line
+        assert "there is no such file; shipped cases are gallery/deployment, gallery/" in line
     folder = workplace.call("run", ".")
     assert (folder.status, folder.new) == (2, [])
     assert folder.err == "foldyn: .: is a folder; give a case file (TOML)\n"

@@ -5,6 +5,11 @@ from __future__ import annotations
 import base64
 from pathlib import Path
 
+import pytest
+
+from foldyn.errors import InputError
+from foldyn.plots.writers import find_ffmpeg
+
 PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "motion.gif", "energies.png")
 
 
@@ -28,6 +33,20 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     for rule in ("panel", "circumcenter"):
         assert f"<td>{rule}</td>" in page
     assert f"figures and {Path('r/report.html')}" in done.out
+
+
+def test_a_film_instead_of_a_gif(workplace, edited) -> None:
+    try:
+        find_ffmpeg()
+    except InputError:
+        pytest.skip("needs ffmpeg on the PATH or imageio-ffmpeg")
+    workplace.write(edited(("every = 0.01", 'every = 0.02\nanimation = "mp4"')))
+    done = workplace.call("run", "case.toml", "--out", "r")
+    assert (done.status, done.err) == (0, "")
+    assert "r/motion.mp4" in done.new and "r/motion.gif" not in done.new
+    page = Path("r/report.html").read_text(encoding="utf-8")
+    assert base64.b64encode(Path("r/motion.mp4").read_bytes()).decode() in page
+    assert page.count("<video ") == 1
 
 
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:

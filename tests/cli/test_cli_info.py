@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import sys
 from importlib import metadata
 
 import pytest
@@ -11,6 +12,7 @@ import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.formats import FORMATS
 from foldyn.structures import MASS_RULES
+from foldyn.studies import shipped_cases
 
 
 def test_info(workplace) -> None:
@@ -23,11 +25,20 @@ def test_info(workplace) -> None:
         assert f"{name} {metadata.version(name)}" in lines
     assert any(line.startswith("processors: ") for line in lines)
     assert any(line.startswith("kernels of rk4: ") for line in lines)
-    assert any(line.startswith("optional parts: ") for line in lines)
+    (parts,) = [line for line in lines if line.startswith("optional parts: ")]
+    assert parts.startswith("optional parts: ffmpeg for MP4 animations, ")
     for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES):
         assert name in told.out
-    for k in (1, 2, 3, 4):
-        assert f"  herkal/case{k}" in lines
+    for name in shipped_cases():
+        assert f"  {name}" in lines
+
+
+def test_info_tells_where_ffmpeg_is_and_how_to_get_it(workplace, monkeypatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda name: f"bin/{name}")
+    assert "MP4 animations, found: bin/ffmpeg" in workplace.call("info").out
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert "MP4 animations, missing: pip install imageio-ffmpeg" in workplace.call("info").out
 
 
 def test_version(capsys) -> None:

@@ -87,6 +87,18 @@ def test_pictures_are_inside_and_unchanged(tmp_path):
     assert page.texts["figcaption"] == ["A sheet", "It moves"]
 
 
+def test_films_are_inside_and_play(tmp_path):
+    mp4 = struct.pack(">I", 24) + b"ftypisom" + bytes(20)
+    page = _write(tmp_path, Picture(mp4, caption="It moves & turns"))
+    assert page.images == []
+    (film,) = [attrs for tag, attrs in page.tags if tag == "video"]
+    assert film["src"] == "data:video/mp4;base64," + base64.b64encode(mp4).decode()
+    assert film["aria-label"] == "It moves & turns"
+    # browsers play by themselves only what is muted, phones only what may stay in the page
+    assert {"controls", "loop", "autoplay", "muted", "playsinline"} <= set(film)
+    assert page.texts["figcaption"] == ["It moves & turns"]
+
+
 def test_wide_pictures_are_scrolled_on_a_phone(tmp_path):
     gif = b"GIF89a" + struct.pack("<HH", 300, 200)
     page = _write(tmp_path, Picture(_png(1350, 3)), Picture(_png(900, 3)), Picture(gif))
@@ -174,7 +186,7 @@ def test_empty_lines_part_paragraphs(tmp_path):
     ("section", "words"),
     [
         (Picture("missing.png"), "no picture missing.png"),
-        (Picture(b"not a picture"), "PNG, GIF or JPEG"),
+        (Picture(b"not a picture"), "PNG, GIF, JPEG or MP4"),
         (Picture(3), "path, bytes or a matplotlib Figure"),
         ("just text", r"sections\[0\]: str"),
     ],

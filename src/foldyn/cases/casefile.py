@@ -66,12 +66,15 @@ class Output:
         Component that figures show, "x", "y" or "z"; None: the one in which a node moves most.
     max_frequency : float or None
         Where the axes of spectra end (Hz); None: at half the sampling rate.
+    animation : str
+        "gif" or "mp4".
     """
 
     nodes: NDArray[np.int64]
     every: int | float
     axis: str | None = None
     max_frequency: float | None = None
+    animation: str = "gif"
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +225,13 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
         sheet=sheet,
         masses=masses,
         analysis=Analysis(analysis.pop("kind"), {**analysis, "every": every}),
-        output=Output(nodes, every, schema.output.axis, schema.output.max_frequency),
+        output=Output(
+            nodes,
+            every,
+            schema.output.axis,
+            schema.output.max_frequency,
+            schema.output.animation,
+        ),
         start=_start(schema.initial),
         _parts=parts,
         _cases=cases,

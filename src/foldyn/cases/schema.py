@@ -37,6 +37,8 @@ LATER_ANALYSES = ("statics", "modes", "frf")
 AXES = ("x", "y", "z")
 METHODS = ("rk4", "central_difference", "dormand_prince")
 """Integrators that a case file may name."""
+ANIMATIONS = ("gif", "mp4")
+"""Kinds of animation that a case file may name."""
 
 
 class Section(BaseModel):
@@ -314,6 +316,7 @@ class OutputSection(Section):
     axis: Annotated[Any, PlainValidator(lambda value: choice("", value, AXES))] = None
     every: Annotated[Any, PlainValidator(_every)] = None
     max_frequency: Positive | None = None
+    animation: Annotated[str, PlainValidator(lambda value: choice("", value, ANIMATIONS))] = "gif"
 
 
 class CaseSchema(Section):

@@ -7,6 +7,7 @@ import platform
 from importlib import metadata
 
 from foldyn import __version__
+from foldyn.errors import InputError
 from foldyn.studies import shipped_cases
 
 REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplotlib", "tqdm")
@@ -28,13 +29,22 @@ def info() -> str:
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
     lines += [
-        "optional parts: this version has none",
+        f"optional parts: ffmpeg for MP4 animations, {_ffmpeg()}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
         f"mass rules: {', '.join(MASS_RULES)}",
         "shipped cases:",
         *(f"  {name}" for name in shipped_cases()),
     ]
     return "\n".join(lines)
+
+
+def _ffmpeg() -> str:
+    from foldyn.plots.writers import find_ffmpeg
+
+    try:
+        return f"found: {find_ffmpeg()}"
+    except InputError:
+        return "missing: pip install imageio-ffmpeg"
 
 
 def _version(name: str) -> str:

@@ -1,7 +1,7 @@
 """Figures of structures, laws, loads and motions.
 
 Every function returns a `matplotlib.figure.Figure`, ready for ``figure.savefig(path)``; `animate`
-writes a GIF. Matplotlib is imported on first use, and its global state is never touched.
+writes a GIF or an MP4. Matplotlib is imported on first use, and its global state is never touched.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
@@ -23,6 +23,8 @@ WIDTH = 7.0
 """Width of a figure, in inches."""
 # Margins around the seen box, and its largest height, in inches.
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
+_LABEL_PADS = 6.0, 6.0, 4.0  # points; that of z would leave the margin with more
+_CLOSE = 0.4  # inches between two ticks whose numbers would touch
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 
 
@@ -172,10 +174,12 @@ def view_figure(
     for axis, name in enumerate("xyz"):
         reach = (middle[axis] - 0.5 * box[axis], middle[axis] + 0.5 * box[axis])
         getattr(axes, f"set_{name}lim")(*reach, view_margin=0)
-    axes.set_box_aspect(box, zoom=1.0)
+    # copies: matplotlib scales what it is given
+    axes.set_box_aspect(box.copy(), zoom=1.0)
     flat = np.array(proj_transform(*corners.T, axes.get_proj())[:2])
-    axes.set_box_aspect(box, zoom=seen[0] * scale / (side * np.ptp(flat[0]) / _span(axes)))
-    _frame(axes, box)
+    zoom = seen[0] * scale / (side * np.ptp(flat[0]) / _span(axes))
+    axes.set_box_aspect(box.copy(), zoom=zoom)
+    _frame(axes, middle, box, scale * view.basis)
     return figure, axes
 
 
@@ -185,20 +189,48 @@ def _span(axes: Axes3D) -> float:
     return pixels / (axes.transData.transform((1.0, 0.0)) - axes.transData.transform((0.0, 0.0)))[0]
 
 
-def _frame(axes: Axes3D, box: NDArray[np.float64]) -> None:
-    """Set ticks, grid, panes and labels."""
+def _frame(
+    axes: Axes3D,
+    middle: NDArray[np.float64],
+    box: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> None:
+    """Set ticks, grid, panes and labels; the basis is that of the view, in inches per meter."""
     axes.patch.set_visible(False)
-    for axis, length in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
-        axis.set_major_locator(MaxNLocator(max(2, round(5 * length / box.max()))))
+    ticks = _ticks(middle, box, basis)
+    for axis, places in zip((axes.xaxis, axes.yaxis, axes.zaxis), ticks, strict=True):
+        axis.set_major_locator(FixedLocator(places.tolist()))
         axis.set_pane_color((0.975, 0.975, 0.975, 1.0))
         axis.line.set_color(style.LIGHT)
         # The grid of three-dimensional axes has no public setting of its own; without this one it
         # would only be darker.
         getattr(axis, "_axinfo", {}).get("grid", {}).update(color="#E2E2E2", linewidth=0.5)
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
-    for name in "xyz":
+    for name, pad in zip("xyz", _LABEL_PADS, strict=True):
         label = getattr(axes, f"set_{name}label")
-        label(f"{name} (m)", fontsize=style.LABEL, color=style.BLACK)
+        label(f"{name} (m)", fontsize=style.LABEL, color=style.BLACK, labelpad=pad)
+
+
+def _ticks(
+    middle: NDArray[np.float64], box: NDArray[np.float64], basis: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """Return the ticks of each axis, those of x and y apart where the two axes meet."""
+    ticks = []
+    for center, length in zip(middle, box, strict=True):
+        wanted = MaxNLocator(max(2, round(5 * length / box.max())), steps=[1, 2, 2.5, 5, 10])
+        places = np.array(wanted.tick_values(center - 0.5 * length, center + 0.5 * length))
+        ticks.append(places[np.abs(places - center) <= 0.5 * length * (1.0 + 1e-9)])
+    # They meet in the corner next to the viewer.
+    corner = middle + 0.5 * box * np.where(basis[2] > 0.0, 1.0, -1.0)
+    nearest = [int(np.abs(ticks[k] - corner[k]).argmin()) for k in (0, 1)]
+    apart = sum(
+        sign * (ticks[k][nearest[k]] - corner[k]) * basis[:2, k]
+        for k, sign in ((0, 1.0), (1, -1.0))
+    )
+    fuller = int(len(ticks[1]) > len(ticks[0]))
+    if np.linalg.norm(apart) < _CLOSE and len(ticks[fuller]) > 1:
+        ticks[fuller] = np.delete(ticks[fuller], nearest[fuller])
+    return ticks
 
 
 def shades(
@@ -219,21 +251,23 @@ def add_panels(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int64],
     color: str = PAPER,
-    alpha: float = 0.8,
+    alpha: float = 1.0,
     zorder: float = 1.0,
 ) -> Poly3DCollection:
-    """Fill the panels, triangle by triangle, so that their bending shows."""
-    # Antialiased neighbors would leave a light seam inside every panel.
+    """Fill the panels, triangle by triangle, so that their bending shows.
+
+    An `alpha` below 1 mixes the color with white. The panels are never translucent, and not
+    antialiased: neighbors that overlap or part by a pixel would leave seams inside every panel.
+    """
     panels = Poly3DCollection(
         vertices[triangles],
-        facecolors=shades(vertices, triangles, color),
+        facecolors=1.0 - alpha * (1.0 - shades(vertices, triangles, color)),
         edgecolors="none",
         linewidths=0.0,
         antialiaseds=False,
         zsort="average",
         zorder=zorder,
     )
-    panels.set_alpha(alpha)
     axes.add_collection3d(panels, autolim=False)
     return panels
 

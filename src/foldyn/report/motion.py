@@ -47,6 +47,7 @@ def write_motion(
         return Picture(path, caption)
 
     start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
+    scale = _scale(case, trajectory)
     rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
     sections: list[Section] = [
         Heading("The structure"),
@@ -84,9 +85,10 @@ def write_motion(
             ),
         ),
         Picture(
-            plots.animate(case, trajectory, folder / "motion.gif", scale=_scale(case, trajectory)),
-            f"The motion with mass rule {first}{_enlarged(_scale(case, trajectory))}; at rest in "
-            "gray.",
+            plots.animate(
+                case, trajectory, folder / f"motion.{case_file.output.animation}", scale=scale
+            ),
+            f"The motion with mass rule {first}{_enlarged(scale)}; at rest in gray.",
         ),
         figure(
             "energies",

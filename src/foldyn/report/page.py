@@ -24,7 +24,7 @@ p { max-width: 46rem; margin: 0.6rem 0; }
 a { color: #0072b2; }
 nav ul { margin: 0; padding-left: 1.2rem; }
 figure { margin: 1.25rem 0; }
-img { display: block; max-width: 100%; height: auto; margin: 0 auto; }
+img, video { display: block; max-width: 100%; height: auto; margin: 0 auto; }
 figcaption, caption { color: #444; font-size: 0.92rem; text-align: left; }
 figcaption { margin-top: 0.4rem; max-width: 46rem; }
 caption { padding-bottom: 0.4rem; }

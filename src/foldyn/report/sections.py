@@ -16,11 +16,13 @@ from typing import Any
 from foldyn.errors import InputError
 
 _SIGNATURES = (
-    (b"\x89PNG\r\n\x1a\n", "image/png"),
-    (b"GIF87a", "image/gif"),
-    (b"GIF89a", "image/gif"),
-    (b"\xff\xd8\xff", "image/jpeg"),
+    (0, b"\x89PNG\r\n\x1a\n", "image/png"),
+    (0, b"GIF87a", "image/gif"),
+    (0, b"GIF89a", "image/gif"),
+    (0, b"\xff\xd8\xff", "image/jpeg"),
+    (4, b"ftyp", "video/mp4"),
 )
+"""Where in a file which bytes tell its kind."""
 _WIDE = 1200  # pixels; wider pictures are scrolled on a phone, as they would be too small to read
 
 
@@ -128,12 +130,13 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure or an animation, stored inside the page.
+    """A figure, an animation or a film, stored inside the page.
 
     Parameters
     ----------
     source : path-like, bytes, or a matplotlib Figure
-        A PNG, GIF or JPEG file, its bytes, or anything with ``savefig(file, format="png")``.
+        A PNG, GIF, JPEG or MP4 file, its bytes, or anything with
+        ``savefig(file, format="png")``.
     caption : str
         Written below the picture.
     alt : str
@@ -147,12 +150,17 @@ class Picture:
     def html(self) -> str:
         """Write as HTML."""
         content = self._bytes()
-        kinds = [kind for start, kind in _SIGNATURES if content.startswith(start)]
+        kinds = [kind for place, mark, kind in _SIGNATURES if content.startswith(mark, place)]
         if not kinds:
-            raise InputError(f"source: {self._name()} is no PNG, GIF or JPEG picture")
+            raise InputError(f"source: {self._name()} is no PNG, GIF, JPEG or MP4")
         data = base64.b64encode(content).decode("ascii")
         alt = escape(self.alt or self.caption)
         caption = f"<figcaption>{escape(self.caption)}</figcaption>" if self.caption else ""
+        if kinds[0].startswith("video"):
+            return (
+                f'<figure><video aria-label="{alt}" controls loop autoplay muted playsinline '
+                f'src="data:{kinds[0]};base64,{data}"></video>{caption}</figure>'
+            )
         width, height = _pixels(content)
         size = f' width="{width}" height="{height}"' if width else ""
         wide = ' class="wide"' if width > _WIDE else ""

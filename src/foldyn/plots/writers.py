@@ -1,0 +1,136 @@
+"""Files of an animation: GIF through Pillow, MP4 through an ffmpeg that is looked for."""
+
+from __future__ import annotations
+
+import shutil
+from io import BytesIO
+from subprocess import CalledProcessError
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from PIL import Image
+
+from foldyn.errors import ComputationError, InputError
+
+_COLORS = 128  # of a GIF, for all its pictures: 256 for each would take three times the space
+_SAMPLES = 8  # pictures from which these colors are taken
+
+
+class GifWriter(PillowWriter):
+    """A GIF that plays for ever, all its pictures in the same few colors.
+
+    Attributes
+    ----------
+    rate : float
+        Pictures per second: a GIF counts in hundredths of a second.
+    """
+
+    def __init__(self, fps: int) -> None:
+        super().__init__(fps=fps)
+        self.rate = 100 / round(100 / fps)
+        self._pictures: list[Image.Image] = []
+
+    def grab_frame(self, **savefig_kwargs: Any) -> None:
+        """Take a picture of the figure."""
+        buffer = BytesIO()
+        self.fig.savefig(buffer, **savefig_kwargs, format="rgba", dpi=self.dpi)
+        picture = Image.frombuffer("RGBA", self.frame_size, buffer.getvalue(), "raw", "RGBA", 0, 1)
+        self._pictures.append(picture.convert("RGB"))
+
+    def finish(self) -> None:
+        """Write the file."""
+        if not self._pictures:
+            return
+        palette = _common_palette(self._pictures)
+        # Dithered paper would flicker and could not be compressed.
+        first, *others = (
+            picture.quantize(palette=palette, dither=Image.Dither.NONE)
+            for picture in self._pictures
+        )
+        first.save(
+            self.outfile,
+            save_all=True,
+            append_images=others,
+            duration=round(1000 / self.rate),
+            loop=0,
+        )
+
+
+def _common_palette(pictures: list[Image.Image]) -> Image.Image:
+    """Return the colors that suit some of the pictures, first and last among them, best."""
+    count = min(len(pictures), _SAMPLES)
+    width, height = pictures[0].size
+    strip = Image.new("RGB", (width, height * count))
+    for row, k in enumerate(np.linspace(0, len(pictures) - 1, count).round().astype(int)):
+        strip.paste(pictures[k], (0, row * height))
+    chosen = strip.quantize(_COLORS)
+    palette = np.array(chosen.getpalette()).reshape(-1, 3)
+    palette[palette.min(axis=1) > 249] = 255  # white is white, not almost
+    chosen.putpalette(palette.ravel().tolist())
+    return chosen
+
+
+class Mp4Writer(FFMpegWriter):
+    """An MP4 in H.264 that browsers and slides play.
+
+    Attributes
+    ----------
+    rate : float
+        Pictures per second.
+    """
+
+    def __init__(self, fps: int) -> None:
+        # Everything named, so that the caller's settings of matplotlib do not matter; the index
+        # comes first in the file, so that it plays before it is loaded.
+        quality = ["-crf", "20", "-movflags", "+faststart"]
+        super().__init__(fps=fps, codec="h264", bitrate=-1, extra_args=quality)
+        self.rate = float(fps)
+
+    @classmethod
+    def bin_path(cls) -> str:
+        """Return the path of ffmpeg."""
+        return find_ffmpeg()
+
+    def finish(self) -> None:
+        """Wait for ffmpeg to write the file.
+
+        Raises
+        ------
+        ComputationError
+            It could not.
+        """
+        try:
+            super().finish()
+        except CalledProcessError as error:
+            said = (error.stderr or "").strip().splitlines()
+            raise ComputationError(
+                f"{self.outfile}: ffmpeg could not write it ({said[-1] if said else error}); "
+                "write .gif, or an ffmpeg with H.264: pip install imageio-ffmpeg"
+            ) from None
+
+
+WRITERS = {".gif": GifWriter, ".mp4": Mp4Writer}
+"""Writers of an animation by the end of the file's name."""
+
+
+def find_ffmpeg() -> str:
+    """Path of the ffmpeg on the PATH, or else of that of the package imageio-ffmpeg.
+
+    Raises
+    ------
+    InputError
+        There is neither.
+    """
+    found = shutil.which("ffmpeg")
+    if found is not None:
+        return found
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingImports]
+
+        return get_ffmpeg_exe()
+    except (ImportError, RuntimeError):  # the package, or the program for this machine
+        raise InputError(
+            "MP4 needs ffmpeg, which is not on the PATH: install it, or the package that brings "
+            "it (pip install imageio-ffmpeg), or write a GIF"
+        ) from None
