@@ -86,6 +86,8 @@ def test_shipped_cases_are_in_the_package():
         ("laws.md", "materials.HINGE_LAWS"),
         ("mass-rules.md", "structures.MASS_RULES"),
         ("integrators.md", "dynamics.METHODS"),
+        ("statics.md", "statics.METHODS"),
+        ("statics.md", "statics.SOLVERS"),
         ("formats.md", "formats.FORMATS"),
         ("histories.md", "cases.HISTORIES"),
     ],

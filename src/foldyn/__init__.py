@@ -50,13 +50,16 @@ _HOME = {
     "save": "results",
     "load": "results",
     "case_of": "results",
+    "trace": "statics",
+    "switch_branch": "statics",
+    "landscape": "statics",
     "simulate": "dynamics",
     "critical_step": "dynamics",
     "initial_state": "dynamics",
 }
 _MODULES = (
     "cases", "checks", "dynamics", "errors", "formats", "materials", "mechanics", "patterns",
-    "plots", "report", "results", "signals", "structures", "studies",
+    "plots", "report", "results", "signals", "statics", "structures", "studies",
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -85,6 +88,7 @@ if TYPE_CHECKING:
     from foldyn.materials import BarLaw, CustomBarLaw, CustomHingeLaw, EnhancedLinear, HingeLaw
     from foldyn.patterns import Pattern
     from foldyn.results import case_of, load, save
+    from foldyn.statics import landscape, switch_branch, trace
     from foldyn.structures import Sheet, Structure, discretize
 
 __all__ = sorted((*_HOME, *_MODULES, "__version__"))  # pyright: ignore

@@ -48,7 +48,7 @@ def actuators(
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
         )
     found = Actuators(
-        hinge=_fold_rows(model, by.rank[structure.folds])[folds],
+        hinge=by.hinge[structure.hinge_of_fold[folds]],
         start=np.asarray(structure.fold_rest, float)[folds],
         span=np.concatenate(spans),
         row=np.concatenate(rows).astype(np.int64),
@@ -57,14 +57,6 @@ def actuators(
         stress_free=isinstance(law, EnhancedLinear) and law.rest == "stress_free",
     )
     return model, found
-
-
-def _fold_rows(model: BarsHinges, folds: NDArray) -> NDArray:
-    """Row of each fold (nf, 4) in `model.hinges`, where folds and bends may be mixed."""
-    there = np.flatnonzero(model.hinge_group == 0)
-    rows = np.empty(len(folds), np.int64)
-    rows[np.lexsort(folds.T)] = there[np.lexsort(model.hinges[there].astype(np.int64).T)]
-    return rows
 
 
 @kernel

@@ -21,6 +21,7 @@ class Numbering(NamedTuple):
 
     order: NDArray  # (n,)
     rank: NDArray  # (n,)
+    hinge: NDArray  # (nh,) row of each hinge of the case's model in the renumbered one
 
     def inward(self, values: NDArray) -> NDArray:
         """Values per node (n, ...) as they stand in memory."""
@@ -46,11 +47,5 @@ class Numbering(NamedTuple):
 
 def renumbered(model: BarsHinges) -> tuple[BarsHinges, Numbering]:
     """Model with its nodes along the sheet, if it is large enough to gain from it."""
-    return model, numbering(np.arange(len(model.rest)))
-
-
-def numbering(order: NDArray) -> Numbering:
-    """Numbering with these nodes in this order."""
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    return Numbering(np.asarray(order, np.int64), rank)
+    nodes, hinges = np.arange(len(model.rest)), np.arange(len(model.hinges))
+    return model, Numbering(nodes, nodes, hinges)

@@ -116,6 +116,17 @@ class Structure:
         )
 
     @cached_property
+    def hinge_of_fold(self) -> NDArray:
+        """Row of each fold (nf,) in `model.hinges`, where folds and bends may be mixed."""
+        there = np.flatnonzero(self.model.hinge_group == 0)
+        rows = np.empty(len(there), np.int64)
+        rows[np.lexsort(self.folds.T)] = there[
+            np.lexsort(self.model.hinges[there].astype(np.int64).T)
+        ]
+        rows.setflags(write=False)
+        return rows
+
+    @cached_property
     def sparsity(self) -> mechanics.Sparsity:
         """Pattern of the tangent."""
         return mechanics.sparsity(self.model)

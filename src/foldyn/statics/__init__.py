@@ -1,0 +1,29 @@
+"""Statics: equilibrium paths, their stability and branches, and energy landscapes."""
+
+from foldyn.statics.backends import SOLVERS
+from foldyn.statics.branch import switch_branch
+from foldyn.statics.energy_landscape import Equilibrium, Landscape, landscape
+from foldyn.statics.mechanism import mechanisms
+from foldyn.statics.methods import METHODS
+from foldyn.statics.newton import Solver
+from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.problem import Problem
+from foldyn.statics.settings import Settings
+from foldyn.statics.station import Point
+from foldyn.statics.tracing import trace
+
+__all__ = [
+    "METHODS",
+    "SOLVERS",
+    "Equilibrium",
+    "Landscape",
+    "OrigamiProblem",
+    "Point",
+    "Problem",
+    "Settings",
+    "Solver",
+    "landscape",
+    "mechanisms",
+    "switch_branch",
+    "trace",
+]

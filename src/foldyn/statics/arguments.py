@@ -1,0 +1,179 @@
+"""What `trace` is given, checked and completed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from numbers import Integral, Real
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, Gravity, State
+from foldyn.errors import InputError
+from foldyn.statics.methods import Method
+from foldyn.statics.origami import OrigamiProblem, drives, is_actuated
+
+STEPS_DRIVEN = 10
+STEPS_FREE = 100
+SHORTEST = 1e-3  # of a bar's length, that is left of it where a path starts
+FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
+
+
+class Plan(NamedTuple):
+    """Where a path begins and goes."""
+
+    begin: float
+    factors: list[float]  # that drive it; empty where the factor is free
+    end: float | None  # of a free factor
+    steps: int
+    first_step: float
+
+
+def plan(method: Method, load_factors: Any, steps: int | None, first_step: float | None) -> Plan:
+    """Check the arguments that say where a path goes."""
+    factors = None if load_factors is None else _factors(load_factors)
+    if steps is not None:
+        check_steps(steps)
+    if first_step is not None and method.rule is None:
+        raise InputError(
+            f"first_step: method {method.name!r} goes by load_factors or steps; leave it out"
+        )
+    if method.rule is None:
+        return _driven(method, factors, steps)
+    if factors is not None and len(factors) != 2:
+        raise InputError(
+            f"load_factors: method {method.name!r} chooses its own; give two numbers, where the "
+            f"path begins and ends, instead of {len(factors)}, or leave them out"
+        )
+    begin, end = (0.0, None) if factors is None else factors
+    if end == begin:
+        raise InputError(f"load_factors = {factors}: begin and end must differ")
+    way = 1.0 if end is None else end - begin
+    step = FIRST_STEP * way if first_step is None else first_step
+    if isinstance(step, bool) or not isinstance(step, Real) or not math.isfinite(step) or not step:
+        raise InputError(f"first_step = {first_step!r}: give a number that is not zero")
+    if end is not None and step * way < 0.0:
+        raise InputError(f"first_step = {step:g} leads away from the last load factor {end:g}")
+    if end is not None and abs(step) > abs(way):
+        step = way
+    return Plan(begin, [], end, int(steps or STEPS_FREE), float(step))
+
+
+def check_steps(steps: Any) -> None:
+    """Refuse a count of steps that is none."""
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or int(steps) < 1:
+        raise InputError(f"steps = {steps!r}: give a positive whole number")
+
+
+def _driven(method: Method, factors: list[float] | None, steps: int | None) -> Plan:
+    if factors is not None and steps is not None:
+        raise InputError(
+            "load_factors and steps: give one of them; steps counts equal steps from 0 to 1"
+        )
+    if factors is None:
+        count = int(steps or STEPS_DRIVEN)
+        factors = [k / count for k in range(count + 1)]
+    for i, (one, other) in enumerate(pairwise(factors)):
+        if one == other:
+            raise InputError(f"load_factors: number {i + 1} repeats the one before, {one:g}")
+    return Plan(factors[0], factors[1:], None, len(factors) - 1, 0.0)
+
+
+def _factors(given: Any) -> list[float]:
+    try:
+        array = np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise InputError(f"load_factors = {given!r}: give a list of numbers") from None
+    if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+        raise InputError(f"load_factors = {given!r}: give a list of finite numbers, at least one")
+    return array.tolist()
+
+
+def constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
+    """Numbers of the loads that do not grow with the load factor."""
+    if isinstance(constant, str):
+        if constant != "gravity":
+            raise InputError(
+                f'constant = {constant!r}: give "gravity", or numbers of loads, as in [0]'
+            )
+        chosen = tuple(i for i, load in enumerate(case.loads) if isinstance(load, Gravity))
+        if not chosen:
+            raise InputError('constant = "gravity": the case has no Gravity among its loads')
+        return chosen
+    if not isinstance(constant, Sequence | np.ndarray):
+        raise InputError(f'constant = {constant!r}: give "gravity", or numbers of loads')
+    for number in constant:
+        if isinstance(number, bool) or not isinstance(number, Integral):
+            raise InputError(f"constant = {constant!r}: give whole numbers of loads, as in [0]")
+        if not 0 <= int(number) < len(case.loads):
+            raise InputError(
+                f"constant: the case has no load {number}; it has {len(case.loads)}, counted from 0"
+            )
+    return tuple(sorted({int(number) for number in constant}))
+
+
+def start_state(case: Case, start: Any) -> NDArray | None:
+    """Displacements (n, 3) to start from, or None."""
+    if start is None:
+        return None
+    if not isinstance(start, State):
+        raise InputError(
+            f"start: got {type(start).__name__}; give a State, as fd.initial_state(path, at=-1)"
+        )
+    shape = case.structure.nodes.shape
+    if start.displacement is None:
+        return np.zeros(shape)
+    array = np.array(start.displacement, float)
+    if array.shape != shape:
+        raise InputError(f"start: displacement of shape {array.shape}: the case has {shape}")
+    return array
+
+
+def check_case(
+    case: Case, method: Method, constant: Sequence[int], goes: Plan, adaptive: bool
+) -> None:
+    """Refuse a case in which nothing happens along the path."""
+    if not len(case.free_dofs):
+        raise InputError(
+            "supports: hold every node along x, y and z, so that nothing can move: free one"
+        )
+    moves = bool(case.imposed.any()) or is_actuated(case)
+    if method.name == "displacement" and not moves:
+        raise InputError(
+            "method 'displacement' needs something that moves: an Impose among the supports or "
+            "an Actuate among the loads; paths under forces take 'newton' or 'arc_length'"
+        )
+    if not goes.factors and goes.begin == 0.0 and method.rule is None:
+        return  # one point, of what is constant
+    if not (drives(case, constant) or adaptive):
+        raise InputError(
+            "nothing grows along the path: give a Force, Gravity, Actuate or Impose that is not "
+            "among the constant loads (load_factors = [0] finds the state under these alone)"
+        )
+
+
+def check_start(problem: OrigamiProblem) -> None:
+    """Refuse a state in which a bar has no length left."""
+    structure, u = problem.structure, problem.start()
+    x = structure.nodes + u.reshape(structure.nodes.shape)
+    length = np.linalg.norm(x[structure.bars[:, 1]] - x[structure.bars[:, 0]], axis=1)
+    short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
+    if short.size:
+        one, other = structure.bars[short[0]]
+        raise InputError(f"start: nodes {one} and {other}, which a bar joins, fall together")
+
+
+def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:
+    """Refuse load factors at which a rest angle would leave 0 to 360 degrees."""
+    if not problem.actuation.acts:
+        return
+    for factor in (goes.begin, *goes.factors, *([] if goes.end is None else [goes.end])):
+        beyond = np.flatnonzero(np.isnan(problem.actuation.rest(factor)))
+        if beyond.size:
+            raise InputError(
+                f"load_factors: at {factor:g} the rest angle of crease {beyond[0]} would leave 0 "
+                "to 360 degrees; actuated folds reach their angle at the factor 1"
+            )

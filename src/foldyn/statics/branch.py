@@ -1,0 +1,223 @@
+"""Switching to the path that crosses a path at a bifurcation.
+
+At a bifurcation the tangent has a mode that no load drives. A small amplitude of it is prescribed
+and an equilibrium with it is sought, the load factor free: it lies on the other path, which is
+then followed away from the crossing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.results import case_of, check_result
+from foldyn.statics.arguments import check_steps
+from foldyn.statics.course import free
+from foldyn.statics.methods import method_of
+from foldyn.statics.newton import Attempt, Solver
+from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.settings import Settings
+from foldyn.statics.stability import critical_modes
+from foldyn.statics.station import PathStoppedError, Point, Station, Walk, arrive
+from foldyn.statics.tolerance import balance
+from foldyn.statics.tracing import Recorder, on_nodes
+
+if TYPE_CHECKING:
+    import xarray
+
+FIRST_TURN = np.radians(1.0)  # of the hinge that turns most in the first step onto the branch
+TRIES = 6  # of amplitudes, each half of the one before
+FAR = 10.0  # times the amplitude: farther away is not beside the bifurcation
+
+
+def switch_branch(
+    path: xarray.Dataset,
+    at: int | None = None,
+    direction: int = 1,
+    *,
+    case: Case | None = None,
+    mode: int = 0,
+    method: str = "arc_length",
+    steps: int = 50,
+    until: Callable[[NDArray, float], bool] | None = None,
+    settings: Settings | None = None,
+    progress: Callable[[Point], None] | None = None,
+) -> xarray.Dataset:
+    """Follow the path that crosses a path at a bifurcation.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path from `trace` with a located bifurcation.
+    at : int, optional
+        Its step; the first bifurcation of the path unless given.
+    direction : {1, -1}
+        Which way along the branch; of a symmetric structure the two are mirror images.
+    case : Case, optional
+        The case of the path; needed where the path cannot rebuild it (`foldyn.case_of`).
+    mode : int
+        Which of the tangent's modes, counted from the one nearest to zero: a multiple bifurcation
+        has several.
+    method : {"arc_length", "mgdcm"}
+    steps, until, settings, progress
+        As in `trace`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As from `trace`; its first point is the bifurcation.
+
+    Raises
+    ------
+    InputError
+        The path has no bifurcation there, or was computed with an adaptive load.
+    ComputationError
+        The branch cannot be followed; `partial` has it up to its last point.
+    """
+    check_result(path, "path: ")
+    at = _bifurcation(path, at)
+    if direction not in (1, -1):
+        raise InputError(f"direction = {direction!r}: give 1 or -1")
+    if isinstance(mode, bool) or not isinstance(mode, int) or mode < 0:
+        raise InputError(f"mode = {mode!r}: give a whole number from 0 on")
+    check_steps(steps)
+    rule = method_of(method).rule
+    if rule is None:
+        raise InputError(f"method = {method!r}: a branch takes 'arc_length' or 'mgdcm'")
+    problem = problem_of(path, case, at)
+    solver = Solver(problem, settings)
+    crossing = station_of(solver, path, at)
+    facts = {
+        "method": method,
+        "steps": steps,
+        "constant": path.attrs.get("constant"),
+        "inertia_relief": bool(path.attrs.get("inertia_relief", 0)),
+        "branch_at": at,
+        "branch_direction": direction,
+        "branch_mode": mode,
+        "started_from": "state",
+    }
+
+    def course() -> Walk:
+        yield crossing
+        first = _onto_branch(solver, crossing, mode, _multiplicity(path, at), direction)
+        yield first
+        away = first.point.u - crossing.point.u
+        yield from free(
+            solver, first, rule, 0.0, steps - 1, None, on_nodes(until, problem), direction=away
+        )
+
+    return Recorder(problem, solver, facts, False).record(course(), progress)
+
+
+def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
+    if "point" not in path:
+        raise InputError("path: is not a path from trace")
+    found = np.flatnonzero(path["point"].values == "bifurcation")
+    if not len(found):
+        raise InputError(
+            "path: has no bifurcation; trace it with settings that locate them (locate = True, "
+            "and a method other than 'newton')"
+        )
+    if at is None:
+        return int(found[0])
+    if at not in found:
+        raise InputError(f"at = {at!r}: the bifurcations of the path are steps {found.tolist()}")
+    return int(at)
+
+
+def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProblem:
+    """The problem that a path solved, its supports where they are at a step."""
+    if "adaptive load" in str(path.attrs.get("not_rerunnable_because", "")):
+        raise InputError("path: was traced with an adaptive load, which a path does not keep")
+    case = case_of(path) if case is None else case
+    displacement = path["displacement"].values[at]
+    if displacement.shape != case.structure.nodes.shape:
+        raise InputError(
+            f"case: has {len(case.structure.nodes)} nodes, the path {len(displacement)}"
+        )
+    constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
+    relief = bool(path.attrs.get("inertia_relief", 0))
+    return OrigamiProblem(case, constant, displacement, None, relief)
+
+
+def station_of(solver: Solver, path: xarray.Dataset, at: int) -> Station:
+    """A station at a step of a path, as it is stored."""
+    u = path["displacement"].values[at].ravel().copy()
+    factor = float(path["load_factor"].values[at])
+    found = balance(solver.problem, u, factor, solver.problem.residual(u, factor))
+    station = arrive(solver, Attempt(u, factor, int(path["iterations"].values[at]), found))
+    stored: dict[str, Any] = {
+        "negative": int(path["negative_eigenvalues"].values[at]),
+        "kind": str(path["point"].values[at]),
+    }
+    point = Point(u, factor, station.point.iterations, found.relative, **stored)
+    return station._replace(point=point)
+
+
+def _multiplicity(path: xarray.Dataset, at: int) -> int:
+    """How many eigenvalues vanish at a bifurcation: by how much their count changes there."""
+    counts = path["negative_eigenvalues"].values[max(at - 1, 0) : at + 2]
+    return max(int(np.ptp(counts)), 1)
+
+
+def _onto_branch(
+    solver: Solver, crossing: Station, mode: int, multiplicity: int, direction: int
+) -> Station:
+    """The first station on the branch."""
+    _, shapes = critical_modes(solver, crossing, max(mode + 1, multiplicity))
+    if mode >= shapes.shape[1]:
+        raise InputError(f"mode = {mode}: the structure has only {shapes.shape[1]} modes")
+    failure = ""
+    for amplitude in FIRST_TURN * 0.5 ** np.arange(TRIES):
+        for shape in _directions(shapes, mode, multiplicity):
+            attempt = _aside(solver, crossing, direction * shape, amplitude)
+            if not attempt.failure:
+                return arrive(solver, attempt)
+            failure = attempt.failure
+    raise PathStoppedError(
+        f"no equilibrium on a branch was found beside the load factor {crossing.point.factor:.6g} "
+        f"({failure})",
+        "try another mode, or trace the path with a tighter tolerance",
+    )
+
+
+def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> Attempt:
+    """Equilibrium with an amplitude of a shape by which a hinge turns by `turn`."""
+    point, probe = crossing.point, 1e-6 * solver.problem.length
+    amplitude = probe * turn / solver.problem.turn(point.u, point.u + probe * shape)
+
+    def plane(moved: NDArray, step: NDArray, response: NDArray) -> float:
+        return (amplitude - float(shape @ (moved + step))) / float(shape @ response)
+
+    attempt = solver.correct(point.u + amplitude * shape, point.factor, plane, origin=point.u)
+    if not attempt.failure and np.linalg.norm(attempt.u - point.u) > FAR * amplitude:
+        return attempt._replace(failure="it led far away")
+    return attempt
+
+
+def _directions(shapes: NDArray, mode: int, multiplicity: int) -> list[NDArray]:
+    """Shapes (m,) along which a branch may leave.
+
+    Where several eigenvalues vanish together, only some of the combinations of their shapes do.
+    """
+    first = _oriented(shapes[:, mode])
+    others = [k for k in range(multiplicity) if k != mode and mode < multiplicity]
+    turned = [
+        np.cos(angle) * first + np.sin(angle) * _oriented(shapes[:, k])
+        for k in others
+        for angle in np.radians([15, -15, 30, -30, 45, -45, 60, -60, 75, -75])
+    ]
+    return [first, *turned]
+
+
+def _oriented(shape: NDArray) -> NDArray:
+    """The shape with its largest entry positive, so that directions do not depend on a solver."""
+    largest = np.abs(shape).max()
+    first = int(np.flatnonzero(np.abs(shape) > (1.0 - 1e-6) * largest)[0])
+    return shape * np.sign(shape[first])

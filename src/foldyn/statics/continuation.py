@@ -1,0 +1,156 @@
+"""Paths along which the load factor moves freely: through limit points and snap-backs.
+
+A step predicts along the tangent of the path, over a length, and corrects under the rule of its
+method. The length grows and shrinks with the iterations that a step took against those aimed at;
+it also shrinks where the path bends, in the plane of motion and load factor (the latter scaled so
+that the first step has a slope of 1), and where hinges turn much. A step is cut where it does not
+converge, where a hinge turns by more than 1.5 times `largest_turn`, or where it lies more than 60
+degrees off the step before or the tangent at its own end: there it may have left the path.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.statics.newton import COLLIDES, Attempt, Rule, Solver
+from foldyn.statics.station import PathStoppedError, Station, Walk, arrive
+from foldyn.statics.stepping import step_to, stopped
+from foldyn.statics.tolerance import UNKNOWN
+
+ALIGNED = 0.5  # cosine of the largest angle to the step before and to the tangent at its end
+BEND = np.radians(12.0)  # of the path within a step, aimed at
+REMEDY = (
+    "take smaller steps (first_step, or settings with a smaller largest_turn), or start from a "
+    "state that is less symmetric"
+)
+
+
+class ArcRule(Protocol):
+    """Makes the rule of one step of a length with a prediction (m,)."""
+
+    def __call__(self, length: float, prediction: NDArray) -> Rule:
+        """Rule of the step."""
+        ...
+
+
+def follow(
+    solver: Solver, start: Station, rule: ArcRule, first_step: float, direction: NDArray | None,
+) -> Walk:  # fmt: skip
+    """Stations along a path without end.
+
+    Parameters
+    ----------
+    solver, start
+        Where the path begins.
+    rule : ArcRule
+        That of a method, such as `arc_length.Cylinder`.
+    first_step : float
+        Change of the load factor in the first step; the next steps are as long.
+    direction : (m,) or None
+        Motion that the path continues; with it, the first step is as long as this instead.
+    """
+    station = start if direction is not None else _first(solver, start, first_step)
+    if direction is None:
+        yield station
+    moved = station.point.u - start.point.u if direction is None else direction
+    pace = _Pace(solver, station, moved)
+    while True:
+        attempt = _advance(solver, station, rule, pace.length, pace.moved)
+        arrived = None if attempt.failure else arrive(solver, attempt)
+        failure = pace.objection(station, arrived) if arrived else attempt.failure
+        if arrived is None or failure:
+            solver.tally.cuts += 1
+            if not pace.cut():
+                raise _stopped(station, failure)
+            continue
+        pace.accept(station, arrived)
+        station = arrived
+        yield station
+
+
+class _Pace:
+    """Length of the steps, and the last step (m,) taken."""
+
+    def __init__(self, solver: Solver, station: Station, moved: NDArray) -> None:
+        self.solver, self.settings, self.moved = solver, solver.settings, moved
+        self.length = float(np.linalg.norm(moved))
+        self.shortest = self.length * 2.0**-self.settings.cuts
+        self.largest = float(np.radians(self.settings.largest_turn))
+        size = float(np.linalg.norm(station.response))
+        climb = np.copysign(self.length / size, station.response @ moved)
+        self.scale = self.length / abs(climb) if climb != 0.0 else 1.0
+        self.slope = np.arctan2(self.scale * climb, self.length)
+
+    def objection(self, station: Station, arrived: Station) -> str:
+        """Why a converged step is not taken; empty if it is.
+
+        The tangent at its end must lie along the step as well: otherwise the direction in which
+        the path goes on would be anybody's guess.
+        """
+        moved = arrived.point.u - station.point.u
+        along = _cosine(moved, self.moved), abs(_cosine(moved, arrived.response))
+        if min(along) < ALIGNED:
+            return "the path turns too sharply"
+        turn = self.solver.problem.turn(station.point.u, arrived.point.u)
+        return "a hinge turns too far" if turn > 1.5 * self.largest else ""
+
+    def cut(self) -> bool:
+        """Halve the length; false where it has become too short."""
+        self.length *= 0.5
+        return self.length > self.shortest
+
+    def accept(self, station: Station, arrived: Station) -> None:
+        """Choose the next length after a step."""
+        one, other = station.point, arrived.point
+        self.moved = other.u - one.u
+        length = float(np.linalg.norm(self.moved))
+        turn = self.solver.problem.turn(one.u, other.u)
+        slope = np.arctan2(self.scale * (other.factor - one.factor), length)
+        growth = np.sqrt(self.settings.target / max(other.iterations, 1))
+        bend = abs(slope - self.slope)
+        limits = (2.0, growth, BEND / max(bend, 1e-9), self.largest / max(turn, 1e-9))
+        self.length, self.slope = length * max(min(limits), 0.25), slope
+
+
+def _first(solver: Solver, start: Station, first_step: float) -> Station:
+    """Station after a step of the load factor, or as much of it as converges."""
+    step = first_step
+    for _ in range(solver.settings.cuts + 1):
+        attempt = step_to(solver, start, start.point.factor + step)
+        if not attempt.failure and not np.array_equal(attempt.u, start.point.u):
+            return arrive(solver, attempt)
+        solver.tally.cuts += 1
+        step *= 0.5
+    raise stopped(start, attempt)  # pyright: ignore
+
+
+def _advance(
+    solver: Solver, station: Station, rule: ArcRule, length: float, moved: NDArray
+) -> Attempt:
+    """One step of a length along the path in the direction in which it `moved`."""
+    size = float(np.linalg.norm(station.response))
+    climb = float(np.copysign(length / size, station.response @ moved))
+    prediction = climb * station.response
+    point = station.point
+    factor = point.factor + climb
+    u = point.u + prediction
+    u[solver.problem.held] = solver.problem.prescribed(factor)
+    if not np.isfinite(solver.problem.turn(point.u, u)):
+        return Attempt(u, factor, 0, UNKNOWN, COLLIDES)
+    return solver.correct(u, factor, rule(length, prediction), origin=point.u)
+
+
+def _cosine(one: NDArray, other: NDArray) -> float:
+    sizes = float(np.linalg.norm(one)) * float(np.linalg.norm(other))
+    return float(one @ other) / sizes if sizes > 0.0 else 0.0
+
+
+def _stopped(station: Station, failure: str) -> PathStoppedError:
+    return PathStoppedError(
+        f"the path could not be followed beyond the load factor {station.point.factor:.6g} "
+        f"({failure})",
+        REMEDY,
+    )

@@ -1,0 +1,242 @@
+"""The energy landscape along a path of a bistable structure.
+
+A path is read as a curve of a driving force against a stroke that is conjugate to it: the load
+factor times the size of the forces against the mean displacement along them, or the force that
+moved supports take against how far they are moved. Where the driving force vanishes the structure
+is in equilibrium by itself: stable where the force rises with the stroke, unstable (the top of the
+barrier) where it falls. These states, and the ends of the ranges in which the force falls (negative
+stiffness), are located to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from foldyn.cases import Case
+from foldyn.errors import ComputationError, InputError
+from foldyn.results import check_result
+from foldyn.statics.branch import problem_of, station_of
+from foldyn.statics.newton import Solver
+from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.settings import Settings
+from foldyn.statics.stability import Mark, Section
+from foldyn.statics.station import Station
+
+if TYPE_CHECKING:
+    import xarray
+
+NO_FORCE = 1e-9  # of the largest driving force: counts as none at the ends of a path
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state without driving force.
+
+    Attributes
+    ----------
+    displacement : ndarray, shape (n, 3)
+        Displacement (m) of every node.
+    stroke : float
+        Stroke (m).
+    energy : float
+        Energy (J) above that of the landscape's first point.
+    stable : bool
+        Whether it stays there when let go.
+    """
+
+    displacement: NDArray
+    stroke: float
+    energy: float
+    stable: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """Energy and force along the stroke of a path.
+
+    Attributes
+    ----------
+    stroke, force, energy : ndarray, shape (steps,)
+        Stroke (m), driving force (N), and energy (J, strain less the work of constant loads)
+        above that of the first point.
+    states : tuple of Equilibrium
+        States without driving force, in their order along the path.
+    negative_stiffness : tuple of (float, float)
+        Ranges of the stroke (m), in the order of the path, in which the force falls.
+    """
+
+    stroke: NDArray
+    force: NDArray
+    energy: NDArray
+    states: tuple[Equilibrium, ...]
+    negative_stiffness: tuple[tuple[float, float], ...]
+
+    @property
+    def stable(self) -> tuple[Equilibrium, ...]:
+        """The stable states."""
+        return tuple(state for state in self.states if state.stable)
+
+    def barrier(self, start: int = 0, end: int = 1) -> float:
+        """Energy (J) to be overcome from one stable state to another, by their numbers.
+
+        Raises
+        ------
+        InputError
+            There are no such stable states.
+        """
+        stable = self.stable
+        for number in (start, end):
+            if not 0 <= number < len(stable):
+                raise InputError(
+                    f"barrier: the landscape has {len(stable)} stable states, there is no {number}"
+                )
+        places = sorted(self.states.index(stable[number]) for number in (start, end))
+        between = self.states[places[0] : places[1] + 1]
+        return max(state.energy for state in between) - stable[start].energy
+
+
+def landscape(
+    path: xarray.Dataset, case: Case | None = None, settings: Settings | None = None
+) -> Landscape:
+    """Energy landscape along a path that leads through the states of a bistable structure.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path from `trace` under forces ("arc_length", "mgdcm") or with moved supports
+        ("displacement"), of which one must drive it alone.
+    case : Case, optional
+        The case of the path; needed where the path cannot rebuild it (`foldyn.case_of`).
+    settings : Settings, optional
+
+    Returns
+    -------
+    Landscape
+
+    Raises
+    ------
+    InputError
+        The path is driven by folds, or by forces and moved supports together.
+    ComputationError
+        A state without force was not found between two points of the path.
+    """
+    check_result(path, "path: ")
+    problem = problem_of(path, case, 0)
+    walker = _Walker(problem, Solver(problem, settings))
+    stations = [station_of(walker.solver, path, k) for k in range(path.sizes["step"])]
+    if len(stations) < 2:
+        raise InputError("path: a landscape needs at least two points")
+    force = np.array([walker.force(s) for s in stations])
+    stroke = np.array([walker.stroke(s) for s in stations])
+    energy = np.array([walker.energy(s) for s in stations])
+    none = NO_FORCE * float(np.abs(force).max())
+    force[np.abs(force) <= none] = 0.0
+    states, edges = [], []
+    falls = [walker.rigidity(s) < 0.0 for s in stations]
+    for k, station in enumerate(stations):
+        if force[k] == 0.0:
+            states.append(walker.state(station, energy[0]))
+        if k + 1 == len(stations):
+            break
+        after = stations[k + 1]
+        if force[k] * force[k + 1] < 0.0:
+            found = walker.root(walker.force, station, after)
+            states.append(walker.state(found, energy[0]))
+        if falls[k] != falls[k + 1]:
+            edges.append(walker.stroke(walker.root(walker.compliance, station, after)))
+    if falls[0]:
+        edges.insert(0, float(stroke[0]))
+    if falls[-1]:
+        edges.append(float(stroke[-1]))
+    ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
+    return Landscape(stroke, force, energy - energy[0], tuple(states), ranges)
+
+
+class _Walker:
+    """Driving force, stroke and energy at stations of a path."""
+
+    def __init__(self, problem: OrigamiProblem, solver: Solver) -> None:
+        self.problem, self.solver = problem, solver
+        if problem.actuation.acts:
+            raise InputError("path: is driven by folds; a landscape needs forces or moved supports")
+        self.moves = problem.motion
+        self.load = problem.growing
+        self.by_motion = bool(self.moves.any())
+        if self.by_motion == bool(self.load.any()):
+            raise InputError(
+                "path: is driven by forces and moved supports together, or by neither; a landscape "
+                "needs one of them"
+            )
+        self.size = float(np.abs(self.moves).max() if self.by_motion else np.abs(self.load).sum())
+
+    def force(self, station: Station) -> float:
+        """Driving force, N."""
+        point = station.point
+        if not self.by_motion:
+            return point.factor * self.size
+        return float(self.moves @ self.problem.residual(point.u, point.factor)) / self.size
+
+    def stroke(self, station: Station) -> float:
+        """Stroke, m."""
+        if self.by_motion:
+            return station.point.factor * self.size
+        return float(self.load @ station.point.u) / self.size
+
+    def energy(self, station: Station) -> float:
+        """Strain energy less the work of constant loads, J."""
+        point = station.point
+        strain = float(self.problem.energies(point.u, point.factor).sum())
+        return strain - float(self.problem.constant @ point.u)
+
+    def rigidity(self, station: Station) -> float:
+        """Slope of the driving force over the stroke, up to a positive factor."""
+        if not self.by_motion:
+            return float(self.load @ station.response)
+        return float(self.moves @ (station.stiffness.matrix @ station.response))
+
+    def compliance(self, station: Station) -> float:
+        """A smooth function that vanishes where the slope changes its sign.
+
+        Under forces the slope passes through infinity in terms of the response, so its inverse is
+        what vanishes.
+        """
+        value = self.rigidity(station)
+        return value if self.by_motion else 1.0 / value
+
+    def state(self, station: Station, base: float) -> Equilibrium:
+        """State without force at a station."""
+        stable = self.rigidity(station) > 0.0
+        if self.by_motion:
+            stable = stable and station.point.negative <= 0
+        else:
+            stable = station.stiffness.factors.negative() == 0
+        displacement = station.point.u.reshape(self.problem.structure.nodes.shape).copy()
+        energy = self.energy(station) - float(base)
+        return Equilibrium(displacement, self.stroke(station), energy, stable)
+
+    def root(self, function, start: Station, end: Station) -> Station:
+        """Station between two others at which a function vanishes."""
+        section = Section(self.solver, start, end)
+        low, high = Mark(0.0, start), Mark(1.0, end)
+        found = {0.0: start, 1.0: end}
+
+        def value(share: float) -> float:
+            if share not in found:
+                mark = section.at(share, low, high)
+                if mark is None:
+                    raise ComputationError(
+                        "no equilibrium was found between the load factors "
+                        f"{start.point.factor:.6g} and {end.point.factor:.6g} of the path: trace "
+                        "it with smaller steps"
+                    )
+                found[share] = mark.station
+            return function(found[share])
+
+        share = float(brentq(value, 0.0, 1.0, xtol=1e-13))
+        value(share)
+        return found[share]

@@ -1,0 +1,117 @@
+"""Sparse symmetric factorizations: solutions and the count of negative eigenvalues.
+
+The tangent of a structure is symmetric but, beyond a critical point, indefinite. A factorization
+P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylvester's law of
+inertia), so one factorization gives both the step and the stability.
+
+SciPy's SuperLU is always there. Backends that are faster on large structures (PARDISO, CHOLMOD)
+are optional packages: see `backends`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.errors import FoldynError
+
+
+class SingularTangentError(FoldynError):
+    """The tangent cannot be factorized: it is singular to rounding, or not finite."""
+
+
+class Factorization(Protocol):
+    """A factorized symmetric matrix."""
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        ...
+
+    def pivots(self) -> NDArray | None:
+        """Pivots whose signs are those of the eigenvalues; None if only their count is known."""
+        ...
+
+    def negative(self) -> int:
+        """Count of negative eigenvalues."""
+        ...
+
+
+Factorizer = Callable[[sparse.csc_array], Factorization]
+
+
+class SuperLU:
+    """Factorization by SciPy's SuperLU in its symmetric mode, pivots taken from the diagonal."""
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        if not np.isfinite(matrix.data).all():
+            raise SingularTangentError("the tangent is not finite")
+        try:
+            self._lu = splu(
+                matrix,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:  # "Factor is exactly singular"
+            raise SingularTangentError("the tangent is singular") from error
+        self._matrix = matrix
+        self._pivots: NDArray | None = None
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        return self._lu.solve(b)
+
+    def pivots(self) -> NDArray:
+        """Pivots, or the eigenvalues themselves where a pivot had to leave the diagonal."""
+        if self._pivots is not None:
+            return self._pivots
+        straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
+        found = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
+        self._pivots = found
+        return found
+
+    def negative(self) -> int:
+        """Count of negative eigenvalues."""
+        return int((self.pivots() < 0.0).sum())
+
+
+MOST_DENSE = 3000  # dofs up to which eigenvalues of a full matrix are affordable
+
+
+def _eigenvalues(matrix: sparse.csc_array) -> NDArray:
+    if matrix.shape[0] > MOST_DENSE:
+        raise SingularTangentError("the tangent has a vanishing pivot")
+    return np.linalg.eigvalsh(matrix.toarray())
+
+
+class Reduction:
+    """Takes the block of the free dofs out of matrices of one sparsity pattern."""
+
+    def __init__(self, free: NDArray) -> None:
+        self.free = free
+        self._pattern: tuple[NDArray, NDArray] | None = None
+
+    def __call__(self, matrix: sparse.csr_array) -> sparse.csc_array:
+        """Block of the free dofs, by columns (which, the matrix being symmetric, are its rows)."""
+        pattern = (matrix.indptr, matrix.indices)
+        if self._pattern is None or not all(map(np.array_equal, pattern, self._pattern)):
+            self._prepare(matrix)
+        size = len(self.free)
+        return sparse.csc_array(
+            (matrix.data[self._take], self._indices, self._indptr), shape=(size, size)
+        )
+
+    def _prepare(self, matrix: sparse.csr_array) -> None:
+        self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
+        numbered = sparse.csr_array(
+            (np.arange(matrix.nnz, dtype=np.int64), matrix.indices, matrix.indptr),
+            shape=matrix.shape,
+        )
+        block = numbered[self.free][:, self.free].tocsr()
+        block.sort_indices()
+        self._take, self._indices, self._indptr = block.data, block.indices, block.indptr

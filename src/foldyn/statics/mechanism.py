@@ -1,0 +1,174 @@
+"""Mechanisms: motions that nothing resists, found and named before a path is sought.
+
+Hinges count with their stiffness k whatever their law (superlinear bends have no slope at rest,
+but they do resist), and forces in the structure do not count: what is judged is whether a motion
+stretches a bar or turns a hinge at all.
+
+Rigid motions follow from the supports alone. For others the stiffness matrix is factorized; only
+where its smallest eigenvalue is suspicious are its softest modes computed, and a mode is a
+mechanism if the strain that it causes is rounding. Bars are judged by their elongations, which
+rounding leaves exact: soft modes of a large sheet are millions of times softer than its bars and
+still not free.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from foldyn import mechanics
+from foldyn.errors import InputError
+from foldyn.mechanics import BarsHinges
+from foldyn.statics.linear_solver import SuperLU
+from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.rigid import AXES, name_rigid_motions
+
+SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
+SUSPICIOUS = (
+    1e-11  # eigenvalues of the matrix scaled to a unit diagonal that call for a closer look
+)
+INVERSE_ITERATIONS = 4
+MOST_MODES = 12
+BAR_STRAIN = 1e-9  # elongations, as a fraction of what the motion of their ends could cause
+HINGE_STRAIN = 1e-6  # and turns of hinges
+MOVED = 0.3  # of the largest motion: nodes that a message names
+MOST_NAMED = 8
+
+
+def refuse_mechanisms(problem: OrigamiProblem) -> None:
+    """Refuse a case whose supports or members leave a mechanism, naming its motions.
+
+    Raises
+    ------
+    InputError
+        The structure can move without strain.
+    """
+    names = mechanisms(problem)
+    if names:
+        raise InputError(
+            f"the structure can move freely: {'; '.join(names)}. Statics needs supports (and bars "
+            "and hinges) that resist every motion: hold what moves, or take inertia_relief = true "
+            "for a free body"
+        )
+
+
+def mechanisms(problem: OrigamiProblem) -> list[str]:
+    """Free motions in words: rigid ones, and where there are none, internal mechanisms."""
+    structure = problem.structure
+    held = np.zeros(structure.nodes.size, bool)
+    held[problem.held] = True
+    x = structure.nodes + problem.start().reshape(structure.nodes.shape)
+    return name_rigid_motions(x, held) or _internal(problem)
+
+
+def _internal(problem: OrigamiProblem) -> list[str]:
+    modes = free_modes(problem)
+    if not modes.shape[1]:
+        return []
+    size = np.linalg.norm(modes.reshape(-1, 3, modes.shape[1]), axis=1)  # (n, modes)
+    return [_name(modes[:, k].reshape(-1, 3), size[:, k]) for k in range(modes.shape[1])]
+
+
+def _name(mode: NDArray, size: NDArray) -> str:
+    moving = np.flatnonzero(size > MOVED * size.max())
+    moving = moving[np.argsort(-size[moving], kind="stable")]
+    nodes = ", ".join(map(str, sorted(moving[:MOST_NAMED].tolist())))
+    more = f" and {len(moving) - MOST_NAMED} more" if len(moving) > MOST_NAMED else ""
+    share = (mode[moving] ** 2).sum(axis=0)
+    axis = int(np.argmax(share))
+    along = f" along {AXES[axis]}" if share[axis] > 0.9 * share.sum() else ""
+    plural = "s" if len(moving) > 1 else ""
+    return f"internal mechanism that moves node{plural} {nodes}{more}{along}"
+
+
+def free_modes(problem: OrigamiProblem) -> NDArray:
+    """Motions (m, k) of the free dofs that strain nothing, orthonormal."""
+    model = _unstrained(problem)
+    pattern, rest = problem.structure.sparsity, np.zeros(problem.structure.nodes.shape)
+    hinges = mechanics.tangent(model._replace(bar_runs=model.bar_runs[:0]), pattern, rest).tocsr()
+    free = problem.free
+    matrix = mechanics.tangent(model, pattern, rest).tocsr()[free][:, free].tocsc()
+    diagonal = matrix.diagonal()
+    if not (diagonal > 0.0).all():
+        return _unresisted(problem, diagonal)
+    scale = 1.0 / np.sqrt(diagonal)  # all pivots of a like size, whatever the members'
+    scaled = sparse.csc_array(matrix.multiply(scale[:, None]).multiply(scale[None, :]))
+    size = len(free)
+    shifted = sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc"))
+    factors = SuperLU(shifted)
+    guess = np.random.default_rng(0).standard_normal(size)
+    if _softest(factors, guess) > SUSPICIOUS:
+        return np.zeros((len(diagonal) + len(problem.held), 0))
+    if size <= 600:
+        values, vectors = np.linalg.eigh(scaled.toarray())
+        vectors = vectors[:, :MOST_MODES]
+    else:
+        inverse = LinearOperator((size, size), matvec=factors.solve)
+        values, vectors = eigsh(scaled, k=MOST_MODES, sigma=-SHIFT, OPinv=inverse, v0=guess)
+        vectors = vectors[:, np.argsort(values)]
+    shapes = np.zeros((size + len(problem.held), vectors.shape[1]))
+    shapes[free] = vectors * scale[:, None]
+    unstrained = [k for k, mode in enumerate(shapes.T) if _strains_nothing(problem, hinges, mode)]
+    return np.linalg.qr(shapes[:, unstrained])[0] if unstrained else shapes[:, :0]
+
+
+def _softest(factors: SuperLU, guess: NDArray) -> float:
+    """Smallest eigenvalue, from above, by a few inverse iterations."""
+    value = np.inf
+    for _ in range(INVERSE_ITERATIONS):
+        guess = guess / np.linalg.norm(guess)
+        found = factors.solve(guess)
+        value = 1.0 / float(np.linalg.norm(found))
+        guess = found
+    return value
+
+
+def _unresisted(problem: OrigamiProblem, diagonal: NDArray) -> NDArray:
+    """Motions of single dofs that no member touches."""
+    loose = problem.free[diagonal <= 0.0]
+    modes = np.zeros((problem.structure.nodes.size, len(loose)))
+    modes[loose, np.arange(len(loose))] = 1.0
+    return modes
+
+
+def _unstrained(problem: OrigamiProblem) -> BarsHinges:
+    """The model with linear laws and without strain where the path is to start."""
+    model = problem.structure.model
+    x = model.rest + problem.start().reshape(model.rest.shape)
+    vector = x[model.bars[:, 1]] - x[model.bars[:, 0]]
+    bar_runs, hinge_runs = model.bar_runs.copy(), model.hinge_runs.copy()
+    bar_runs[:, 2] = hinge_runs[:, 2] = 0
+    return model._replace(
+        rest=x,
+        bar_vector=vector,
+        bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),
+        bar_runs=bar_runs,
+        hinge_rest=mechanics.angles(x, model.hinges),
+        hinge_runs=hinge_runs,
+    )
+
+
+def _directions(problem: OrigamiProblem) -> NDArray:
+    structure = problem.structure
+    x = structure.nodes + problem.start().reshape(structure.nodes.shape)
+    along = x[structure.bars[:, 1]] - x[structure.bars[:, 0]]
+    return along / np.linalg.norm(along, axis=1)[:, None]
+
+
+def _strains_nothing(problem: OrigamiProblem, hinges: sparse.csr_array, mode: NDArray) -> bool:
+    """Whether the strain that a mode causes is rounding."""
+    structure = problem.structure
+    motion = mode.reshape(-1, 3)
+    ends = motion[structure.bars]
+    apart = ends[:, 1] - ends[:, 0]
+    stiff = structure.bar_area > 0.0
+    elongation = np.einsum("ij,ij->i", apart, _directions(problem))[stiff]
+    most = np.linalg.norm(ends, axis=2).sum(axis=1)[stiff]
+    weight = (structure.bar_area / structure.bar_length)[stiff]
+    bars = float((weight * elongation**2).sum())
+    if bars > BAR_STRAIN**2 * float((weight * most**2).sum()):
+        return False
+    turned = float(mode @ (hinges @ mode))
+    return turned <= HINGE_STRAIN**2 * float(hinges.diagonal() @ mode**2)

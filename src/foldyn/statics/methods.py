@@ -1,0 +1,38 @@
+"""The registry of methods that follow a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from foldyn.errors import InputError
+from foldyn.statics.arc_length import Cylinder
+from foldyn.statics.continuation import ArcRule
+from foldyn.statics.mgdcm import Plane
+
+
+class Method(NamedTuple):
+    """How a path is followed.
+
+    `rule` is None where the load factor drives the path; `between` says whether points between
+    the given load factors belong to the path, too.
+    """
+
+    name: str
+    rule: ArcRule | None
+    between: bool
+
+
+METHODS: Mapping[str, Method] = {
+    "newton": Method("newton", None, False),
+    "displacement": Method("displacement", None, True),
+    "mgdcm": Method("mgdcm", Plane, True),
+    "arc_length": Method("arc_length", Cylinder, True),
+}
+
+
+def method_of(name: str) -> Method:
+    """Method by its name."""
+    if not isinstance(name, str) or name not in METHODS:
+        raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
+    return METHODS[name]

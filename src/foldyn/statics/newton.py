@@ -1,0 +1,194 @@
+"""Newton's method for one equilibrium, with line search and an optional moving load factor.
+
+Each iteration solves K a = -residual with the held dofs moved to where they are prescribed, and,
+where a rule lets the load factor f move too, K b = -d residual/df (the response to the factor):
+the step is a + df b, df from the rule (Batoz and Dhatt, Int. J. Numer. Meth. Eng. 14, 1979). The
+factor stands still without a rule.
+
+Steps are cut where a part would turn by more than `MOST_TURN` or run into another. With
+`search`, they are also cut to where the residual along the step is half of what it was at its
+start, as in Crisfield's line search; plain steps are tried first, because the residual of sheets
+often grows once (bars stretch to second order as panels turn) before it vanishes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.statics.backends import factorizer
+from foldyn.statics.linear_solver import Factorization, Reduction, SingularTangentError
+from foldyn.statics.problem import Problem
+from foldyn.statics.settings import Settings
+from foldyn.statics.tolerance import Balance, balance, converged
+
+COLLIDES = "panel would pass through panel"
+MOST_TURN = 0.2  # rad, of any part within one iteration
+HALVINGS = 40  # of a step that would let parts collide
+TRIALS = 10  # of a line search
+STALL = 10  # iterations without a new least residual after which an attempt is given up
+SLACK = 0.5  # of the residual along a step that a line search leaves
+SHIFT = 1e-13  # of the mean diagonal, added to a tangent that is singular to rounding
+
+# df from (motion since the start of the step, a, b); nan where the rule cannot be met
+Rule = Callable[[NDArray, NDArray, NDArray], float]
+
+
+class Attempt(NamedTuple):
+    """What a correction came to; an equilibrium unless `failure` says why not."""
+
+    u: NDArray
+    factor: float
+    iterations: int
+    balance: Balance
+    failure: str = ""
+
+
+@dataclass
+class Tally:
+    """Work done so far."""
+
+    iterations: int = 0
+    factorizations: int = 0
+    cuts: int = 0
+
+
+class Stiffness:
+    """The factorized tangent at one state."""
+
+    def __init__(self, problem: Problem, matrix: sparse.csr_array, factors: Factorization) -> None:
+        self.problem, self.matrix, self.factors = problem, matrix, factors
+
+    def solve(self, force: NDArray, motion: NDArray) -> NDArray:
+        """Motion (m,) of all dofs under a force (m,) on the free ones as the held move."""
+        problem = self.problem
+        full = np.zeros(len(force))
+        full[problem.held] = motion
+        load = force[problem.free]
+        if motion.any():
+            load = load - (self.matrix @ full)[problem.free]
+        full[problem.free] = self.factors.solve(load)
+        return full
+
+    def response(self, u: NDArray, factor: float) -> NDArray:
+        """Motion (m,) per unit of the load factor along the path."""
+        problem = self.problem
+        motion = problem.prescribed(1.0) - problem.prescribed(0.0)
+        return self.solve(-problem.rate(u, factor), motion)
+
+
+class Solver:
+    """A problem with the settings and memory that its equilibria are solved with."""
+
+    def __init__(self, problem: Problem, settings: Settings | None = None) -> None:
+        self.problem = problem
+        self.settings = settings or Settings()
+        self.tally = Tally()
+        self._reduce = Reduction(problem.free)
+        self.backend, self._factorize = factorizer(self.settings.solver, len(problem.free))
+
+    def stiffness(self, u: NDArray, factor: float, before: NDArray | None = None) -> Stiffness:
+        """Factorize the tangent at a state, for a step after one from the state `before`.
+
+        Where it is singular to rounding (exactly at a critical point) a shift of its diagonal far
+        below any stiffness lets the iteration go on.
+        """
+        matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
+        block = self._reduce(matrix)
+        self.tally.factorizations += 1
+        try:
+            factors = self._factorize(block)
+        except SingularTangentError:
+            diagonal = np.abs(block.diagonal())
+            if not np.isfinite(diagonal).all():
+                raise
+            shift = SHIFT * float(diagonal.mean()) or 1.0
+            shifted = block + shift * sparse.eye_array(block.shape[0], format="csc")
+            factors = self._factorize(sparse.csc_array(shifted))
+        return Stiffness(self.problem, matrix, factors)
+
+    def reduced(self, stiffness: Stiffness) -> sparse.csc_array:
+        """The tangent's block of the free dofs."""
+        return self._reduce(stiffness.matrix)
+
+    def correct(
+        self, u: NDArray, factor: float, rule: Rule | None = None,
+        stiffness: Stiffness | None = None, search: bool = False, origin: NDArray | None = None,
+    ) -> Attempt:  # fmt: skip
+        """Iterate from a state (m,) to an equilibrium.
+
+        stiffness : what the first iteration takes, if it is known already.
+        origin : where the step began that the rule restricts; `u` unless given.
+        """
+        problem, settings = self.problem, self.settings
+        before = origin
+        u, origin = u.copy(), u.copy() if origin is None else origin
+        residual = problem.residual(u, factor)
+        found = balance(problem, u, factor, residual)
+        least, since = np.inf, 0
+        for iteration in range(1, settings.iterations + 1):
+            if not np.isfinite(found.residual):
+                return Attempt(u, factor, iteration - 1, found, "the forces are no longer finite")
+            self.tally.iterations += 1
+            try:
+                tangent = stiffness or self.stiffness(u, factor, before)
+            except SingularTangentError as error:
+                return Attempt(u, factor, iteration, found, str(error))
+            stiffness = None
+            gap = problem.prescribed(factor) - u[problem.held]
+            step, climb = tangent.solve(-residual, gap), 0.0
+            if rule is not None:
+                response = tangent.response(u, factor)
+                climb = rule(u - origin, step, response)
+                step = step + climb * response
+            if not np.isfinite(step).all():
+                return Attempt(u, factor, iteration, found, "no step meets the path")
+            share = self._share(u, step)
+            if share == 0.0:
+                return Attempt(u, factor, iteration, found, COLLIDES)
+            if search and rule is None and share == 1.0 and not gap.any():
+                share = self._search(u, factor, step, residual)
+            before, u = u, u + share * step
+            factor += share * climb
+            if share == 1.0:
+                u[problem.held] = problem.prescribed(factor)
+            residual = problem.residual(u, factor)
+            found = balance(problem, u, factor, residual)
+            length = float(np.linalg.norm(step))
+            least, since = (found.residual, 0) if found.residual < least else (least, since + 1)
+            if share == 1.0 and converged(problem, found, u, length, settings.tolerance):
+                return Attempt(u, factor, iteration, found)
+            if since == STALL:
+                return Attempt(u, factor, iteration, found, "no progress of the iteration")
+        failure = f"no convergence in {settings.iterations} iterations"
+        return Attempt(u, factor, settings.iterations, found, failure)
+
+    def _share(self, u: NDArray, step: NDArray) -> float:
+        """Share of a step within which nothing turns too far and nothing collides."""
+        share = 1.0
+        for _ in range(HALVINGS):
+            turn = self.problem.turn(u, u + share * step)
+            if turn <= MOST_TURN:
+                return share
+            share *= MOST_TURN / turn if np.isfinite(turn) else 0.5
+        return 0.0
+
+    def _search(self, u: NDArray, factor: float, step: NDArray, residual: NDArray) -> float:
+        """Share of a step at which the residual along it is small against that at its start."""
+        start = float(step @ residual)
+        low, high, share = 0.0, 1.0, 1.0
+        for _ in range(TRIALS):
+            there = self.problem.residual(u + share * step, factor)
+            along = float(step @ there)
+            if abs(along) <= SLACK * abs(start):
+                return share
+            if along * start > 0.0 and share == 1.0:
+                return share  # still going down at the full step
+            low, high = (share, high) if along * start > 0.0 else (low, share)
+            share = 0.5 * (low + high)
+        return share

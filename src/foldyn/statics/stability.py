@@ -1,0 +1,165 @@
+"""Critical points between the points of a path: located and told apart.
+
+Where the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has
+passed through zero. The step is halved until one crossing remains, and the crossing is then found
+as the zero of the tangent's determinant, each point an equilibrium in the plane across the step.
+
+A crossing that cannot be located is left out: the counts on both sides tell of it all the same.
+
+At a limit point the load factor turns: the response to the factor points along the step on one
+side and against it on the other. At a bifurcation it does not, and another path crosses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from foldyn.statics.newton import Attempt, Solver
+from foldyn.statics.station import Station, arrive
+
+APART = 1e-6  # share of a step within which crossings count as one multiple point
+SHARP = 1e-13  # share of a step to which a crossing is located
+
+
+class Mark(NamedTuple):
+    """A station at a share of the way along a step."""
+
+    share: float
+    station: Station
+
+    @property
+    def negative(self) -> int:
+        """Negative eigenvalues there."""
+        return self.station.point.negative
+
+
+class Section:
+    """Equilibria in planes across a step from one station to another."""
+
+    def __init__(self, solver: Solver, start: Station, end: Station) -> None:
+        self.solver, self.start, self.end = solver, start, end
+        self.chord = end.point.u - start.point.u
+        self.whole = float(self.chord @ self.chord)
+
+    def at(self, share: float, low: Mark, high: Mark) -> Mark | None:
+        """Station at a share of the step, sought from between two marks; None if not found."""
+        weight = (share - low.share) / (high.share - low.share)
+        one, other = low.station.point, high.station.point
+        factor = one.factor + weight * (other.factor - one.factor)
+        u = one.u + weight * (other.u - one.u)
+        u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
+        goal = share * self.whole
+
+        def plane(moved: NDArray, step: NDArray, response: NDArray) -> float:
+            return (goal - float(self.chord @ (moved + step))) / float(self.chord @ response)
+
+        attempt = self.solver.correct(u, factor, plane, origin=self.start.point.u)
+        if attempt.failure or self._strays(attempt):
+            return None
+        return Mark(share, arrive(self.solver, attempt))
+
+    def _strays(self, attempt: Attempt) -> bool:
+        """Whether a point lies farther from the start than twice the length of the step."""
+        return bool(np.linalg.norm(attempt.u - self.start.point.u) > 2.0 * np.sqrt(self.whole))
+
+    def climbs(self, mark: Mark) -> bool:
+        """Whether the load factor grows along the step there."""
+        return float(self.chord @ mark.station.response) > 0.0
+
+
+def critical_points(solver: Solver, start: Station, end: Station) -> list[Station]:
+    """Stations at the limit and bifurcation points of a step, in their order."""
+    if start.point.negative == end.point.negative:
+        return []
+    section = Section(solver, start, end)
+    return _crossings(section, Mark(0.0, start), Mark(1.0, end))
+
+
+def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
+    change = abs(high.negative - low.negative)
+    if change == 0:
+        return []
+    if change > 1 and high.share - low.share > APART:
+        middle = section.at(0.5 * (low.share + high.share), low, high)
+        if middle is not None:
+            return _crossings(section, low, middle) + _crossings(section, middle, high)
+    found = _crossing(section, low, high)
+    return [] if found is None else [found]
+
+
+def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
+    """The critical point between two marks, as near as rounding allows; None if it is lost."""
+    kind = "bifurcation" if section.climbs(low) == section.climbs(high) else "limit"
+    count = min(low.negative, high.negative)
+    single = abs(high.negative - low.negative) == 1
+    if single and low.station.stiffness.factors.pivots() is not None:
+        found = _zero_of_determinant(section, low, high)
+    else:
+        found = _bisected(section, low, high)
+    if found is None:
+        return None
+    return found._replace(point=replace(found.point, negative=count, kind=kind))
+
+
+def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | None:
+    scale = _log_determinant(low)
+    best = {low.share: low, high.share: high}
+
+    def determinant(share: float) -> float:
+        if share not in best:
+            left = max((m for m in best.values() if m.share < share), key=lambda m: m.share)
+            right = min((m for m in best.values() if m.share > share), key=lambda m: m.share)
+            found = section.at(share, left, right)
+            if found is None:
+                raise _LostError
+            best[share] = found
+        mark = best[share]
+        sign = 1.0 if (mark.negative - low.negative) % 2 == 0 else -1.0
+        return sign * float(np.exp(min(_log_determinant(mark) - scale, 600.0)))
+
+    try:
+        root = brentq(determinant, low.share, high.share, xtol=SHARP, rtol=4 * np.finfo(float).eps)
+    except _LostError:
+        return _bisected(section, low, high)
+    return best[min(best, key=lambda share: abs(share - root))].station
+
+
+class _LostError(Exception):
+    """A section of the path was not found."""
+
+
+def _log_determinant(mark: Mark) -> float:
+    pivots = mark.station.stiffness.factors.pivots()
+    with np.errstate(divide="ignore"):
+        return float(np.log(np.abs(pivots)).sum()) if pivots is not None else np.nan
+
+
+def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
+    while high.share - low.share > SHARP:
+        middle = section.at(0.5 * (low.share + high.share), low, high)
+        if middle is None or middle.share in (low.share, high.share):
+            break
+        low, high = (middle, high) if middle.negative == low.negative else (low, middle)
+    return high.station if high.share - low.share <= APART else None
+
+
+def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
+    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their shapes (m, k)."""
+    problem, size = solver.problem, len(solver.problem.free)
+    matrix = solver.reduced(station.stiffness)
+    if size <= 300 or count >= size - 1:
+        values, vectors = np.linalg.eigh(matrix.toarray())
+    else:
+        inverse = LinearOperator((size, size), matvec=station.stiffness.factors.solve)
+        start = np.random.default_rng(0).standard_normal(size)
+        values, vectors = eigsh(matrix, k=count, sigma=0.0, OPinv=inverse, v0=start)
+    nearest = np.argsort(np.abs(values))[:count]
+    shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))
+    shapes[problem.free] = vectors[:, nearest]
+    return values[nearest], shapes

@@ -1,0 +1,133 @@
+"""What `trace` refuses, and how it says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sheets import TOP, compression, ideal_supports, specimen
+from trusses import APEX, VonMises
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.statics import Settings, trace
+
+
+@pytest.fixture(scope="module")
+def case():
+    return VonMises().case()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "newtn"}, "choose one of newton, displacement, mgdcm, arc_length"),
+        ({"load_factors": [1.0], "steps": 3}, "give one of them"),
+        ({"load_factors": [0.0, np.nan]}, "finite numbers"),
+        ({"load_factors": []}, "at least one"),
+        ({"load_factors": "all"}, "a list of numbers"),
+        ({"load_factors": [0.5, 0.5]}, "number 1 repeats"),
+        ({"steps": 0}, "steps = 0: give a positive whole number"),
+        ({"steps": True}, "positive whole number"),
+        ({"first_step": 0.1}, "method 'newton' goes by load_factors"),
+        ({"method": "mgdcm", "load_factors": [0, 1, 2]}, "two numbers"),
+        ({"method": "mgdcm", "load_factors": [1, 1]}, "begin and end must differ"),
+        ({"method": "mgdcm", "first_step": 0.0}, "not zero"),
+        ({"method": "mgdcm", "load_factors": [0, 1], "first_step": -0.1}, "leads away"),
+        ({"method": "displacement"}, "needs something that moves"),
+        ({"constant": "weight"}, 'give "gravity"'),
+        ({"constant": "gravity"}, "no Gravity among its loads"),
+        ({"constant": [1]}, "no load 1; it has 1, counted from 0"),
+        ({"constant": [0.5]}, "whole numbers"),
+        ({"constant": 0}, "numbers of loads"),
+        ({"constant": [0]}, "nothing grows along the path"),
+        ({"start": np.zeros((3, 3))}, "give a State"),
+        ({"start": fd.State(np.zeros((4, 3)))}, r"shape \(4, 3\): the case has \(3, 3\)"),
+        ({"settings": {"tolerance": 1e-6}}, "give statics.Settings"),
+        ({"inertia_relief": 1}, "True or False"),
+        ({"inertia_relief": True}, "needs the mass"),
+    ],
+)
+def test_bad_arguments(case, arguments, message):
+    with pytest.raises(InputError, match=message):
+        trace(case, **arguments)
+
+
+def test_no_case():
+    with pytest.raises(InputError, match="got Structure, give a Case"):
+        trace(specimen())
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"tolerance": 0.0}, "positive number"),
+        ({"tolerance": 0.5}, "between 1e-14 and 0.01"),
+        ({"iterations": 0}, "positive whole number"),
+        ({"target": 2.5}, "positive whole number"),
+        ({"jump": 1.0}, "above 1"),
+        ({"largest_turn": -3}, "positive number"),
+        ({"locate": 1}, "True or False"),
+    ],
+)
+def test_bad_settings(values, message):
+    with pytest.raises(InputError, match=message):
+        Settings(**values)
+
+
+def test_unknown_solver(case):
+    with pytest.raises(InputError, match="choose 'auto' or one of superlu, pardiso"):
+        trace(case, settings=Settings(solver="umfpack"))
+
+
+def test_nothing_can_move():
+    s = VonMises().structure()
+    held = fd.Case(
+        s, [fd.Fix([0, 1, 2], "xyz")], [fd.Gravity((0, 0, -9.81))] if s.sheet.density else []
+    )
+    with pytest.raises(InputError, match="nothing can move"):
+        trace(held)
+
+
+def test_nothing_loads_the_case():
+    case = fd.Case(specimen(), [*ideal_supports(), fd.Fix([3], "x")])
+    with pytest.raises(InputError, match="nothing grows along the path"):
+        trace(case)
+
+
+def test_state_under_constant_loads_alone():
+    """load_factors = [0] finds the state at rest: folds that are not stress-free open."""
+    case = fd.Case(specimen("as_published"), ideal_supports())
+    path = trace(case, load_factors=[0.0])
+    assert float(path.displacement.sel(node=3, axis="x")[0]) < -1e-3
+    assert path.residual.values[0] < 1e-9
+
+
+def test_rest_angle_out_of_range():
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01))
+    supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
+    case = fd.Case(s, supports, [fd.Actuate([0], 200.0)])
+    with pytest.raises(InputError, match="at 4 the rest angle of crease 0 would leave 0 to 360"):
+        trace(case, load_factors=[1.0, 4.0])
+
+
+def test_contradictory_supports():
+    with pytest.raises(InputError, match="contradictory support"):
+        fd.Case(specimen(), [fd.Fix(TOP, "x"), fd.Impose(TOP, "x", 0.01)])
+
+
+def test_start_with_nodes_on_top_of_each_other():
+    case = compression()
+    u = np.zeros_like(case.structure.nodes)
+    u[30] = case.structure.nodes[31] - case.structure.nodes[30]
+    with pytest.raises(InputError, match="start: nodes 30 and 31, which a bar joins"):
+        trace(case, load_factors=[0.0], start=fd.State(u))
+
+
+def test_base_motion_and_histories_play_no_part():
+    truss = VonMises()
+    supports = [*truss.case().supports, fd.BaseMotion("z", fd.HalfSine(0.5), 0.1)]
+    load = fd.Force([APEX], (0, 0, -1.0), fd.Pulse(0.1))
+    moved = trace(fd.Case(truss.structure(), supports, [load]), load_factors=[2.0])
+    plain = trace(truss.case(), load_factors=[2.0])
+    np.testing.assert_array_equal(moved.displacement, plain.displacement)
