@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.mechanics import BarsHinges
+from foldyn.mechanics import BarsHinges, node_order, renumber
+
+SMALL = 300  # nodes below which all values are in the cache anyway
 
 
 class Numbering(NamedTuple):
@@ -47,5 +49,15 @@ class Numbering(NamedTuple):
 
 def renumbered(model: BarsHinges) -> tuple[BarsHinges, Numbering]:
     """Model with its nodes along the sheet, if it is large enough to gain from it."""
-    nodes, hinges = np.arange(len(model.rest)), np.arange(len(model.hinges))
-    return model, Numbering(nodes, nodes, hinges)
+    if len(model.rest) < SMALL:
+        nodes = np.arange(len(model.rest))
+        return model, Numbering(nodes, nodes, np.arange(len(model.hinges)))
+    order = node_order(model)
+    model, rows = renumber(model, order)
+    return model, Numbering(order, _inverse(order), _inverse(rows))
+
+
+def _inverse(order: NDArray) -> NDArray:
+    places = np.empty(len(order), np.int64)
+    places[order] = np.arange(len(order))
+    return places

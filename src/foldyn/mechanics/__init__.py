@@ -1,9 +1,17 @@
 """Compiled mechanics of bars and hinges: energy, internal force, tangent."""
 
 from foldyn.mechanics.energy import angles, strain_energies
-from foldyn.mechanics.force import Workspace, internal_force, workspace
+from foldyn.mechanics.force import (
+    Workspace,
+    internal_force,
+    strip_force,
+    workspace,
+    workspaces,
+)
 from foldyn.mechanics.model import BarsHinges, Hinges, build
+from foldyn.mechanics.renumber import node_order, renumber
 from foldyn.mechanics.tangent import Sparsity, sparsity, tangent
+from foldyn.mechanics.threads import part, run_together, shared, threads_for, wait
 
 __all__ = [
     "BarsHinges",
@@ -13,8 +21,17 @@ __all__ = [
     "angles",
     "build",
     "internal_force",
+    "node_order",
+    "part",
+    "renumber",
+    "run_together",
+    "shared",
     "sparsity",
     "strain_energies",
+    "strip_force",
     "tangent",
+    "threads_for",
+    "wait",
     "workspace",
+    "workspaces",
 ]

@@ -4,6 +4,8 @@ The compute passes run over blocks of 64 elements in structure-of-arrays form, w
 vectorizes; the moment pass stands apart, so that laws with branches or powers do not stop it.
 The scratch arrays are flat and addressed as row * BLOCK + lane: with a stride known when compiling
 the compiler proves that loads and stores do not overlap (two-dimensional scratch: 5 times slower).
+Nodal values stand in buffers of rows of four, which are loaded and stored as vectors (`rows`), and
+which hold a window of a large sheet (`strips`).
 """
 
 from __future__ import annotations
@@ -21,57 +23,156 @@ from foldyn.materials.switch import bar_stress, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.flat import flat
 from foldyn.mechanics.model import BLOCK, BarsHinges
+from foldyn.mechanics.prefetch import prefetch_range
+from foldyn.mechanics.rows import LANES, add_rows, load_rows
+from foldyn.mechanics.strips import Strips, strips
+from foldyn.mechanics.threads import Team, shared, team, wait
+
+LINE = 8  # numbers in a cache line
+SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would make them collide
 
 
 class Workspace(NamedTuple):
-    """Scratch memory of the force kernels, made once and used at every evaluation."""
+    """Scratch memory of the force kernels on one thread, made once and used at every evaluation."""
 
     points: NDArray  # (12 * BLOCK,)
     gradient: NDArray  # (13 * BLOCK,), the last row the angle
-    value: NDArray  # (BLOCK,)
-    position: NDArray  # (n, 3)
-    angle: NDArray  # (nh,) the dihedrals of the last evaluation, rad
+    value: NDArray  # (2 * BLOCK,)
+    position: NDArray  # (r, 4) buffers of nodal values, see `strips`
+    displacement: NDArray  # (r, 4)
+    sums: NDArray  # (r, 4) forces
+    angle: NDArray  # (nh,) the dihedrals of the last evaluation, rad; all threads write to one
+    strips: Strips
+    team: Team
 
 
 def workspace(model: BarsHinges) -> Workspace:
-    """Scratch memory for `model`."""
-    return Workspace(
-        np.zeros(12 * BLOCK),  # lanes beyond a block's end are computed too
-        np.zeros(13 * BLOCK),
-        np.zeros(BLOCK),
-        np.empty((len(model.rest), 3)),
-        np.empty(len(model.hinges)),
-    )
+    """Scratch memory for `model` on one thread."""
+    return workspaces(model, 1)[0]
+
+
+def workspaces(model: BarsHinges, threads: int) -> list[Workspace]:
+    """Scratch memory of each thread; fewer than asked for if the model cannot be shared so."""
+    parts = strips(model, threads)
+    angle = np.empty(len(model.hinges))
+    return [
+        Workspace(**_scratch(part.rows), angle=angle, strips=part, team=member)
+        for part, member in zip(parts, team(len(parts)), strict=True)
+    ]
+
+
+def _scratch(rows: int) -> dict[str, NDArray]:
+    """Scratch arrays that start at cache lines."""
+    shapes = {
+        "points": (12 * BLOCK,),
+        "gradient": (13 * BLOCK,),
+        "value": (2 * BLOCK,),
+        "position": (rows, 4),
+        "displacement": (rows, 4),
+        "sums": (rows, 4),
+    }
+    sizes = [math.prod(shape) for shape in shapes.values()]
+    starts = np.cumsum([0, *(math.ceil(size / LINE) * LINE + SHIFT for size in sizes)])
+    room = np.zeros(starts[-1] + LINE)  # lanes beyond a block's end are computed too
+    room = room[-room.ctypes.data % (8 * LINE) // 8 :]
+    return {
+        name: room[start : start + size].reshape(shape)
+        for (name, shape), start, size in zip(shapes.items(), starts[:-1], sizes, strict=True)
+    }
+
+
+@scalar
+def whole_lanes(m):
+    """The count of lanes to compute for m elements: the rest of a vector costs nothing."""
+    return (m + LANES - 1) // LANES * LANES
+
+
+@scalar
+def gather(rows, mask, nodes, width, v, first, m, out, at):
+    """Coordinates of node v of m elements, rows of `width` nodes, to three rows from out[at]."""
+    whole = m // LANES * LANES
+    for q in range(0, whole, LANES):
+        load_rows(rows, nodes, width * (first + q) + v, width, mask, out, at + q, BLOCK)
+    for q in range(whole, m):
+        row = 4 * (nodes[width * (first + q) + v] & mask)
+        for c in range(3):
+            out[at + c * BLOCK + q] = rows[row + c]
+
+
+@scalar
+def scatter(rows, mask, nodes, width, v, first, m, vector, at, factor, start):
+    """Add factor[start + q] times a vector, three rows from vector[at], to node v of elements."""
+    whole = m // LANES * LANES
+    for q in range(0, whole, LANES):
+        node = width * (first + q) + v
+        add_rows(rows, nodes, node, width, mask, vector, at + q, BLOCK, factor, start + q)
+    for q in range(whole, m):
+        row = 4 * (nodes[width * (first + q) + v] & mask)
+        for c in range(3):
+            rows[row + c] += factor[start + q] * vector[at + c * BLOCK + q]
+
+
+@scalar
+def first_above(nodes, width, start, end, node):
+    """First of the elements start to end whose lowest node is not below `node`, a strip's end."""
+    while start < end:
+        middle = (start + end) // 2
+        low = nodes[width * middle]
+        for v in range(1, width):
+            low = min(low, nodes[width * middle + v])
+        if low < node:
+            start = middle + 1
+        else:
+            end = middle
+    return start
+
+
+@scalar
+def elements_of(nodes, width, run, low, high, n):
+    """Elements of a run with lowest nodes from low to high, multiples of GROUP or the end n."""
+    start, end = run[0], run[1]
+    if low > 0:
+        start = first_above(nodes, width, start, end, low)
+    if high < n:
+        end = first_above(nodes, width, start, end, high)
+    return start, end
 
 
 @kernel
-def add_bar_forces(model, u, force, work):
-    """Add the bars' internal force at displacement u (n, 3) to force (n, 3)."""
-    d, s = work.points, work.value
-    u, force = flat(u), flat(force)
+def add_bar_forces(model, low, high, work):
+    """Add the forces of the bars with lowest nodes from low to high to work.sums."""
+    x, s, mask = work.points, work.value, work.strips.mask
+    u, sums = flat(work.displacement), flat(work.sums)
     bars, vector = flat(model.bars), flat(model.bar_vector)
     per_length2, stiffness = model.bar_per_length2, model.bar_stiffness
+    far = work.strips.lowest.shape[0] > 1
     for run in range(model.bar_runs.shape[0]):
         code = model.bar_runs[run, 2]
         address = model.addresses[model.bar_runs[run, 3], 1]
-        end = model.bar_runs[run, 1]
-        for first in range(model.bar_runs[run, 0], end, BLOCK):
+        start, end = elements_of(bars, 2, model.bar_runs[run], low, high, model.rest.shape[0])
+        for first in range(start, end, BLOCK):
             m = min(BLOCK, end - first)
+            lanes = whole_lanes(m)
+            after = first + BLOCK
+            for v in range(2):
+                gather(u, mask, bars, 2, v, first, m, x, 3 * v * BLOCK)
+            if far:
+                prefetch_range(vector, 3 * after, 3 * BLOCK)
+                prefetch_range(bars, 2 * after, 2 * BLOCK)
+                prefetch_range(per_length2, after, BLOCK)
+                prefetch_range(stiffness, after, BLOCK)
             for q in range(m):
                 e = first + q
-                a, b = 3 * bars[2 * e], 3 * bars[2 * e + 1]
                 for c in range(3):
-                    d[c * BLOCK + q] = vector[3 * e + c]
-                    d[(3 + c) * BLOCK + q] = u[b + c] - u[a + c]
-            lanes = whole_lanes(m)
-            for q in range(m):
-                s[q] = per_length2[first + q]
+                    x[(6 + c) * BLOCK + q] = vector[3 * e + c]
+                s[q] = per_length2[e]
             for q in range(lanes):
                 # lambda^2 - 1 from displacements: nothing cancels
-                x = d[3 * BLOCK + q] * (2.0 * d[q] + d[3 * BLOCK + q])
-                x += d[4 * BLOCK + q] * (2.0 * d[BLOCK + q] + d[4 * BLOCK + q])
-                x += d[5 * BLOCK + q] * (2.0 * d[2 * BLOCK + q] + d[5 * BLOCK + q])
-                s[q] *= x
+                dx, vx = x[3 * BLOCK + q] - x[q], x[6 * BLOCK + q]
+                dy, vy = x[4 * BLOCK + q] - x[BLOCK + q], x[7 * BLOCK + q]
+                dz, vz = x[5 * BLOCK + q] - x[2 * BLOCK + q], x[8 * BLOCK + q]
+                s[q] *= dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
+                x[q], x[BLOCK + q], x[2 * BLOCK + q] = vx + dx, vy + dy, vz + dz
             if code == 1:
                 for q in range(lanes):
                     s[q] = ogden_stress(s[q])
@@ -80,38 +181,25 @@ def add_bar_forces(model, u, force, work):
                     s[q] = bar_stress(code, s[q] / (1.0 + math.sqrt(1.0 + s[q])), address)
             for q in range(m):
                 s[q] *= stiffness[first + q]
-            for q in range(lanes):
-                d[q] = s[q] * (d[q] + d[3 * BLOCK + q])
-                d[BLOCK + q] = s[q] * (d[BLOCK + q] + d[4 * BLOCK + q])
-                d[2 * BLOCK + q] = s[q] * (d[2 * BLOCK + q] + d[5 * BLOCK + q])
-            for q in range(m):
-                e = first + q
-                a, b = 3 * bars[2 * e], 3 * bars[2 * e + 1]
-                for c in range(3):
-                    force[a + c] -= d[c * BLOCK + q]
-                    force[b + c] += d[c * BLOCK + q]
+                s[BLOCK + q] = -s[q]
+            scatter(sums, mask, bars, 2, 0, first, m, x, 0, s, BLOCK)
+            scatter(sums, mask, bars, 2, 1, first, m, x, 0, s, 0)
 
 
 @scalar
-def whole_lanes(m):
-    """The count of lanes to compute for m elements: the rest of a vector costs nothing."""
-    return (m + 7) // 8 * 8
-
-
-@scalar
-def enhanced_moments(stiffness, rest, p, first, m, angle, value):
-    """Moments of hinges of the enhanced linear law: those between theta1 and theta2 at once."""
+def enhanced_moments(stiffness, rest, p, low, high, first, m, angle, value):
+    """Moments of hinges of the enhanced linear law: those between low and high at once."""
     beyond = 0
     for q in range(m):
         e = first + q
-        beyond += (angle[e] < p[4 * e]) | (angle[e] > p[4 * e + 1])
-        value[q] = stiffness[e] * (angle[e] - rest[e] - p[4 * e + 2])
+        beyond += (angle[q] < low) | (angle[q] > high)
+        value[q] = stiffness[e] * (angle[q] - rest[e] - p[4 * e + 2])
     if beyond > 0:
         for q in range(m):
             e = first + q
-            if (angle[e] < p[4 * e]) | (angle[e] > p[4 * e + 1]):
+            if (angle[q] < low) | (angle[q] > high):
                 value[q] = stiffness[e] * hinge_moment(
-                    2, angle[e], rest[e], p[4 * e], p[4 * e + 1], p[4 * e + 2], 0.0, 0
+                    2, angle[q], rest[e], low, high, p[4 * e + 2], 0.0, 0
                 )
 
 
@@ -120,7 +208,7 @@ def superlinear_moments(stiffness, rest, first, m, angle, value):
     """Moments of hinges of the superlinear law."""
     for q in range(m):
         e = first + q
-        value[q] = stiffness[e] * superlinear_moment(angle[e], rest[e])
+        value[q] = stiffness[e] * superlinear_moment(angle[q], rest[e])
 
 
 @kernel
@@ -129,35 +217,34 @@ def hinge_moments(code, address, stiffness, rest, p, first, m, angle, value):
     for q in range(m):
         e = first + q
         value[q] = stiffness[e] * hinge_moment(
-            code, angle[e], rest[e], p[4 * e], p[4 * e + 1], p[4 * e + 2], p[4 * e + 3], address
+            code, angle[q], rest[e], p[4 * e], p[4 * e + 1], p[4 * e + 2], p[4 * e + 3], address
         )
 
 
 @kernel
-def add_hinge_forces(model, u, force, work):
-    """Add the hinges' internal force at displacement u (n, 3) to force (n, 3)."""
-    x, g, value, angle = work.points, work.gradient, work.value, work.angle
-    position, hinges = flat(work.position), flat(model.hinges)
-    u, force, at_rest = flat(u), flat(force), flat(model.rest)
-    stiffness, rest = model.hinge_stiffness, model.hinge_rest
-    parameters = flat(model.hinge_parameters)
-    for n in range(u.size):
-        position[n] = at_rest[n] + u[n]
+def add_hinge_forces(model, low, high, work, keep):
+    """Add the forces of the hinges with lowest nodes from low to high to work.sums.
+
+    keep : whether the dihedrals go to work.angle.
+    """
+    x, g, value, mask = work.points, work.gradient, work.value, work.strips.mask
+    position, sums, hinges = flat(work.position), flat(work.sums), flat(model.hinges)
+    stiffness, rest, kept = model.hinge_stiffness, model.hinge_rest, work.angle
+    p, angle = flat(model.hinge_parameters), g[12 * BLOCK :]
+    far = work.strips.lowest.shape[0] > 1
     for run in range(model.hinge_runs.shape[0]):
         code = model.hinge_runs[run, 2]
         address = model.addresses[model.hinge_runs[run, 3], 1]
-        end = model.hinge_runs[run, 1]
-        for first in range(model.hinge_runs[run, 0], end, BLOCK):
+        start, end = elements_of(hinges, 4, model.hinge_runs[run], low, high, model.rest.shape[0])
+        for first in range(start, end, BLOCK):
             m = min(BLOCK, end - first)
-            for q in range(m):
-                h = 4 * (first + q)
-                j, k = 3 * hinges[h], 3 * hinges[h + 1]
-                i, l = 3 * hinges[h + 2], 3 * hinges[h + 3]  # noqa: E741
-                for c in range(3):
-                    x[c * BLOCK + q] = position[j + c]
-                    x[(3 + c) * BLOCK + q] = position[k + c]
-                    x[(6 + c) * BLOCK + q] = position[i + c]
-                    x[(9 + c) * BLOCK + q] = position[l + c]
+            after = first + BLOCK
+            for v in range(4):
+                gather(position, mask, hinges, 4, v, first, m, x, 3 * v * BLOCK)
+            if far:
+                prefetch_range(hinges, 4 * after, 4 * BLOCK)
+                prefetch_range(stiffness, after, BLOCK)
+                prefetch_range(rest, after, BLOCK)
             for q in range(whole_lanes(m)):
                 (
                     g[12 * BLOCK + q],
@@ -171,29 +258,94 @@ def add_hinge_forces(model, u, force, work):
                     x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
                     x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
                 )  # fmt: skip
-            for q in range(m):
-                angle[first + q] = g[12 * BLOCK + q]
+            if keep:
+                for q in range(m):
+                    kept[first + q] = angle[q]
             if code == 1:
                 superlinear_moments(stiffness, rest, first, m, angle, value)
-            elif code == 2:
-                enhanced_moments(stiffness, rest, parameters, first, m, angle, value)
+            elif code == 2:  # theta1 and theta2 are those of the law, one for the whole run
+                enhanced_moments(
+                    stiffness, rest, p, p[4 * start], p[4 * start + 1], first, m, angle, value
+                )
             else:
-                hinge_moments(code, address, stiffness, rest, parameters, first, m, angle, value)
-            for q in range(m):
-                h = 4 * (first + q)
-                j, k = 3 * hinges[h], 3 * hinges[h + 1]
-                i, l = 3 * hinges[h + 2], 3 * hinges[h + 3]  # noqa: E741
-                moment = value[q]
-                for c in range(3):
-                    force[j + c] += moment * g[c * BLOCK + q]
-                    force[k + c] += moment * g[(3 + c) * BLOCK + q]
-                    force[i + c] += moment * g[(6 + c) * BLOCK + q]
-                    force[l + c] += moment * g[(9 + c) * BLOCK + q]
+                hinge_moments(code, address, stiffness, rest, p, first, m, angle, value)
+            for v in range(4):
+                scatter(sums, mask, hinges, 4, v, first, m, g, 3 * v * BLOCK, value, 0)
+
+
+@kernel
+def place(at_rest, u, work, start, end):
+    """Put the nodes start to end, flat rows of three, into the buffers of rows of four."""
+    mask, last = np.uint32(work.strips.mask), at_rest.size // 3 - 1
+    position, displacement, sums = flat(work.position), flat(work.displacement), flat(work.sums)
+    for i in range(start, min(end, last)):
+        node = np.uint32(i)  # unsigned: no test for wraparound
+        at, row = 3 * node, 4 * (node & mask)
+        # the fourth number belongs to the next node and is not used: four make a vector
+        a, b, c, d = u[at], u[at + 1], u[at + 2], u[at + 3]
+        e, f, g, h = at_rest[at], at_rest[at + 1], at_rest[at + 2], at_rest[at + 3]
+        displacement[row], displacement[row + 1] = a, b
+        displacement[row + 2], displacement[row + 3] = c, d
+        position[row], position[row + 1] = a + e, b + f
+        position[row + 2], position[row + 3] = c + g, d + h
+        sums[row], sums[row + 1], sums[row + 2], sums[row + 3] = 0.0, 0.0, 0.0, 0.0
+    if start <= last < end:
+        row = 4 * (np.uint32(last) & mask)
+        for c in range(3):
+            displacement[row + c], sums[row + c] = u[3 * last + c], 0.0
+            position[row + c] = at_rest[3 * last + c] + u[3 * last + c]
+
+
+@kernel
+def finish(force, work, start, end):
+    """Take the sums of the nodes start to end from the buffer to flat rows of three."""
+    mask, sums = np.uint32(work.strips.mask), flat(work.sums)
+    for i in range(start, end - 1):
+        node = np.uint32(i)
+        at, row = 3 * node, 4 * (node & mask)
+        # the fourth number is overwritten by the next node's first
+        a, b, c, d = sums[row], sums[row + 1], sums[row + 2], sums[row + 3]
+        force[at], force[at + 1], force[at + 2], force[at + 3] = a, b, c, d
+    for i in range(max(start, end - 1), end):
+        for c in range(3):
+            force[3 * i + c] = sums[4 * (i & work.strips.mask) + c]
+
+
+@kernel
+def finish_edge(force, work, start, end):
+    """Add the sums of the nodes start to end to those of an edge strip."""
+    mask, sums = work.strips.mask, flat(work.sums)
+    for i in range(start, end):
+        for c in range(3):
+            force[3 * i + c] += sums[4 * (i & mask) + c]
 
 
 @scalar
-def internal_force(model, u, force, work):
-    """Internal force (n, 3), N, at displacement u (n, 3), m; dihedrals go to work.angle."""
-    force[:] = 0.0
-    add_bar_forces(model, u, force, work)
-    add_hinge_forces(model, u, force, work)
+def strip_force(model, s, u, force, work, keep):
+    """Force (n, 3) on the nodes work.strips.finished[s], for each strip s in turn.
+
+    Members of a team must `wait` for each other before strip work.strips.edge.
+    """
+    plan = work.strips
+    place(flat(model.rest), flat(u), work, plan.fresh[s, 0], plan.fresh[s, 1])
+    add_bar_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work)
+    add_hinge_forces(model, plan.lowest[s, 0], plan.lowest[s, 1], work, keep)
+    if plan.adds[s]:
+        finish_edge(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
+    else:
+        finish(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
+
+
+@shared
+def internal_force(model, u, force, work, keep=True):
+    """Internal force (n, 3), N, at displacement u (n, 3), m.
+
+    A member of a team gets the force on its own nodes, work.strips.own; u must be complete before
+    any of them starts, and may be changed on its own nodes when it is done.
+
+    keep : whether the dihedrals go to work.angle.
+    """
+    for s in range(work.strips.lowest.shape[0]):
+        if s == work.strips.edge:
+            wait(work.team)
+        strip_force(model, s, u, force, work, keep)

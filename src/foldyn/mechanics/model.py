@@ -2,7 +2,8 @@
 
 Elements stand sorted in runs of one law, so that the choice of the law is made once per block of
 elements, and within a run by their lowest node, so that neighbors in memory are neighbors in
-space.
+space. The lowest nodes are sorted by groups of 16 only: within a group, elements with the same
+lowest node stand apart, because a sum that has just been written makes the next addition wait.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from foldyn.materials.law import BarLaw, HingeLaw
 
 BLOCK = 64
+GROUP = 16
 
 
 class BarsHinges(NamedTuple):
@@ -47,8 +49,15 @@ class Hinges(NamedTuple):
     law: HingeLaw
 
 
-def _order(nodes: NDArray) -> NDArray:
-    return np.argsort(nodes.min(axis=1), kind="stable") if len(nodes) else np.zeros(0, int)
+def element_order(nodes: NDArray) -> NDArray:
+    """Order (ne,) in which the elements of a run, rows of nodes (ne, k), stand in a model."""
+    if not len(nodes):
+        return np.zeros(0, np.int64)
+    lowest = nodes.min(axis=1).astype(np.int64)
+    order = np.argsort(lowest, kind="stable")
+    lowest = lowest[order]
+    turn = np.arange(len(order)) - np.searchsorted(lowest, lowest)  # first, second, ... of its node
+    return order[np.lexsort((lowest, turn, lowest // GROUP))]
 
 
 def build(
@@ -63,7 +72,7 @@ def build(
         addresses.append(of.addresses)
         return start, end, of.code, len(addresses) - 1
 
-    order = _order(bars)
+    order = element_order(bars)
     bars = np.ascontiguousarray(bars[order], np.uint32).reshape(-1, 2)
     vector = rest[bars[:, 1]] - rest[bars[:, 0]]
     bar_runs = [run(0, len(bars), law)]
@@ -76,7 +85,7 @@ def build(
     hinge_runs, start, orders = [], 0, []
     for numbers in members:
         nodes = np.concatenate([np.asarray(groups[k].nodes).reshape(-1, 4) for k in numbers])
-        orders.append(_order(nodes))
+        orders.append(element_order(nodes))
         hinge_runs.append(run(start, start + len(nodes), groups[numbers[0]].law))
         start += len(nodes)
 

@@ -1,0 +1,179 @@
+"""Threads that run one compiled function together, each on its share of a model.
+
+All threads run the same function; where one needs what others have computed, they wait for each
+other. So a whole time loop runs on several threads without one being started or stopped on the
+way, and it is compiled only once: a thread that is alone waits for nobody. Numba's `prange` would
+compile it a second time, and its pools of threads do not survive a fork (GNU OpenMP) or two callers
+at once (workqueue).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import config, njit, types
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+from numpy.typing import NDArray
+
+from foldyn.materials.compiled import kernel, scalar
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.strips import shares
+
+HINGES_EACH = 10_000  # hinges for each thread from which it pays
+MOST = 8  # threads: more have not been measured
+SPINS = 2000  # looks at the others before the processor is offered to other programs
+ARRIVED, ROUND, BROKEN = 0, 8, 16  # places in `Team.state`, each in a cache line of its own
+
+# as `compiled.kernel`, and without Python's lock: for functions that threads run together
+shared = njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
+
+
+class Team(NamedTuple):
+    """A member of a team of threads."""
+
+    size: int
+    number: int  # of this member, 0..size - 1
+    state: NDArray  # (24,) int64, of the whole team
+    pause: int  # see `_pause`
+
+
+def team(size: int) -> list[Team]:
+    """Members of a team of `size` threads."""
+    state = np.zeros(24, np.int64)
+    return [Team(size, number, state, _pause()) for number in range(size)]
+
+
+@cache
+def _pause() -> int:
+    """Address of the system's function that lets other programs run."""
+    if os.name == "nt":
+        function = ctypes.windll.kernel32.SwitchToThread  # type: ignore[attr-defined]
+    else:
+        function = ctypes.CDLL(None).sched_yield
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def threads_for(model: BarsHinges) -> int:
+    """Number of threads on which a motion of the model runs fastest: one below 20 000 hinges.
+
+    Never more than NUMBA_NUM_THREADS (by default the processors that this process may use) or
+    OMP_NUM_THREADS, or than its elements' reach permits.
+    """
+    allowed = [MOST, int(config.NUMBA_NUM_THREADS)]  # type: ignore[attr-defined]
+    text = os.environ.get("OMP_NUM_THREADS", "")
+    if text.isdigit():
+        allowed.append(int(text))
+    return len(shares(model, min(*allowed, len(model.hinges) // HINGES_EACH))) - 1
+
+
+def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tuple]) -> list:
+    """Results of a compiled function, run by each member of a team with its tuple of arguments.
+
+    The function must be compiled with `shared`: threads that hold Python's lock would wait for each
+    other forever. The caller's thread is the first member. An exception on one thread ends the
+    waiting of all and is raised; the team is then spent.
+    """
+    results: list[Any] = [None] * len(members)
+    failures: list[BaseException] = []
+
+    def run(number: int) -> None:
+        try:
+            results[number] = function(*arguments[number])
+        except BaseException as failure:
+            failures.append(failure)
+            members[number].state[BROKEN] = 1
+
+    others = [threading.Thread(target=run, args=(number,)) for number in range(1, len(members))]
+    started: list[threading.Thread] = []
+    try:
+        for thread in others:
+            thread.start()
+            started.append(thread)
+        run(0)
+    except BaseException:  # a thread that cannot start: those that wait for it must end
+        members[0].state[BROKEN] = 1
+        raise
+    finally:
+        for thread in started:
+            thread.join()
+    if failures:
+        raise failures[0]
+    return results
+
+
+def _place(context, builder, kind, array, index):
+    return builder.gep(make_array(kind)(context, builder, array).data, [index])
+
+
+@intrinsic
+def _fetch_add(typing_context, array, index, value):
+    """array[index] += value in one piece; returns what was there before."""
+
+    def codegen(context, builder, signature, arguments):
+        place = _place(context, builder, array, *arguments[:2])
+        return builder.atomic_rmw("add", place, arguments[2], "acq_rel")
+
+    return types.int64(array, types.int64, types.int64), codegen
+
+
+@intrinsic
+def _look(typing_context, array, index):
+    """array[index] as other threads have left it; what they wrote before is then seen too."""
+
+    def codegen(context, builder, signature, arguments):
+        return builder.load_atomic(_place(context, builder, array, *arguments), "acquire", 8)
+
+    return types.int64(array, types.int64), codegen
+
+
+@intrinsic
+def _call(typing_context, address):
+    """Call the function int32() at `address`."""
+
+    def codegen(context, builder, signature, arguments):
+        kind = ir.FunctionType(ir.IntType(32), [])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [])
+
+    return types.int32(types.int64), codegen
+
+
+# called with one argument less than written: Numba adds the typing context
+fetch_add: Any = _fetch_add
+look: Any = _look
+call: Any = _call
+
+
+@kernel
+def _wait(team):
+    """Count the round's arrivals; the last one starts the next round."""
+    now = look(team.state, ROUND)
+    if fetch_add(team.state, ARRIVED, 1) == team.size - 1:
+        fetch_add(team.state, ARRIVED, -team.size)
+        fetch_add(team.state, ROUND, 1)
+        return
+    spins = 0
+    while look(team.state, ROUND) == now and look(team.state, BROKEN) == 0:
+        spins += 1
+        if spins > SPINS:
+            call(team.pause)
+
+
+@scalar
+def wait(team):
+    """Wait until all members have come here; then what they wrote before can be read."""
+    if team.size > 1:
+        _wait(team)
+
+
+@scalar
+def part(team, count):
+    """First and last + 1 of this member's share of `count` things."""
+    return count * team.number // team.size, count * (team.number + 1) // team.size
