@@ -6,11 +6,13 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
+import foldyn as fd
 from foldyn.cases import Table, read_case
-from foldyn.cases.schema import CaseSchema
+from foldyn.cases.analyses import KINDS
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -37,7 +39,7 @@ def test_the_case_file_page_shows_a_case_file(tmp_path):
 
 
 def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
-    page, moving, actuated = blocks("case-file.md", "toml")
+    page, moving, actuated, _ = blocks("case-file.md", "toml")
     rest = re.sub(r"^\[\[(supports|loads)\]\]\n(.+\n)*", "", page, flags=re.M)
     (tmp_path / "case.toml").write_text(rest + moving + actuated, "utf-8")
     case = read_case(tmp_path / "case.toml").case()
@@ -45,6 +47,38 @@ def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
     assert case.imposed.sum() == 2
     assert len(case.base_terms) == 1
     assert len(case.actuated_creases) == len(case.structure.folds)
+
+
+def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
+    page, *_, slow = blocks("case-file.md", "toml")
+    rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)
+    rest = rest[: rest.index("[[loads]]")]
+    (tmp_path / "case.toml").write_text(rest + slow, "utf-8")
+    case_file = read_case(tmp_path / "case.toml")
+    path = fd.trace(case_file.case(), **case_file.analysis.arguments)
+    moved = path.displacement.sel(node=7, axis="x").values
+    assert moved[-1] >= 0.02 > moved[-2]  # until
+    assert case_file.output.shapes == (0, -1)
+
+
+def test_compress_release_vibrate_of_the_quasi_static_page():
+    (block,) = blocks("quasi-static.md", "python")
+    names: dict = {}
+    exec(compile(block, "quasi-static.md", "exec"), names)
+    path, motion = names["path"], names["motion"]
+    np.testing.assert_array_equal(motion.displacement[0], path.displacement[5])
+    top = motion.displacement.sel(node=3, axis="x").values
+    assert top[0] == pytest.approx(0.010)
+    assert top.min() < -0.002  # it springs back beyond its height
+
+
+def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
+    script = runpy.run_path(str(DOCS.parent / "examples" / "quasi_static.py"))
+    page = (DOCS / "quasi-static.md").read_text("utf-8")
+    _, results = script["compute"]()
+    for table in script["tables"](results).split("\n\n"):
+        assert table in page
+    assert f"{script['frequency'](results['motion']):.1f} Hz" in page
 
 
 def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
@@ -61,11 +95,12 @@ def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
 def sections() -> list[tuple[str, str]]:
     """(section, key) of the case file."""
     found = []
-    for name, field in CaseSchema.model_fields.items():
-        kinds = [field.annotation, *getattr(field.annotation, "__args__", ())]
-        models = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)]
-        found += [(name, key) for model in models for key in model.model_fields]
-    return found
+    for schema in KINDS.values():
+        for name, field in schema.model_fields.items():
+            types = [field.annotation, *getattr(field.annotation, "__args__", ())]
+            models = [one for one in types if isinstance(one, type) and issubclass(one, BaseModel)]
+            found += [(name, key) for model in models for key in model.model_fields]
+    return sorted(set(found))
 
 
 @pytest.mark.parametrize(("section", "key"), sections())
@@ -77,6 +112,7 @@ def test_every_key_of_a_case_file_is_described(section, key):
 
 def test_sections_are_found():
     assert {section for section, _ in sections()} >= {"sheet", "model", "loads", "analysis"}
+    assert {("analysis", "duration"), ("analysis", "load_factors")} <= set(sections())
 
 
 def test_inertia_table_is_what_the_code_gives():

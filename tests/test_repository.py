@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
-from foldyn.cases import schema
+from foldyn.cases import analyses
+from foldyn.cases.casefile import SETTINGS
 from foldyn.kernel_cache import remove_stale_caches
 from foldyn.plots.writers import WRITERS
 
@@ -102,11 +103,21 @@ def test_every_registry_row_has_a_docs_row(page, registry):
 
 
 def test_case_files_may_name_every_integrator():
-    assert set(schema.METHODS) == set(fd.dynamics.METHODS)
+    assert set(analyses.METHODS) == set(fd.dynamics.METHODS)
 
 
 def test_case_files_may_name_every_kind_of_animation():
-    assert [f".{kind}" for kind in schema.ANIMATIONS] == list(WRITERS)
+    assert [f".{kind}" for kind in analyses.ANIMATIONS] == list(WRITERS)
+
+
+def test_case_files_may_name_every_method_of_following_a_path():
+    assert tuple(fd.statics.METHODS) == analyses.PATH_METHODS
+
+
+def test_settings_of_a_path_in_case_files_are_those_of_the_solver():
+    section = analyses.StaticsSection(kind="statics")
+    settings = {name: getattr(section, name) for name in SETTINGS}
+    assert fd.statics.Settings(**settings) == fd.statics.Settings()
 
 
 def test_every_top_level_name_is_in_the_api_page():

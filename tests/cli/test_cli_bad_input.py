@@ -134,9 +134,9 @@ BAD = {
         "output.every: 2.69e+09 samples of 13 nodes need 1.86e+03 GiB",
         "raise it",
     ),
-    "statics": (
-        [('kind = "dynamics"', 'kind = "statics"')],
-        'analysis.kind = "statics": not available in this version; available: dynamics',
+    "modes": (
+        [('kind = "dynamics"', 'kind = "modes"')],
+        'analysis.kind = "modes": not available in this version; available: dynamics, statics',
     ),
     "axes": (
         [('axes = "xyz"', 'axes = "xq"')],
@@ -265,7 +265,7 @@ def test_files_that_are_not_there(workplace) -> None:
         bad = workplace.call("run", name)
         assert (bad.status, bad.out, bad.new) == (2, "", [])
         (line,) = bad.err.splitlines()
-        assert "there is no such file; shipped cases are gallery/deployment, gallery/" in line
+        assert "there is no such file; shipped cases are gallery/deployment, " in line
     folder = workplace.call("run", ".")
     assert (folder.status, folder.new) == (2, [])
     assert folder.err == "foldyn: .: is a folder; give a case file (TOML)\n"

@@ -51,7 +51,7 @@ def test_a_film_instead_of_a_gif(workplace, edited) -> None:
 
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     """A sheet without loads shows some of its vertices, not hundreds of rows."""
-    from foldyn.report import motion
+    from foldyn.report import album, motion
 
     shown = []
     monkeypatch.setattr(motion.plots, "animate", lambda *_, **__: Path("r/structure.png"))
@@ -69,7 +69,7 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     )
     done = workplace.call("run", "case.toml", "--out", "r")
     assert (done.status, done.err) == (0, "")
-    assert len(shown) == motion.MOST_NODES
+    assert len(shown) == album.MOST_NODES
     page = Path("r/report.html").read_text(encoding="utf-8")
-    assert f"the first {motion.MOST_NODES} of 156" in page
+    assert f"the first {album.MOST_NODES} of 156" in page
     assert not Path("r/load.png").exists()

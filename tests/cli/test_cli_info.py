@@ -27,7 +27,10 @@ def test_info(workplace) -> None:
     assert any(line.startswith("kernels of rk4: ") for line in lines)
     (parts,) = [line for line in lines if line.startswith("optional parts: ")]
     assert parts.startswith("optional parts: ffmpeg for MP4 animations, ")
-    for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES):
+    (solver,) = [line for line in lines if line.startswith("optional solver")]
+    found = fd.statics.SOLVERS["pardiso"].present
+    assert solver.endswith("pardiso, found" if found else "missing: pip install pypardiso")
+    for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES, *fd.statics.METHODS):
         assert name in told.out
     for name in shipped_cases():
         assert f"  {name}" in lines

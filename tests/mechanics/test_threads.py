@@ -38,6 +38,12 @@ LAWS = {
 
 
 @shared
+def evaluate(model, u, force, work):
+    """The force as threads compute it: called from a function that has let go of Python's lock."""
+    mechanics.internal_force(model, u, force, work)
+
+
+@shared
 def again_and_again(model, u, force, work, times):
     """Evaluations that would read what is being written, did the threads not wait."""
     model, work = borrowed(model), borrowed(work)
@@ -68,11 +74,8 @@ def alone(model, u):
 
 def together(model, u, works):
     out = np.full_like(u, np.nan)
-    run_together(
-        mechanics.internal_force,
-        [work.team for work in works],
-        [(model, u, out, work) for work in works],
-    )
+    arguments = [(model, u, out, work) for work in works]
+    run_together(evaluate, [work.team for work in works], arguments)
     return out
 
 

@@ -16,16 +16,18 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from foldyn.cases.actuation import Actuate
+from foldyn.cases.analyses import KINDS, StaticsSection, schema_of
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import call_from
 from foldyn.cases.initial import Initial, rigid_motion
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
-from foldyn.cases.schema import CaseSchema, InitialSection, LoadSection, SupportSection
+from foldyn.cases.schema import LoadSection, SupportSection
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.state import State
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
+from foldyn.cases.until import Reached
 from foldyn.cases.values import choice, show
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import read_pattern
@@ -34,6 +36,8 @@ from foldyn.structures import MASS_RULES, ModelOptions, Sheet, discretize
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
+SETTINGS = ("tolerance", "largest_turn", "stability")
+"""Keys of a path's analysis that are settings of its solver."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +47,16 @@ class Analysis:
     Attributes
     ----------
     kind : str
-        "dynamics".
+        "dynamics" or "statics".
     arguments : dict
-        Keyword arguments of its function (`simulate`): method, duration, dt, every, force.
+        Keyword arguments of its function: `simulate` or `trace`.
+    settings : dict
+        Of a path: arguments of its `foldyn.statics.Settings`.
     """
 
     kind: str
     arguments: dict[str, Any]
+    settings: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,21 +67,25 @@ class Output:
     ----------
     nodes : ndarray of int64
         Nodes that figures and spectra show.
-    every : int or float
-        Interval between samples: steps (int) or seconds (float).
     axis : str or None
-        Component that figures show, "x", "y" or "z"; None: the one in which a node moves most.
-    max_frequency : float or None
-        Where the axes of spectra end (Hz); None: at half the sampling rate.
+        Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
+        one in which a node moves most.
     animation : str
         "gif" or "mp4".
+    every : int, float or None
+        Of a motion: interval between samples, steps (int) or seconds (float).
+    max_frequency : float or None
+        Of a motion: where the axes of spectra end (Hz); None: at half the sampling rate.
+    shapes : int, tuple of int or None
+        Of a path: how many deformed shapes are drawn, or the numbers of their points.
     """
 
     nodes: NDArray[np.int64]
-    every: int | float
     axis: str | None = None
-    max_frequency: float | None = None
     animation: str = "gif"
+    every: int | float | None = None
+    max_frequency: float | None = None
+    shapes: int | tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +105,7 @@ class CaseFile:
     analysis : Analysis
     output : Output
     start : Initial or None
-        How the motion starts if not at rest; `initial` makes a state of it.
+        How the motion or path starts if not at rest; `initial` makes a state of it.
     """
 
     path: Path
@@ -118,7 +129,7 @@ class CaseFile:
     def initial(
         self, mass: str | None = None, read: Callable[[Path, int], State] | None = None
     ) -> State | None:
-        """State that the motion starts from; None for rest.
+        """State that the motion or path starts from; None for rest.
 
         Parameters
         ----------
@@ -184,15 +195,16 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     """
     path = Path(path)
     document = _read_toml(path)
+    shape: Any = schema_of(document)
     try:
-        schema = CaseSchema.model_validate(document, context={"folder": path.parent})
+        schema = shape.model_validate(document, context={"folder": path.parent})
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error, CaseSchema)}") from None
+        raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
     with _placed(path, "pattern"):
         pattern = _pattern(schema.pattern, path.parent)
     with _placed(path, ""):
         sheet = Sheet(**schema.sheet.model_dump())
-    if sheet.density is None:
+    if sheet.density is None and schema.analysis.kind == "dynamics":
         raise InputError(f"{path}: sheet.density: missing; a motion needs it (kg/m3)")
     parts: dict[str, Any] = {
         "options": {name: getattr(schema.model, name) for name in schema.model.model_fields_set},
@@ -213,26 +225,19 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
         for rule in masses[1:]:
             cases[rule] = _build(path, pattern, sheet, rule, parts)
     case = cases[masses[0]]
-    analysis = schema.analysis.model_dump()
-    every = schema.output.every
-    every = schema.analysis.duration / SAMPLES if every is None else every
     with _placed(path, ""):
-        nodes = _output_nodes(case, schema.output.nodes)
+        analysis = _analysis(schema, case)
+        nodes = _output_nodes(case, schema.output.nodes, analysis.kind)
+    output = {name: value for name, value in schema.output if name not in ("nodes", "every")}
     case_file = CaseFile(
         path=path,
         title=schema.title,
         pattern=pattern,
         sheet=sheet,
         masses=masses,
-        analysis=Analysis(analysis.pop("kind"), {**analysis, "every": every}),
-        output=Output(
-            nodes,
-            every,
-            schema.output.axis,
-            schema.output.max_frequency,
-            schema.output.animation,
-        ),
-        start=_start(schema.initial),
+        analysis=analysis,
+        output=Output(nodes, every=analysis.arguments.get("every"), **output),
+        start=None if schema.initial is None else Initial(**schema.initial.model_dump()),
         _parts=parts,
         _cases=cases,
     )
@@ -288,24 +293,40 @@ def _load(item: LoadSection) -> Force | Gravity | Actuate:
     return Force(item.nodes, item.force, item.history)
 
 
-def _start(item: InitialSection | None) -> Initial | None:
-    return None if item is None else Initial(item.velocity, item.spin, item.file, item.at)
+def _analysis(schema: Any, case: Case) -> Analysis:
+    section = schema.analysis
+    arguments = {name: value for name, value in section if name != "kind"}
+    if not isinstance(section, StaticsSection):
+        every = schema.output.every
+        every = section.duration / SAMPLES if every is None else every
+        return Analysis(section.kind, {**arguments, "every": every})
+    if section.until is not None:
+        resolve_nodes(case.structure, (section.until.node,), "analysis.until.node")
+        arguments["until"] = Reached(**section.until.model_dump())
+    settings = {name: arguments.pop(name) for name in SETTINGS}
+    return Analysis(section.kind, arguments, settings)
 
 
 def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
     with _placed(path, "model: "):
         structure = discretize(pattern, sheet, mass=mass, **parts["options"])
-        _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
+        if sheet.density is not None:
+            _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
     with _placed(path, ""):
         return Case(structure, parts["supports"], parts["loads"], parts["damping"])
 
 
-def _output_nodes(case: Case, chosen: Any) -> NDArray[np.int64]:
-    """Nodes to show: those chosen, else those with a force, else every vertex that can move."""
+def _output_nodes(case: Case, chosen: Any, kind: str) -> NDArray[np.int64]:
+    """Nodes to show: those chosen, else those with a force, else every vertex that can move.
+
+    Of a path without forces, those that supports move come before every vertex.
+    """
     if chosen is not None:
         return resolve_nodes(case.structure, chosen, "output.nodes")
     if case.loaded_nodes.size:
         return case.loaded_nodes
+    if kind == "statics" and case.imposed.any():
+        return np.flatnonzero(case.imposed.any(axis=1))
     vertices = len(case.structure.pattern.vertices)
     return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
 

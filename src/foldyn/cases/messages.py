@@ -24,8 +24,13 @@ _TEXTS = {
 }
 
 
-def describe(error: ValidationError, schema: type[BaseModel]) -> str:
-    """Text for all that a validation found: one line, and one more for each further error."""
+def describe(
+    error: ValidationError, schema: type[BaseModel], kinds: Mapping[str, type[BaseModel]]
+) -> str:
+    """Text for all that a validation found: one line, and one more for each further error.
+
+    `kinds` are the schemas of all kinds of analysis: a key of another kind is told as such.
+    """
     items = error.errors(include_url=False, include_context=True)
     unknown = [item for item in items if item["type"] == "extra_forbidden"]
     # a misspelled key is also missing under its right name: say it once, and first
@@ -36,7 +41,7 @@ def describe(error: ValidationError, schema: type[BaseModel]) -> str:
         if item["type"] != "extra_forbidden"
         and not (item["type"] == "missing" and item["loc"] in meant)
     ]
-    lines = [_line(item, schema) for item in [*unknown, *rest]]
+    lines = [_line(item, schema, kinds) for item in [*unknown, *rest]]
     return "\n  also ".join(dict.fromkeys(lines))
 
 
@@ -48,14 +53,19 @@ def dotted(location: Sequence[str | int]) -> str:
     return text
 
 
-def _line(item: Mapping[str, Any], schema: type[BaseModel]) -> str:
+def _line(
+    item: Mapping[str, Any], schema: type[BaseModel], kinds: Mapping[str, type[BaseModel]]
+) -> str:
     location, kind, value = item["loc"], item["type"], item["input"]
     place, context = dotted(location), item.get("ctx", {})
     if kind == "value_error":  # an InputError of ours: its text continues the path
         return f"{place}{context['error']}"
     if kind == "extra_forbidden":
-        known = _section(schema, location[:-1]).model_fields
-        return f"{place}: {unknown_key(str(location[-1]), known)}"
+        at, key = location[:-1], str(location[-1])
+        owners = [name for name, other in kinds.items() if key in _keys(other, at)]
+        if owners:
+            return f'{place}: only for analysis.kind = "{owners[0]}"; leave it out'
+        return f"{place}: {unknown_key(key, _keys(schema, at))}"
     if kind == "missing":
         return f"{place}: {_TEXTS[kind]}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
@@ -69,13 +79,16 @@ def _line(item: Mapping[str, Any], schema: type[BaseModel]) -> str:
 
 
 def _meant(location: Sequence[str | int], schema: type[BaseModel]) -> str | None:
-    return nearest(str(location[-1]), _section(schema, location[:-1]).model_fields)
+    return nearest(str(location[-1]), _keys(schema, location[:-1]))
 
 
-def _section(schema: type[BaseModel], location: Sequence[str | int]) -> type[BaseModel]:
+def _keys(schema: Any, location: Sequence[str | int]) -> list[str]:
+    """Keys of the section at a location; none where a schema has no such section."""
     for part in location:
         if isinstance(part, int):
             continue
+        if part not in schema.model_fields:
+            return []
         annotation: Any = schema.model_fields[part].annotation
         schema = next(iter(get_args(annotation)), annotation)
-    return schema
+    return list(getattr(schema, "model_fields", ()))

@@ -1,8 +1,9 @@
-"""The case file's contract: its sections, keys and types.
+"""The case file's contract: the sections that all kinds of analysis share, their keys and types.
 
-Limits of values live here only where a message should name the key; everything else is checked
-by the objects that are built from the sections. Validators raise InputError with a text that
-continues the key's path (" = -1: must be ...", ".kind: missing ...").
+What differs from kind to kind is in `cases.analyses`. Limits of values live here only where a
+message should name the key; everything else is checked by the objects that are built from the
+sections. Validators raise InputError with a text that continues the key's path (" = -1: must be
+...", ".kind: missing ...").
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     PlainValidator,
@@ -31,14 +31,6 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.structures import MASS_RULES
 from foldyn.structures.options import CALIBRATIONS, SCHEMES
-
-ANALYSES = ("dynamics",)
-LATER_ANALYSES = ("statics", "modes", "frf")
-AXES = ("x", "y", "z")
-METHODS = ("rk4", "central_difference", "dormand_prince")
-"""Integrators that a case file may name."""
-ANIMATIONS = ("gif", "mp4")
-"""Kinds of animation that a case file may name."""
 
 
 class Section(BaseModel):
@@ -111,34 +103,8 @@ def _creases(value: Any) -> Any:
     return array
 
 
-def _every(value: Any) -> int | float:
-    if isinstance(value, int) and not isinstance(value, bool):
-        if value < 1:
-            raise InputError(f" = {value}: must be at least 1 (steps)")
-        return value
-    return number("", value, above=0.0)
-
-
-def _result_file(value: Any) -> str:
-    if not isinstance(value, str) or not value:
-        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc")
-    return value
-
-
 def _history(value: Any, info: ValidationInfo) -> History:
     return history_from(value, (info.context or {}).get("folder"))
-
-
-def _analysis(value: Any) -> Any:
-    if isinstance(value, Mapping) and "kind" in value:
-        kind = value["kind"]
-        if kind in LATER_ANALYSES:
-            raise InputError(
-                f".kind = {show(kind)}: not available in this version; available: "
-                f"{', '.join(ANALYSES)}"
-            )
-        choice(".kind", kind, ANALYSES)
-    return value
 
 
 Positive = Annotated[float, Field(gt=0)]
@@ -274,53 +240,8 @@ class LoadSection(Section):
         return self
 
 
-class InitialSection(Section):
-    """[initial]: the rigid motion or the stored state that a motion starts from."""
-
-    velocity: Vector = None
-    spin: Vector = None
-    file: Annotated[Any, PlainValidator(_result_file)] = None
-    at: int = -1
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = self.model_fields_set
-        rigid = sorted(given & {"velocity", "spin"})
-        if not given:
-            raise InputError(": give velocity or spin or both, or file (a result)")
-        if "file" in given and rigid:
-            raise InputError(
-                f".file: holds the velocities too; leave out {' and '.join(reversed(rigid))}"
-            )
-        if "at" in given and "file" not in given:
-            raise InputError(".at: is the number of a sample of a result; give file too")
-        return self
-
-
-class DynamicsSection(Section):
-    """[analysis] of kind "dynamics": arguments of `simulate`."""
-
-    kind: str
-    duration: Positive
-    method: Annotated[str, PlainValidator(lambda value: choice("", value, METHODS))] = "rk4"
-    dt: Positive | None = None
-    force: bool = False
-    tolerance: Positive | None = None
-    start: float = 0.0
-
-
-class OutputSection(Section):
-    """[output]: what is kept and shown."""
-
-    nodes: Nodes = None
-    axis: Annotated[Any, PlainValidator(lambda value: choice("", value, AXES))] = None
-    every: Annotated[Any, PlainValidator(_every)] = None
-    max_frequency: Positive | None = None
-    animation: Annotated[str, PlainValidator(lambda value: choice("", value, ANIMATIONS))] = "gif"
-
-
 class CaseSchema(Section):
-    """The whole case file."""
+    """The sections that every case file may have."""
 
     title: str = ""
     pattern: Annotated[dict[str, Any], PlainValidator(_pattern)]
@@ -329,6 +250,3 @@ class CaseSchema(Section):
     damping: DampingSection = DampingSection()
     supports: list[SupportSection] = []
     loads: list[LoadSection] = []
-    initial: InitialSection | None = None
-    analysis: Annotated[DynamicsSection, BeforeValidator(_analysis)]
-    output: OutputSection = OutputSection()

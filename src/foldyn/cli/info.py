@@ -18,6 +18,7 @@ def info() -> str:
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
     from foldyn.patterns import GENERATORS
+    from foldyn.statics import METHODS as PATH_METHODS
     from foldyn.structures import MASS_RULES
 
     lines = [
@@ -30,6 +31,8 @@ def info() -> str:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
     lines += [
         f"optional parts: ffmpeg for MP4 animations, {_ffmpeg()}",
+        *(f"optional solver for large structures: {text}" for text in _solvers()),
+        f"methods of paths: {', '.join(PATH_METHODS)}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
         f"mass rules: {', '.join(MASS_RULES)}",
         "shipped cases:",
@@ -45,6 +48,16 @@ def _ffmpeg() -> str:
         return f"found: {find_ffmpeg()}"
     except InputError:
         return "missing: pip install imageio-ffmpeg"
+
+
+def _solvers() -> list[str]:
+    from foldyn.statics import SOLVERS
+
+    others = [(name, item) for name, item in SOLVERS.items() if item.worthwhile > 0]
+    return [
+        f"{name}, {'found' if item.present else 'missing: pip install ' + item.module}"
+        for name, item in others
+    ]
 
 
 def _version(name: str) -> str:

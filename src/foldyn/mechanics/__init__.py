@@ -1,13 +1,7 @@
 """Compiled mechanics of bars and hinges: energy, internal force, tangent."""
 
 from foldyn.mechanics.energy import angles, strain_energies
-from foldyn.mechanics.force import (
-    Workspace,
-    internal_force,
-    strip_force,
-    workspace,
-    workspaces,
-)
+from foldyn.mechanics.force import Workspace, internal_force, workspace, workspaces
 from foldyn.mechanics.model import BarsHinges, Hinges, build
 from foldyn.mechanics.renumber import node_order, renumber
 from foldyn.mechanics.tangent import Sparsity, sparsity, tangent
@@ -28,7 +22,6 @@ __all__ = [
     "shared",
     "sparsity",
     "strain_energies",
-    "strip_force",
     "tangent",
     "threads_for",
     "wait",

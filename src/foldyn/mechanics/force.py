@@ -26,7 +26,7 @@ from foldyn.mechanics.model import BLOCK, BarsHinges
 from foldyn.mechanics.prefetch import prefetch_range
 from foldyn.mechanics.rows import LANES, add_rows, load_rows
 from foldyn.mechanics.strips import Strips, strips
-from foldyn.mechanics.threads import Team, shared, team, wait
+from foldyn.mechanics.threads import Team, team, wait
 
 LINE = 8  # numbers in a cache line
 SHIFT = 5 * LINE  # between scratch arrays: a multiple of 4096 bytes would make them collide
@@ -273,7 +273,7 @@ def add_hinge_forces(model, low, high, work, keep):
                 scatter(sums, mask, hinges, 4, v, first, m, g, 3 * v * BLOCK, value, 0)
 
 
-@kernel
+@scalar
 def place(at_rest, u, work, start, end):
     """Put the nodes start to end, flat rows of three, into the buffers of rows of four."""
     mask, last = np.uint32(work.strips.mask), at_rest.size // 3 - 1
@@ -296,7 +296,7 @@ def place(at_rest, u, work, start, end):
             position[row + c] = at_rest[3 * last + c] + u[3 * last + c]
 
 
-@kernel
+@scalar
 def finish(force, work, start, end):
     """Take the sums of the nodes start to end from the buffer to flat rows of three."""
     mask, sums = np.uint32(work.strips.mask), flat(work.sums)
@@ -311,7 +311,7 @@ def finish(force, work, start, end):
             force[3 * i + c] = sums[4 * (i & work.strips.mask) + c]
 
 
-@kernel
+@scalar
 def finish_edge(force, work, start, end):
     """Add the sums of the nodes start to end to those of an edge strip."""
     mask, sums = work.strips.mask, flat(work.sums)
@@ -336,7 +336,7 @@ def strip_force(model, s, u, force, work, keep):
         finish(flat(force), work, plan.finished[s, 0], plan.finished[s, 1])
 
 
-@shared
+@scalar
 def internal_force(model, u, force, work, keep=True):
     """Internal force (n, 3), N, at displacement u (n, 3), m.
 

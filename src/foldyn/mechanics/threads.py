@@ -27,9 +27,9 @@ from foldyn.materials.compiled import kernel, scalar
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
 
-HINGES_EACH = 10_000  # hinges for each thread from which it pays
+HINGES_EACH = 4000  # hinges for each thread: with half of that it pays on an idle machine only
 MOST = 8  # threads: more have not been measured
-SPINS = 2000  # looks at the others before the processor is offered to other programs
+SPINS = 100  # looks at the others before the processor is offered to other programs
 ARRIVED, ROUND, BROKEN = 0, 8, 16  # places in `Team.state`, each in a cache line of its own
 
 # as `compiled.kernel`, and without Python's lock: for functions that threads run together
@@ -62,7 +62,7 @@ def _pause() -> int:
 
 
 def threads_for(model: BarsHinges) -> int:
-    """Number of threads on which a motion of the model runs fastest: one below 20 000 hinges.
+    """Number of threads on which a motion of the model runs fastest: one below 8000 hinges.
 
     Never more than NUMBA_NUM_THREADS (by default the processors that this process may use) or
     OMP_NUM_THREADS, or than its elements' reach permits.

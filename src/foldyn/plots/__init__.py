@@ -1,4 +1,4 @@
-"""Figures of structures, laws, loads and motions.
+"""Figures of structures, laws, loads, motions and equilibrium paths.
 
 Every function returns a `matplotlib.figure.Figure`, ready for ``figure.savefig(path)``; `animate`
 writes a GIF or an MP4. Matplotlib is imported on first use, and its global state is never touched.
@@ -15,24 +15,39 @@ if TYPE_CHECKING:
     from foldyn.plots.history import plot_history
     from foldyn.plots.laws import plot_laws
     from foldyn.plots.loads import plot_load_history
+    from foldyn.plots.path import plot_load_displacement, plot_reaction, total_reaction
+    from foldyn.plots.path_energies import energy_shares, plot_path_energies
+    from foldyn.plots.shapes import draw_shapes
     from foldyn.plots.structure import draw_structure
 
 __all__ = [
     "animate",
+    "draw_shapes",
     "draw_structure",
+    "energy_shares",
     "plot_energies",
     "plot_history",
     "plot_laws",
+    "plot_load_displacement",
     "plot_load_history",
+    "plot_path_energies",
+    "plot_reaction",
+    "total_reaction",
 ]
 
 _HOMES = {
     "animate": "animation",
+    "draw_shapes": "shapes",
     "draw_structure": "structure",
+    "energy_shares": "path_energies",
     "plot_energies": "energies",
     "plot_history": "history",
     "plot_laws": "laws",
+    "plot_load_displacement": "path",
     "plot_load_history": "loads",
+    "plot_path_energies": "path_energies",
+    "plot_reaction": "path",
+    "total_reaction": "path",
 }
 
 

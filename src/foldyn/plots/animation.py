@@ -1,4 +1,4 @@
-"""Animation of a motion, as a GIF or an MP4."""
+"""Animation of a motion or a path, as a GIF or an MP4."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
+from foldyn.plots.along import check_path, runs, way
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 from foldyn.plots.writers import WRITERS, find_ffmpeg
@@ -31,7 +32,7 @@ _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0
 
 def animate(
     case_or_structure: Case | Structure,
-    trajectory: xr.Dataset,
+    result: xr.Dataset,
     path: str | PathLike[str],
     frames: int = 120,
     fps: int = 25,
@@ -42,21 +43,23 @@ def animate(
     """Write a GIF or an MP4 of the moving sheet, the sheet at rest behind it in gray.
 
     The frame stands still and holds the whole motion, at equal scale along all axes; where a free
-    body travels, a line shows the path of its center of mass. Every picture tells the simulated
-    time and how much slower or faster than in reality it passes.
+    body travels, a line shows the path of its center of mass. Every picture of a motion tells the
+    simulated time and how much slower or faster than in reality it passes, every picture of an
+    equilibrium path its load factor and whether it is unstable there.
 
     Parameters
     ----------
     case_or_structure : Case or Structure
         What moves.
-    trajectory : xarray.Dataset
-        Its motion: ``displacement`` (time, node, axis) in m over ``time`` (s).
+    result : xarray.Dataset
+        Its motion, ``displacement`` (time, node, axis) in m over ``time`` (s), or its equilibrium
+        path, ``displacement`` (step, node, axis) with its ``load_factor``.
     path : path-like
         File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
         package imageio-ffmpeg.
     frames : int
-        Number of pictures, evenly spread over the trajectory's time (linear in between its
-        samples).
+        Number of pictures, evenly spread over the time of a motion or the way of the nodes along
+        a path (linear in between its samples).
     fps : int
         Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
     scale : float
@@ -74,7 +77,7 @@ def animate(
     Raises
     ------
     InputError
-        A trajectory of another structure or with NaN, fewer than two frames, a rate out of range,
+        A result of another structure or with NaN, fewer than two frames, a rate out of range,
         a path that is no GIF or MP4 in an existing directory, or an MP4 without ffmpeg.
     ComputationError
         ffmpeg could not write the file.
@@ -82,7 +85,7 @@ def animate(
     path = Path(path)
     kind = _checked_kind(path, frames, fps)
     sheet = Sheet3D.of(case_or_structure)
-    times, displacement = frame_displacements(sheet, trajectory, frames)
+    places, displacement = frame_displacements(sheet, result, frames)
     moving = sheet.nodes + scale * displacement
 
     sight = View(*view)
@@ -110,17 +113,14 @@ def animate(
     )
     style.finish(figure)
     writer = WRITERS[kind](fps=fps)
-    between = float(times[1] - times[0])
-    # As many digits as tell two frames apart: equal pictures would be stored as one.
-    digits = max(0, int(np.ceil(-np.log10(between))))
-    note = pace(writer.rate * between)
-    note += f", displacement times {scale:g}" if scale != 1.0 else ""
+    moments = _times(places, writer.rate) if "time" in result.sizes else _factors(places, result)
+    note = f", displacement times {scale:g}" if scale != 1.0 else ""
     with writer.saving(figure, str(path), dpi=_DPI[kind]):
-        for index, (time, points) in enumerate(zip(times, moving, strict=True)):
+        for index, (moment, points) in enumerate(zip(moments, moving, strict=True)):
             drawn.move(points)
-            for dot, way in dots:
-                dot.set_data_3d(*way[index, :, None])
-            clock.set_text(f"t = {time:.{digits}f} s, {note}")
+            for dot, course in dots:
+                dot.set_data_3d(*course[index, :, None])
+            clock.set_text(moment + note)
             writer.grab_frame()
     return path
 
@@ -139,6 +139,31 @@ def _checked_kind(path: Path, frames: int, fps: int) -> str:
     if kind == ".mp4":
         find_ffmpeg()
     return kind
+
+
+def _times(times: NDArray[np.float64], rate: float) -> list[str]:
+    """Return what pictures of a motion tell: the time, and how fast it passes."""
+    digits, shown = _digits(times), pace(rate * float(times[1] - times[0]))
+    return [f"t = {time:.{digits}f} s, {shown}" for time in times]
+
+
+def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
+    """Return what pictures of a path tell: the load factor, and whether it is unstable there."""
+    length = way(path)
+    factors = np.interp(places, length, path["load_factor"].values)
+    unstable = [(length[run.start], length[run.stop]) for run in runs(path) if not run.stable]
+    digits = _digits(factors)
+    return [
+        f"load factor {factor:.{digits}f}"
+        + (", unstable" if any(a < place < b for a, b in unstable) else "")
+        for factor, place in zip(factors, places, strict=True)
+    ]
+
+
+def _digits(values: NDArray[np.float64]) -> int:
+    """As many digits as tell two pictures apart: equal pictures would be stored as one."""
+    step = float(np.ptp(values)) / (len(values) - 1)
+    return max(0, int(np.ceil(-np.log10(step)))) if step > 0.0 else 3
 
 
 def pace(seconds: float) -> str:
@@ -166,22 +191,32 @@ def _draw_path(axes: Axes3D, path: NDArray[np.float64]) -> Any:
 
 
 def frame_displacements(
-    sheet: Sheet3D, trajectory: xr.Dataset, frames: int
+    sheet: Sheet3D, result: xr.Dataset, frames: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return evenly spaced times and the displacements (frames, n, 3) at them."""
-    motion = trajectory["displacement"].transpose("time", "node", "axis").values
-    stored = np.asarray(trajectory["time"].values, dtype=np.float64)
+    """Return evenly spaced times, or places on the way of a path, and displacements (frames, n, 3).
+
+    The way of a path is that of `plots.along`, so that shapes change evenly from picture to
+    picture, whatever the length of its steps.
+    """
+    if "step" in result.sizes:
+        check_path(result, "result")
+    elif "time" not in result.sizes:
+        raise InputError("result: has neither times nor steps; give a motion or a path")
+    dimension = "time" if "time" in result.sizes else "step"
+    motion = result["displacement"].transpose(dimension, "node", "axis").values
     if motion.shape[1:] != sheet.nodes.shape:
         raise InputError(
-            f"trajectory: it has {motion.shape[1]} nodes, the structure {len(sheet.nodes)}; give "
-            "the case that was simulated"
+            f"result: it has {motion.shape[1]} nodes, the structure {len(sheet.nodes)}; give "
+            "the case that was computed"
         )
-    if len(stored) < 2:
-        raise InputError("trajectory: a single sample does not move; store more of them")
+    if len(motion) < 2:
+        raise InputError("result: a single sample does not move; store more of them")
     if not np.isfinite(motion).all():
-        raise InputError("trajectory: its displacement contains NaN or infinity; cut it before")
-    times = np.linspace(stored[0], stored[-1], frames)
-    after = np.clip(np.searchsorted(stored, times), 1, len(stored) - 1)
-    part = (times - stored[after - 1]) / (stored[after] - stored[after - 1])
+        raise InputError("result: its displacement contains NaN or infinity; cut it before")
+    stored = result["time"].values.astype(np.float64) if dimension == "time" else way(result)
+    places = np.linspace(stored[0], stored[-1], frames)
+    after = np.clip(np.searchsorted(stored, places), 1, len(stored) - 1)
+    gap = stored[after] - stored[after - 1]
+    part = (places - stored[after - 1]) / np.where(gap > 0.0, gap, 1.0)
     part = part[:, None, None]
-    return times, (1.0 - part) * motion[after - 1] + part * motion[after]
+    return places, (1.0 - part) * motion[after - 1] + part * motion[after]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -25,6 +25,7 @@ WIDTH = 7.0
 _LEFT, _RIGHT, _TICKS, _TALLEST = 0.8, 0.8, 0.5, 5.0
 _LABEL_PADS = 6.0, 6.0, 4.0  # points; that of z would leave the margin with more
 _CLOSE = 0.4  # inches between two ticks whose numbers would touch
+_MOST_PIECES, _MOST_DIVISIONS = 2000, 12  # of all panels in a picture, and of a triangle's edge
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 
 
@@ -132,6 +133,26 @@ class View:
         return points @ self.basis[:2].T
 
 
+class Seen(NamedTuple):
+    """The box around all that a view shows, and its size on the screen."""
+
+    view: View
+    middle: NDArray[np.float64]
+    box: NDArray[np.float64]
+    corners: NDArray[np.float64]
+    size: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, points: NDArray[np.float64], view: View) -> Seen:
+        """Take the box of all points (p, 3)."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        # A flat sheet still gets a box of some height, or its ticks would fall on each other.
+        box = np.maximum(high - low, 0.15 * (high - low).max()) * 1.04
+        middle = 0.5 * (low + high)
+        corners = middle + 0.5 * box * np.array(list(product((-1, 1), repeat=3)))
+        return cls(view, middle, box, corners, np.ptp(view.flat(corners), axis=0))
+
+
 def view_figure(
     points: NDArray[np.float64],
     view: View,
@@ -144,24 +165,27 @@ def view_figure(
     Three-dimensional axes are square and mostly empty around a flat sheet, so the figure is cut to
     the box as it is seen: its height follows from the points, at most 5 inches and the margins.
     """
-    low, high = points.min(axis=0), points.max(axis=0)
-    # A flat sheet still gets a box of some height, or its ticks would fall on each other.
-    box = np.maximum(high - low, 0.15 * (high - low).max()) * 1.04
-    middle = 0.5 * (low + high)
-    corners = middle + 0.5 * box * np.array(list(product((-1, 1), repeat=3)))
-    seen = np.ptp(view.flat(corners), axis=0)
-    scale = min((width - _LEFT - _RIGHT) / seen[0], _TALLEST / seen[1])  # inches per meter
+    seen = Seen.of(points, view)
+    scale = min((width - _LEFT - _RIGHT) / seen.size[0], _TALLEST / seen.size[1])
     top = 0.42 if title else 0.12
     bottom = _TICKS + (0.1 + 0.19 * legend_rows if legend_rows else 0.0)
-    height = top + seen[1] * scale + bottom
+    height = top + seen.size[1] * scale + bottom
 
     figure = style.new_figure(width, height, constrained=False)
     if title:
         figure.suptitle(
             title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
         )
-    side = 1.1 * seen.max() * scale  # of the square axes, which clip what they draw
-    center = _LEFT + 0.5 * (width - _LEFT - _RIGHT), bottom + 0.5 * seen[1] * scale
+    center = _LEFT + 0.5 * (width - _LEFT - _RIGHT), bottom + 0.5 * seen.size[1] * scale
+    axes = add_view(figure, seen, center, scale)
+    _frame(axes, seen.middle, seen.box, scale * view.basis)
+    return figure, axes
+
+
+def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: float) -> Axes3D:
+    """Put axes for what is seen into a figure: the center in inches, the scale in inches per m."""
+    width, height = figure.get_size_inches()
+    side = 1.1 * seen.size.max() * scale  # of the square axes, which clip what they draw
     corner = center[0] - 0.5 * side, center[1] - 0.5 * side
     axes = Axes3D(
         figure,
@@ -170,17 +194,18 @@ def view_figure(
         computed_zorder=False,
     )
     figure.add_axes(axes)
-    axes.view_init(elev=view.elevation, azim=view.azimuth)
+    axes.view_init(elev=seen.view.elevation, azim=seen.view.azimuth)
     for axis, name in enumerate("xyz"):
-        reach = (middle[axis] - 0.5 * box[axis], middle[axis] + 0.5 * box[axis])
-        getattr(axes, f"set_{name}lim")(*reach, view_margin=0)
+        reach = 0.5 * seen.box[axis]
+        limits = seen.middle[axis] - reach, seen.middle[axis] + reach
+        getattr(axes, f"set_{name}lim")(*limits, view_margin=0)
     # copies: matplotlib scales what it is given
-    axes.set_box_aspect(box.copy(), zoom=1.0)
-    flat = np.array(proj_transform(*corners.T, axes.get_proj())[:2])
-    zoom = seen[0] * scale / (side * np.ptp(flat[0]) / _span(axes))
-    axes.set_box_aspect(box.copy(), zoom=zoom)
-    _frame(axes, middle, box, scale * view.basis)
-    return figure, axes
+    axes.set_box_aspect(seen.box.copy(), zoom=1.0)
+    flat = np.array(proj_transform(*seen.corners.T, axes.get_proj())[:2])
+    zoom = seen.size[0] * scale / (side * np.ptp(flat[0]) / _span(axes))
+    axes.set_box_aspect(seen.box.copy(), zoom=zoom)
+    axes.patch.set_visible(False)
+    return axes
 
 
 def _span(axes: Axes3D) -> float:
@@ -196,7 +221,6 @@ def _frame(
     basis: NDArray[np.float64],
 ) -> None:
     """Set ticks, grid, panes and labels; the basis is that of the view, in inches per meter."""
-    axes.patch.set_visible(False)
     ticks = _ticks(middle, box, basis)
     for axis, places in zip((axes.xaxis, axes.yaxis, axes.zaxis), ticks, strict=True):
         axis.set_major_locator(FixedLocator(places.tolist()))
@@ -246,22 +270,48 @@ def shades(
     return np.clip(bright[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
 
 
+def pieces(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Cut triangles into smaller ones (np, 3, 3), as many of each."""
+    count = _divisions(len(triangles))
+    corners = []
+    for i in range(count):
+        for j in range(count - i):
+            corners.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < count - 1:
+                corners.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    place = np.array(corners) / count  # (pieces of a triangle, 3, 2)
+    weights = np.concatenate([1.0 - place.sum(axis=2, keepdims=True), place], axis=2)
+    return np.einsum("pcw,twd->tpcd", weights, vertices[triangles]).reshape(-1, 3, 3)
+
+
+def piece_colors(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], color: str = PAPER
+) -> NDArray[np.float64]:
+    """Return the `shades` of the `pieces` of all triangles, shape (np, 3)."""
+    each = _divisions(len(triangles)) ** 2
+    return np.repeat(shades(vertices, triangles, color), each, axis=0)
+
+
+def _divisions(count: int) -> int:
+    """Pieces of a triangle's edge."""
+    return int(np.clip(np.sqrt(_MOST_PIECES / max(count, 1)), 1, _MOST_DIVISIONS))
+
+
 def add_panels(
     axes: Axes3D,
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    color: str = PAPER,
+    corners: NDArray[np.float64],
+    colors: NDArray[np.float64],
     alpha: float = 1.0,
     zorder: float = 1.0,
 ) -> Poly3DCollection:
-    """Fill the panels, triangle by triangle, so that their bending shows.
+    """Fill triangles, corners (k, 3, 3), each in its color (k, 3).
 
     An `alpha` below 1 mixes the color with white. The panels are never translucent, and not
     antialiased: neighbors that overlap or part by a pixel would leave seams inside every panel.
     """
     panels = Poly3DCollection(
-        vertices[triangles],
-        facecolors=1.0 - alpha * (1.0 - shades(vertices, triangles, color)),
+        corners,
+        facecolors=1.0 - alpha * (1.0 - colors),
         edgecolors="none",
         linewidths=0.0,
         antialiaseds=False,

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from foldyn.plots import scene, style
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.visibility import split_edges
+from foldyn.plots.visibility import hidden_points, split_edges
 
 _HIDDEN = 0.3  # opacity of what lies behind a panel
 
 
 def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
     """Draw the sheet at rest in gray."""
-    scene.add_panels(axes, sheet.nodes, sheet.triangles, "#D0D0D0", alpha=0.25, zorder=0.5)
+    colors = scene.shades(sheet.nodes, sheet.triangles, "#D0D0D0")
+    scene.add_panels(axes, sheet.nodes[sheet.triangles], colors, alpha=0.25, zorder=0.5)
     scene.add_segments(axes, sheet.nodes[sheet.edges], style.LIGHT, 0.9, zorder=0.6)
 
 
@@ -62,6 +63,10 @@ def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> 
 class DrawnSheet:
     """Panels, creases and boundary of a sheet in one position.
 
+    Panels are painted from the farthest to the nearest by their middles, which goes wrong where
+    large ones lie close to each other, as in a sheet that is almost closed. So they are cut into
+    pieces, and those whose middle is hidden are painted before all others.
+
     Parameters
     ----------
     axes : Axes3D
@@ -85,7 +90,9 @@ class DrawnSheet:
         actuated: bool = True,
     ) -> None:
         self._sheet, self._view = sheet, view
-        self._panels = scene.add_panels(axes, points, sheet.triangles)
+        hidden, visible = self._pieces(points)
+        self._behind = scene.add_panels(axes, *hidden, zorder=0.9)
+        self._panels = scene.add_panels(axes, *visible)
         self._lines: list[tuple[Any, Any, NDArray[np.int64]]] = []
         for kind in edge_kinds(sheet, elements, actuated):
             visible, hidden = self._split(kind.edges, points)
@@ -97,12 +104,25 @@ class DrawnSheet:
 
     def move(self, points: NDArray[np.float64]) -> None:
         """Put the nodes in other positions (n, 3)."""
-        self._panels.set_verts(points[self._sheet.triangles])
-        self._panels.set_facecolor(scene.shades(points, self._sheet.triangles))
+        for panels, (corners, colors) in zip(
+            (self._behind, self._panels), self._pieces(points), strict=True
+        ):
+            panels.set_verts(corners)
+            panels.set_facecolor(colors)
         for front, behind, edges in self._lines:
             visible, hidden = self._split(edges, points)
             front.set_segments(visible)
             behind.set_segments(hidden)
+
+    def _pieces(self, points: NDArray[np.float64]) -> list[tuple[NDArray, NDArray]]:
+        """Return corners and colors of the hidden pieces of panels, and of the others."""
+        triangles = self._sheet.triangles
+        corners = scene.pieces(points, triangles)
+        colors = scene.piece_colors(points, triangles)
+        hidden = hidden_points(
+            corners.mean(axis=1), points, triangles, self._view, self._sheet.size
+        )
+        return [(corners[chosen], colors[chosen]) for chosen in (hidden, ~hidden)]
 
     def _split(
         self, edges: NDArray[np.int64], points: NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from foldyn.report.page import write_report
@@ -9,13 +10,24 @@ from foldyn.report.sections import Heading, Picture, Section, Table, Text
 
 if TYPE_CHECKING:
     from foldyn.report.motion import write_motion
+    from foldyn.report.path import write_path
 
-__all__ = ["Heading", "Picture", "Section", "Table", "Text", "write_motion", "write_report"]
+__all__ = [
+    "Heading",
+    "Picture",
+    "Section",
+    "Table",
+    "Text",
+    "write_motion",
+    "write_path",
+    "write_report",
+]
+
+_HOMES = {"write_motion": "motion", "write_path": "path"}
+"""What needs the case file's schema and the plots, and is loaded when first used."""
 
 
 def __getattr__(name: str) -> Any:
-    if name == "write_motion":  # it needs the case file's schema and the plots
-        from foldyn.report.motion import write_motion
-
-        return write_motion
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

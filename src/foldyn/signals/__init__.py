@@ -2,7 +2,41 @@
 
 from __future__ import annotations
 
+from foldyn.signals.circle_fit import CircleFit, circle_fit, circle_fits
+from foldyn.signals.conversions import base_transmissibility, convert_response, transmissibility
+from foldyn.signals.exponential_window import exponential_window, without_window
+from foldyn.signals.frequency_response import FrequencyResponse, frequency_response
+from foldyn.signals.half_power import HalfPower, half_power
+from foldyn.signals.log_decrement import LogDecrement, log_decrement
+from foldyn.signals.matrix_pencil import DecayingModes, matrix_pencil
+from foldyn.signals.peaks import Peaks, find_peaks
 from foldyn.signals.sampling import is_uniform, sampling_interval
 from foldyn.signals.spectrum import spectrum
+from foldyn.signals.stepped_sine import SineFit, fit_sine, stepped_sine
 
-__all__ = ["is_uniform", "sampling_interval", "spectrum"]
+__all__ = [
+    "CircleFit",
+    "DecayingModes",
+    "FrequencyResponse",
+    "HalfPower",
+    "LogDecrement",
+    "Peaks",
+    "SineFit",
+    "base_transmissibility",
+    "circle_fit",
+    "circle_fits",
+    "convert_response",
+    "exponential_window",
+    "find_peaks",
+    "fit_sine",
+    "frequency_response",
+    "half_power",
+    "is_uniform",
+    "log_decrement",
+    "matrix_pencil",
+    "sampling_interval",
+    "spectrum",
+    "stepped_sine",
+    "transmissibility",
+    "without_window",
+]

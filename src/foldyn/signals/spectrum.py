@@ -7,9 +7,16 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.signals.records import (
+    checked_count,
+    checked_interval,
+    checked_window,
+    detrended,
+    finite,
+    real_numbers,
+)
 
 MINIMUM_SAMPLES = 4
-_DETRENDS = (None, "constant", "linear")
 
 
 def spectrum(
@@ -59,23 +66,16 @@ def spectrum(
     """
     samples = _checked_samples(x, axis)
     n = samples.shape[0]
-    interval = _checked_interval(dt)
-    if detrend not in _DETRENDS:
-        raise InputError(f'detrend: {detrend!r} is unknown; use None, "constant" or "linear"')
-    if isinstance(pad, bool) or not isinstance(pad, int | np.integer) or pad < 1:
-        raise InputError(f"pad: {pad!r}; the padding factor is a whole number from 1 up")
+    interval = checked_interval(dt)
+    length = n * checked_count("pad", pad)
 
-    if detrend is not None:
-        from scipy.signal import detrend as subtract  # slow to import, and seldom needed
-
-        samples = subtract(samples, axis=0, type=detrend)
+    samples = detrended(samples, detrend)
     gain = float(n)
     if window is not None:
-        weights = _window(window, n)
+        weights = checked_window(window, n)
         gain = float(weights.sum())
         samples = samples * weights.reshape((n,) + (1,) * (samples.ndim - 1))
 
-    length = n * int(pad)
     amplitude = np.abs(scipy.fft.rfft(samples, n=length, axis=0)) / gain
     doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)
     amplitude[doubled] *= 2.0
@@ -84,59 +84,13 @@ def spectrum(
 
 def _checked_samples(x: ArrayLike, axis: int) -> NDArray[np.float64]:
     """Return the samples as float64 with time along axis 0."""
-    try:
-        samples = np.asarray(x)
-        if np.iscomplexobj(samples):
-            raise InputError("x: complex samples; a one-sided spectrum needs a real record")
-        samples = samples.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"x: not an array of numbers ({error})") from error
+    samples = real_numbers("x", x)
     if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
         raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
-    samples = np.moveaxis(samples, axis, 0)
+    samples = finite("x", np.moveaxis(samples, axis, 0))
     if samples.shape[0] < MINIMUM_SAMPLES:
         raise InputError(
             f"x: {samples.shape[0]} samples along axis {axis}; a spectrum needs at least "
             f"{MINIMUM_SAMPLES}: run longer or store more often"
         )
-    bad = ~np.isfinite(samples)
-    if bad.any():
-        first = int(np.argwhere(bad)[0][0])
-        raise InputError(
-            f"x: {int(bad.sum())} samples are NaN or infinite, the first at index {first} in "
-            "time; cut the record or fill the gap first"
-        )
     return samples
-
-
-def _checked_interval(dt: float) -> float:
-    """Return the sampling interval as a positive float."""
-    try:
-        interval = float(dt)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"dt: {dt!r} is not one number; for sample times use signals.sampling_interval(time)"
-        ) from error
-    if not (np.isfinite(interval) and interval > 0.0):
-        raise InputError(f"dt: {dt!r}; the sampling interval is a positive number of seconds")
-    return interval
-
-
-def _window(window: str | tuple | ArrayLike, n: int) -> NDArray[np.float64]:
-    """Return the window's samples, by name or as given."""
-    if isinstance(window, str | tuple):
-        try:
-            from scipy.signal import get_window
-
-            weights = np.asarray(get_window(window, n), dtype=np.float64)
-        except (ValueError, TypeError) as error:
-            raise InputError(f"window: {window!r} is not known to scipy ({error})") from error
-    else:
-        weights = np.asarray(window, dtype=np.float64)
-        if weights.shape != (n,):
-            raise InputError(f"window: shape {weights.shape}, but the record has {n} samples")
-    if not np.isfinite(weights).all() or weights.sum() <= 0.0:
-        raise InputError("window: its samples must be finite and their sum positive")
-    return weights

@@ -12,8 +12,8 @@ _HERE = Path(__file__).parent
 
 def shipped_cases() -> dict[str, Path]:
     """Case files that come with the package, by name ("herkal/case1")."""
-    found = sorted(_HERE.glob("*/cases/*.toml"))
-    return {f"{path.parts[-3]}/{path.stem}": path for path in found}
+    found = {f"{path.parts[-3]}/{path.stem}": path for path in _HERE.glob("*/cases/*.toml")}
+    return dict(sorted(found.items()))
 
 
 def find_case(name: str) -> Path:

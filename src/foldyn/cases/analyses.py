@@ -1,0 +1,268 @@
+"""The case file's contract, kind by kind: what each analysis takes, and what its output may be.
+
+A path has no time: what only a motion can use (histories, moving bases, spectra, lists of mass
+rules) is refused, as it would be left out without a word otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, PlainValidator, model_validator
+
+from foldyn.cases.schema import (
+    CaseSchema,
+    LoadSection,
+    ModelSection,
+    Nodes,
+    Positive,
+    Section,
+    SupportSection,
+    Vector,
+)
+from foldyn.cases.supports import check_axis
+from foldyn.cases.values import choice, indices, number, show
+from foldyn.errors import InputError
+from foldyn.structures import MASS_RULES
+
+LATER_ANALYSES = ("modes", "frf")
+AXES = ("x", "y", "z")
+DIRECTIONS = (*AXES, "-x", "-y", "-z")
+METHODS = ("rk4", "central_difference", "dormand_prince")
+"""Integrators that a case file may name."""
+PATH_METHODS = ("newton", "displacement", "mgdcm", "arc_length")
+"""Methods of following a path that a case file may name."""
+ANIMATIONS = ("gif", "mp4")
+"""Kinds of animation that a case file may name."""
+MOST_SHAPES = 12
+"""Deformed shapes that one figure shows at most."""
+
+
+def _every(value: Any) -> int | float:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value < 1:
+            raise InputError(f" = {value}: must be at least 1 (steps)")
+        return value
+    return number("", value, above=0.0)
+
+
+def _result_file(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc")
+    return value
+
+
+def _one_mass(value: Any) -> list[str]:
+    if isinstance(value, list):
+        raise InputError(
+            f" = {show(value)}: a path is computed once; give one rule, or none: only gravity and "
+            "inertia relief use the mass"
+        )
+    return [choice("", value, MASS_RULES)]
+
+
+def _timeless(value: Any) -> None:
+    raise InputError(
+        f" = {show(value)}: a path has no time; leave it out: what loads and moves the structure "
+        "grows with the load factor (or is named in analysis.constant)"
+    )
+
+
+def _no_base(value: Any) -> None:
+    raise InputError(
+        f" = {show(value)}: a base moves over time, which a path has not; give nodes, axis and "
+        "displacement instead"
+    )
+
+
+def _constant(value: Any) -> str | tuple[int, ...]:
+    if value == "gravity":
+        return "gravity"
+    if isinstance(value, str):
+        raise InputError(f' = {show(value)}: give "gravity", or numbers of [[loads]], as in [0]')
+    return indices("", value, "load", 'or "gravity"')
+
+
+def _load_factors(value: Any) -> list[float]:
+    if not isinstance(value, list) or not value:
+        raise InputError(f" = {show(value)}: must be a list of numbers, as in [0, 0.5, 1]")
+    return [number(f"[{i}]", item) for i, item in enumerate(value)]
+
+
+def _shapes(value: Any) -> int | tuple[int, ...]:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= MOST_SHAPES:
+            raise InputError(f" = {value}: give 1 to {MOST_SHAPES} shapes, or a list of points")
+        return value
+    chosen = indices("", value, "point", "or how many shapes to draw")
+    if len(chosen) > MOST_SHAPES:
+        raise InputError(f": {len(chosen)} points; give at most {MOST_SHAPES}")
+    return chosen
+
+
+def _animation() -> PlainValidator:
+    return PlainValidator(lambda value: choice("", value, ANIMATIONS))
+
+
+class DynamicsSection(Section):
+    """[analysis] of kind "dynamics": arguments of `simulate`."""
+
+    kind: str
+    duration: Positive
+    method: Annotated[str, PlainValidator(lambda value: choice("", value, METHODS))] = "rk4"
+    dt: Positive | None = None
+    force: bool = False
+    tolerance: Positive | None = None
+    start: float = 0.0
+
+
+class UntilSection(Section):
+    """Where a path ends: a node's displacement along an axis reaches a value."""
+
+    node: int
+    axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
+    displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if self.displacement == 0.0:
+            raise InputError(".displacement = 0: the path begins there; give where it shall end")
+        return self
+
+
+class StaticsSection(Section):
+    """[analysis] of kind "statics": arguments of `trace` and of its settings."""
+
+    kind: str
+    method: Annotated[str, PlainValidator(lambda value: choice("", value, PATH_METHODS))] = "newton"
+    load_factors: Annotated[list[float] | None, PlainValidator(_load_factors)] = None
+    steps: Annotated[int, Field(ge=1)] | None = None
+    first_step: float | None = None
+    constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
+    until: UntilSection | None = None
+    inertia_relief: bool = False
+    tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = 1e-9
+    largest_turn: Positive = 10.0
+    stability: bool = True
+
+
+class MotionStart(Section):
+    """[initial] of a motion: a rigid motion, or a stored state."""
+
+    velocity: Vector = None
+    spin: Vector = None
+    file: Annotated[Any, PlainValidator(_result_file)] = None
+    at: int = -1
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        rigid = sorted(given & {"velocity", "spin"})
+        if not given:
+            raise InputError(": give velocity or spin or both, or file (a result)")
+        if "file" in given and rigid:
+            raise InputError(
+                f".file: holds the velocities too; leave out {' and '.join(reversed(rigid))}"
+            )
+        if "at" in given and "file" not in given:
+            raise InputError(".at: is the number of a sample of a result; give file too")
+        return self
+
+
+class PathStart(Section):
+    """[initial] of a path: the stored state near which its first point is sought."""
+
+    file: Annotated[str, PlainValidator(_result_file)]
+    at: int = -1
+
+
+class MotionOutput(Section):
+    """[output] of a motion: what is kept and shown."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, PlainValidator(lambda value: choice("", value, AXES))] = None
+    every: Annotated[Any, PlainValidator(_every)] = None
+    max_frequency: Positive | None = None
+    animation: Annotated[str, _animation()] = "gif"
+
+
+class PathOutput(Section):
+    """[output] of a path: what is shown."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, PlainValidator(lambda value: choice("", value, DIRECTIONS))] = None
+    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 4
+    animation: Annotated[str, _animation()] = "gif"
+
+
+class PathModel(ModelSection):
+    """[model] of a path, with one mass rule at most."""
+
+    mass: Annotated[list[str] | None, PlainValidator(_one_mass)] = None
+
+
+class PathSupport(SupportSection):
+    """One of the [[supports]] of a path: nodes held, or moved with the load factor."""
+
+    base: Annotated[Any, PlainValidator(_no_base)] = None
+    history: Annotated[Any, PlainValidator(_timeless)] = None
+
+
+class PathLoad(LoadSection):
+    """One of the [[loads]] of a path, which grow with the load factor."""
+
+    history: Annotated[Any, PlainValidator(_timeless)] = None
+
+
+def _known_kind(value: Any) -> Any:
+    """Refuse an analysis whose kind is missing or unknown."""
+    if not isinstance(value, Mapping):
+        return value
+    if "kind" not in value:
+        raise InputError(f".kind: missing; choose one of {', '.join(KINDS)}")
+    if value["kind"] in LATER_ANALYSES:
+        raise InputError(
+            f".kind = {show(value['kind'])}: not available in this version; available: "
+            f"{', '.join(KINDS)}"
+        )
+    choice(".kind", value["kind"], KINDS)
+    return value
+
+
+class MotionSchema(CaseSchema):
+    """A case file of kind "dynamics"."""
+
+    initial: MotionStart | None = None
+    analysis: DynamicsSection
+    output: MotionOutput = MotionOutput()
+
+
+class PathSchema(CaseSchema):
+    """A case file of kind "statics"."""
+
+    model: PathModel = PathModel()
+    supports: list[PathSupport] = Field(default_factory=list)
+    loads: list[PathLoad] = Field(default_factory=list)
+    initial: PathStart | None = None
+    analysis: StaticsSection
+    output: PathOutput = PathOutput()
+
+
+class UnknownSchema(CaseSchema):
+    """A case file that does not say its kind: the sections of its kind are left alone."""
+
+    initial: Any = None
+    analysis: Annotated[dict[str, Any], BeforeValidator(_known_kind)]
+    output: Any = None
+
+
+KINDS: Mapping[str, type[CaseSchema]] = {"dynamics": MotionSchema, "statics": PathSchema}
+"""What a case file of each kind looks like."""
+
+
+def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
+    """Schema of a case file by the kind that it names."""
+    analysis = document.get("analysis")
+    kind = analysis.get("kind") if isinstance(analysis, Mapping) else None
+    return KINDS.get(kind, UnknownSchema) if isinstance(kind, str) else UnknownSchema

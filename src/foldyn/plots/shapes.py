@@ -1,0 +1,148 @@
+"""Deformed shapes at points of a path, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from foldyn.errors import InputError
+from foldyn.plots import scene, style
+from foldyn.plots.along import check_path, evenly
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from foldyn.cases import Case
+    from foldyn.structures import Structure
+
+_MOST_COLUMNS = 3
+_WIDTH, _MARGIN, _CAPTION = 9.0, 0.15, 0.42  # inches; the caption stands below its shape
+_TALLEST = 3.2  # inches
+
+
+def draw_shapes(
+    case_or_structure: Case | Structure,
+    path: xr.Dataset,
+    points: int | Sequence[int] = 4,
+    scale: float = 1.0,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw the deformed sheet at points of a path, over the undeformed one in gray.
+
+    All shapes are drawn at the same scale.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What moves.
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+    points : int or sequence of int
+        How many points, spread evenly over the way of the nodes with the first and the last among
+        them; or their numbers, negative ones from the end.
+    scale : float
+        Factor on the displacement in the picture.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One orthographic view for each point; below it the number of the point, its load factor
+        and what kind of point it is.
+
+    Raises
+    ------
+    InputError
+        A path of another structure, or no such point.
+    """
+    check_path(path, "path")
+    sheet = Sheet3D.of(case_or_structure)
+    numbers = chosen_points(path, points)
+    displacement = path["displacement"].transpose("step", "node", "axis").values[numbers]
+    if displacement.shape[1:] != sheet.nodes.shape:
+        raise InputError(
+            f"path: it has {displacement.shape[1]} nodes, the structure {len(sheet.nodes)}; give "
+            "the case that was traced"
+        )
+    positions = sheet.nodes + scale * displacement
+    sight = View(*view)
+    seen = scene.Seen.of(np.vstack([sheet.nodes, *positions]), sight)
+    keys = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed")]
+    if scale != 1.0:
+        keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+    glow = len(sheet.actuated) < len(sheet.pattern.creases)
+    keys += edge_keys(sheet, actuated=glow)
+
+    columns = min(len(numbers), _MOST_COLUMNS)
+    columns = -(-len(numbers) // -(-len(numbers) // columns))  # rows as full as can be
+    rows = -(-len(numbers) // columns)
+    cell = _WIDTH / columns
+    flat = sight.flat(np.vstack([sheet.nodes, *positions]))
+    low, size = flat.min(axis=0), np.ptp(flat, axis=0)
+    inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # per meter
+    aside = inches * (sight.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
+    top = 0.42 if title else 0.1
+    bottom = 0.12 + 0.19 * -(-len(keys) // 4)
+    step = size[1] * inches + _CAPTION
+    figure = style.new_figure(_WIDTH, top + rows * step + bottom, constrained=False)
+    height = figure.get_figheight()
+    if title:
+        figure.suptitle(
+            title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
+        )
+    for place, (number, shape) in enumerate(zip(numbers, positions, strict=True)):
+        row, column = divmod(place, columns)
+        here = min(columns, len(numbers) - row * columns)  # the last row stands in the middle
+        middle = _WIDTH / 2 + (column - 0.5 * (here - 1)) * cell
+        floor = height - top - (row + 1) * step + _CAPTION
+        center = middle + aside[0], floor + 0.5 * size[1] * inches + aside[1]
+        axes = scene.add_view(figure, seen, center, inches)
+        axes.set_axis_off()
+        add_undeformed(axes, sheet)
+        DrawnSheet(axes, sheet, shape, sight, actuated=glow)
+        figure.text(
+            middle / _WIDTH,
+            (floor - 0.08) / height,
+            describe_point(path, number),
+            ha="center",
+            va="top",
+            fontsize=style.LABEL,
+            color=style.BLACK,
+        )
+    style.legend_below(figure, keys, columns=4)
+    return style.finish(figure)
+
+
+def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
+    """Numbers of points from 0 on, for how many there shall be or numbers with negative ones."""
+    count = path.sizes["step"]
+    if isinstance(points, int | np.integer):
+        if points < 1:
+            raise InputError(f"points: {points}; give at least one")
+        return evenly(path, int(points))
+    for number in points:
+        if not -count <= number < count:
+            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
+    if not len(points):
+        raise InputError("points: empty; give at least one")
+    return [int(number) % count for number in points]
+
+
+def describe_point(path: xr.Dataset, number: int) -> str:
+    """Text for a point: its number, load factor, and what is special about it."""
+    point = path.isel(step=number)
+    kind = str(point["point"].values)
+    said = {"limit": ", limit point", "bifurcation": ", bifurcation"}.get(kind, "")
+    if not said and int(point["negative_eigenvalues"]) > 0:
+        said = ", unstable"
+    return f"point {number}: load factor {float(point['load_factor']):.4g}{said}"

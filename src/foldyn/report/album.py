@@ -1,0 +1,69 @@
+"""What the pages of motions and paths share: figures in a folder, the part on the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from foldyn import plots
+from foldyn.cases import Case
+from foldyn.report.sections import Heading, Picture, Section
+
+if TYPE_CHECKING:
+    import xarray
+
+DPI = 150
+MOST_NODES = 12
+"""Nodes that one figure shows at most."""
+
+
+class Album:
+    """Figures of a page, each also a file of its own in a folder."""
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    def figure(self, name: str, caption: str, draw: Callable[[], Any]) -> Picture:
+        """Draw a figure, write it as NAME.png, and return it for the page."""
+        path = self.folder / f"{name}.png"
+        draw().savefig(path, dpi=DPI)
+        return Picture(path, caption)
+
+    def structure(self, case: Case) -> list[Section]:
+        """Draw the structure and its laws."""
+        return [
+            Heading("The structure"),
+            self.figure(
+                "structure",
+                "The pattern with its nodes, supports and loads.",
+                lambda: plots.draw_structure(case),
+            ),
+            self.figure(
+                "laws",
+                "Constitutive curves: moment of a fold and of a bend against the dihedral, stress "
+                "of a bar against its stretch.",
+                lambda: plots.plot_laws(case.structure),
+            ),
+        ]
+
+
+def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], str]:
+    """Nodes that a figure shows, and what to say where there were more."""
+    nodes = chosen[:most]
+    return nodes, f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
+
+
+def visible_scale(case: Case, result: xarray.Dataset) -> float:
+    """Enlargement with which a small motion can be seen: 1, 2, 5, 10, ... at most 1000."""
+    largest = float(np.abs(result["displacement"].to_numpy()).max())
+    wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
+    steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
+    return max((s for s in steps if s <= wanted), default=1.0)
+
+
+def enlarged(scale: float) -> str:
+    """What a caption says of an enlargement."""
+    return "" if scale == 1.0 else f", displacements enlarged {scale:g} times"

@@ -1,0 +1,202 @@
+"""Figures and the page of an equilibrium path: what `foldyn run` leaves for people to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from foldyn import plots
+from foldyn.cases import Case
+from foldyn.cases.casefile import CaseFile
+from foldyn.plots.along import AXES, along, evenly, main_direction
+from foldyn.plots.path import total_reaction
+from foldyn.plots.shapes import chosen_points
+from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
+
+if TYPE_CHECKING:
+    import xarray
+
+FRAMES, FPS = 60, 15
+MOST_CURVES = 8
+"""Nodes whose curves one figure shows at most, each in its color."""
+MOST_ROWS = 12
+"""Regular points that the table shows at most."""
+MOST_COLUMNS = 4
+"""Nodes whose displacements the table shows at most."""
+
+
+def write_path(case_file: CaseFile, path: xarray.Dataset, folder: str | Path) -> Path:
+    """Draw a case and its path into `folder`; returns the path of report.html.
+
+    Parameters
+    ----------
+    case_file : CaseFile
+    path : xarray.Dataset
+    folder : path
+        Exists already; files of the same names are replaced.
+    """
+    album, case = Album(folder), case_file.case()
+    moved = moved_supports(case)
+    chosen = case_file.output.nodes.tolist()
+    nodes, some = shown_nodes(chosen, MOST_CURVES)
+    direction = case_file.output.axis or main_direction({"": path}, nodes)
+    sections: list[Section] = [*album.structure(case), Heading("The path")]
+    if moved is not None:
+        sections.append(
+            album.figure(
+                "reaction",
+                f"Total force of the supports at {_nodes(moved[0])}, which are moved along "
+                f"{moved[1]}, over their displacement. {_multiplied(path)}",
+                lambda: plots.plot_reaction({"": path}, *moved),
+            )
+        )
+    if moved is None or not set(nodes) <= set(moved[0]):
+        sections.append(
+            album.figure(
+                "curve",
+                f"Load factor over the displacement of {_nodes(nodes)}{some} along {direction}. "
+                f"{_multiplied(path)}",
+                lambda: plots.plot_load_displacement({"": path}, nodes, direction),
+            )
+        )
+    if path.sizes["step"] > 1:
+        sections.append(
+            album.figure(
+                "energies",
+                "Strain energies of bars, bends and folds, one upon the other, with the work that "
+                "was done on the structure; below, their shares.",
+                lambda: plots.plot_path_energies(path, *_growing(path, moved)),
+            )
+        )
+    scale = visible_scale(case, path)
+    sections.append(
+        album.figure(
+            "shapes",
+            f"The deformed sheet{enlarged(scale)}; the undeformed one in gray.",
+            lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
+        )
+    )
+    if path.sizes["step"] > 1:
+        file = album.folder / f"path.{case_file.output.animation}"
+        plots.animate(case, path, file, frames=FRAMES, fps=FPS, scale=scale)
+        sections.append(Picture(file, f"Along the path{enlarged(scale)}; at rest in gray."))
+    sections += [
+        Heading("The numbers"),
+        _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved),
+        _run(case_file, path),
+        Text(
+            f"Computed with Foldyn {path.attrs['foldyn_version']}. Stable means that the tangent "
+            "stiffness of the free nodes has no negative eigenvalue: nodes that supports move stay "
+            "where they are. At every point the out-of-balance force is below the tolerance times "
+            "the forces at play, or rounding. The result carries its own case, can be run again "
+            "from it, and motions can start from its points."
+        ),
+    ]
+    title = case_file.title or case_file.path.stem
+    return write_report(album.folder / "report.html", title, sections)
+
+
+def moved_supports(case: Case) -> tuple[list[int], str] | None:
+    """Nodes that supports move together and farthest, and the direction; None where none moves."""
+    motion = sum((vector for vector, _ in case.imposed_terms), np.zeros(case.imposed.shape))
+    if not motion.any():
+        return None
+    _, axis = np.unravel_index(np.abs(motion).argmax(), motion.shape)
+    largest = motion[np.abs(motion[:, axis]).argmax(), axis]
+    together = np.isclose(motion[:, axis], largest, rtol=1e-9, atol=0.0)
+    return np.flatnonzero(together).tolist(), ("-" if largest < 0.0 else "") + AXES[axis]
+
+
+def _growing(
+    path: xarray.Dataset, moved: tuple[list[int], str] | None
+) -> tuple[list[int], str] | tuple[None, None]:
+    """The moved supports, if they only move forward."""
+    if moved is None or not (np.diff(along(path, *moved)) > 0.0).all():
+        return None, None
+    return moved
+
+
+def _multiplied(path: xarray.Dataset) -> str:
+    """What the load factor is."""
+    constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
+    but = f", but for {_list('loads', constant)}, which act in full all along" if constant else ""
+    return f"The factor multiplies the loads and displacements that the structure has above{but}."
+
+
+def _points(
+    case_file: CaseFile,
+    path: xarray.Dataset,
+    nodes: list[int],
+    direction: str,
+    moved: tuple[list[int], str] | None,
+) -> Table:
+    special = np.flatnonzero(path["point"].values != "regular").tolist()
+    drawn = chosen_points(path, case_file.output.shapes or 4)
+    rows = sorted({*special, *drawn, *evenly(path, MOST_ROWS)})
+    shares = plots.energy_shares(path)
+    total = sum(path[f"strain_{name}"].values for name in shares)
+    header = ["point", "load factor"]
+    columns: list[np.ndarray] = [path["load_factor"].values]
+    if moved is not None:
+        header += [f"moved along {moved[1]} (m)", "force (N)"]
+        columns += [along(path, *moved), total_reaction(path, *moved)]
+    shown = [node for node in nodes if moved is None or node not in moved[0]]
+    header += [f"node {node} along {direction} (m)" for node in shown]
+    columns += [along(path, [node], direction) for node in shown]
+    header += ["strain energy (J)", *(f"{name} (%)" for name in shares)]
+    columns += [np.asarray(total), *(100.0 * share for share in shares.values())]
+    header += ["iterations", "stability", "kind"]
+    negative = path["negative_eigenvalues"].values
+    judged = ["" if n < 0 else "stable" if n == 0 else "unstable" for n in negative.tolist()]
+    kinds = {"regular": "", "limit": "limit point", "bifurcation": "bifurcation"}
+    table = [
+        [
+            k,
+            *(None if np.isnan(column[k]) else float(column[k]) for column in columns),
+            int(path["iterations"][k]),
+            judged[k],
+            kinds[str(path["point"].values[k])],
+        ]
+        for k in rows
+    ]
+    return Table(header, table, "Points of the path, with all limit points and bifurcations")
+
+
+def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
+    a = path.attrs
+    header = [
+        "method",
+        "points",
+        "limit points",
+        "bifurcations",
+        "Newton iterations",
+        "factorizations",
+        "step cuts",
+        "tolerance",
+        "time (s)",
+    ]
+    kinds = path["point"].values
+    row = [
+        a["method"],
+        path.sizes["step"],
+        int((kinds == "limit").sum()),
+        int((kinds == "bifurcation").sum()),
+        a["newton_iterations"],
+        a["factorizations"],
+        a["step_cuts"],
+        a["tolerance"],
+        a["wall_seconds"],
+    ]
+    return Table(header, [row], f"{case_file.path.name}: the run", digits=3)
+
+
+def _nodes(nodes: list[int]) -> str:
+    return f"node {nodes[0]}" if len(nodes) == 1 else _list("nodes", nodes)
+
+
+def _list(what: str, numbers: list[int]) -> str:
+    return f"{what} {', '.join(map(str, numbers))}"

@@ -1,0 +1,210 @@
+"""Frequency response from records of force and response: H1, H2 and coherence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.signals.records import (
+    Window,
+    checked_choice,
+    checked_count,
+    checked_interval,
+    checked_number,
+    checked_window,
+    detrended,
+    real_array,
+)
+
+ESTIMATORS = ("h1", "h2")
+_FEWEST = 4  # samples of a segment
+# Lines where the force's amplitude is below this part of its largest one hold rounding alone.
+_SILENCE = 1e-12
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """A frequency response estimated from records.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (m,)
+        0 ... 1/(2 dt) (Hz), m = segment // 2 + 1.
+    response : ndarray, shape (m, ...), complex
+        Response per force, in the unit of the response over that of the force, for the time
+        dependence exp(+i w t): a lag is a negative phase. NaN at lines without force.
+    coherence : ndarray, shape (m, ...)
+        Part of the response's power that is linear in the force, 0 ... 1. NaN from a single
+        segment, for which it is 1 by construction and says nothing.
+    force_density : ndarray, shape (m,)
+        One-sided power density of the force (unit of the force squared per Hz): where it is
+        small against its maximum, the response is a quotient of small numbers.
+    segments : int
+        Number of segments averaged, over all records.
+    """
+
+    frequency: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    coherence: NDArray[np.float64]
+    force_density: NDArray[np.float64]
+    segments: int
+
+    @property
+    def random_error(self) -> NDArray[np.float64]:
+        """Standard deviation of the relative magnitude, and of the phase in rad.
+
+        sqrt((1 - c) / (2 n c)), c the coherence and n the number of segments, which must not
+        overlap (Bendat and Piersol, Random Data, chapter 9); valid where it is well below 1.
+        """
+        with np.errstate(divide="ignore"):
+            return np.sqrt((1.0 - self.coherence) / (2.0 * self.segments * self.coherence))
+
+
+def frequency_response(
+    force: ArrayLike,
+    response: ArrayLike,
+    dt: float,
+    estimator: str = "h1",
+    segment: int | None = None,
+    overlap: float = 0.0,
+    window: Window = None,
+    detrend: str | None = None,
+) -> FrequencyResponse:
+    """Estimate a frequency response from records of force and response.
+
+    With F and X the transforms of a windowed segment and averages over all segments,
+    H1 = <F* X> / <F* F> has no bias from noise in the response, and H2 = <X* X> / <X* F> none
+    from noise in the force; H1 is too small by 1 + (noise / force) with noise in the force, H2 too
+    large by 1 + (noise / response) with noise in the response, powers meant. The coherence
+    ``|<F* X>|^2 / (<F* F> <X* X>)`` is H1 / H2.
+
+    Burst random, impulse and sweep: give each record whole (`segment=None`, no window), long enough
+    that the response has died away within it, or periodic. Where it has not, multiply with an
+    `exponential_window`. Unending noise: segments with ``window="hann"`` and ``overlap=0.5``.
+
+    Parameters
+    ----------
+    force : array_like, shape (n,) or (records, n)
+        Force (N), or the motion of the base: one record, or several of one length.
+    response : array_like, shape (n, ...) or (records, n, ...)
+        Response (m, m/s, m/s^2), with any further axes for channels.
+    dt : float
+        Sampling interval (s); `foldyn.signals.sampling_interval` finds and checks it.
+    estimator : {"h1", "h2"}
+        Which quotient; the same without noise, and with a single segment.
+    segment : int or None
+        Samples of a segment; None is the whole record. What is left at a record's end is unused.
+    overlap : float
+        Part of a segment that the next one shares, 0 <= overlap < 1.
+    window : str, tuple, array_like of shape (segment,), or None
+        As in `spectrum`, for force and response alike.
+    detrend : {None, "constant", "linear"}
+        What is taken off each segment, force and response, before windowing.
+
+    Returns
+    -------
+    FrequencyResponse
+        Frequency, response, coherence, density of the force and number of segments.
+
+    Raises
+    ------
+    InputError
+        Records of different length, a segment longer than the record, a force without content,
+        and what `spectrum` refuses.
+
+    Notes
+    -----
+    Sources: Bendat and Piersol, Random Data, 4th ed. 2010, chapters 6 (H1, H2, coherence) and 9
+    (errors); Brandt, Noise and Vibration Analysis, 2011, chapter 13. With n segments the coherence
+    of unrelated records is about 1/n, not 0.
+
+    Examples
+    --------
+    A gain of 2 with a delay of one sample, at a quarter of the sampling frequency:
+
+    >>> import numpy as np
+    >>> force = np.random.default_rng(1).normal(size=(8, 64))
+    >>> estimate = frequency_response(force, 2.0 * np.roll(force, 1, axis=1), dt=0.01)
+    >>> print(estimate.frequency[16], estimate.response[16].imag.round(12))
+    25.0 -2.0
+    """
+    checked_choice("estimator", estimator, ESTIMATORS)
+    interval = checked_interval(dt)
+    forces, responses = _records(force, response)
+    length = forces.shape[1] if segment is None else checked_count("segment", segment, _FEWEST)
+    if not _FEWEST <= length <= forces.shape[1]:
+        raise InputError(
+            f"segment: {length} samples, but a record has {forces.shape[1]}; a segment has from "
+            f"{_FEWEST} samples to all of a record"
+        )
+    shared = int(checked_number("overlap", overlap, least=0.0, below=1.0) * length)
+    weights = checked_window(window, length)
+
+    channels = responses.shape[2:]
+    lines = length // 2 + 1
+    ff = np.zeros(lines)
+    xx = np.zeros((lines, *channels))
+    fx = np.zeros((lines, *channels), dtype=np.complex128)
+    count = 0
+    for f, x in zip(forces, responses, strict=True):
+        for start in range(0, len(f) - length + 1, length - shared):
+            part = slice(start, start + length)
+            F = _transform(f[part], weights, detrend)
+            X = _transform(x[part], weights, detrend)
+            ff += np.abs(F) ** 2
+            xx += np.abs(X) ** 2
+            fx += np.conj(_beside(F, X)) * X
+            count += 1
+
+    silent = ff <= _SILENCE**2 * ff.max()
+    if silent.all():
+        raise InputError("force: zero throughout; a response per force needs a force")
+    power = _beside(np.where(silent, np.nan, ff), fx)
+    coherent = np.abs(fx) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):  # nan / nan, and channels at rest
+        h1 = fx / power
+        h2 = np.where(coherent > 0.0, xx * fx / coherent, np.nan)
+        ratio = np.minimum(coherent / (power * xx), 1.0)
+    density = ff * interval / (count * np.sum(weights**2))
+    density[1 : -1 if length % 2 == 0 else None] *= 2.0
+    return FrequencyResponse(
+        frequency=scipy.fft.rfftfreq(length, interval),
+        response=h1 if estimator == "h1" else np.where(np.isnan(h1), np.nan, h2),
+        coherence=ratio if count > 1 else np.full_like(ratio, np.nan),
+        force_density=density,
+        segments=count,
+    )
+
+
+def _records(
+    force: ArrayLike, response: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Force (records, n) and response (records, n, ...) of equal length."""
+    f = real_array("force", force)
+    x = real_array("response", response)
+    if f.ndim not in (1, 2) or f.size == 0:
+        raise InputError(
+            f"force: shape {f.shape}; give one record, shape (n,), or several of one length, "
+            "shape (records, n)"
+        )
+    if x.shape[: f.ndim] != f.shape:
+        raise InputError(
+            f"response: shape {x.shape} does not begin with the force's {f.shape}; force and "
+            "response have the same records and samples, channels come last"
+        )
+    return (f, x) if f.ndim == 2 else (f[np.newaxis], x[np.newaxis])
+
+
+def _transform(
+    x: NDArray[np.float64], weights: NDArray[np.float64], detrend: str | None
+) -> NDArray[np.complex128]:
+    return scipy.fft.rfft(detrended(x, detrend) * _beside(weights, x), axis=0)
+
+
+def _beside(row: NDArray, other: NDArray) -> NDArray:
+    """A row over the first axis, shaped to multiply an array with channels behind it."""
+    return row.reshape(row.shape + (1,) * (other.ndim - 1))

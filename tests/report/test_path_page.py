@@ -1,0 +1,78 @@
+"""What the page of a path finds out about the case and the path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cases.casefile import read_case
+from foldyn.report import write_path
+from foldyn.report.path import moved_supports
+
+FOLD = """
+[pattern]
+kind = "simple_fold"
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[[supports]]
+nodes = [4, 5]
+[[supports]]
+nodes = [0, 1]
+axes = "z"
+"""
+
+
+@pytest.fixture
+def cell():
+    pattern = fd.patterns.miura(cells=(1, 1))
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01))
+
+
+@pytest.mark.parametrize(
+    ("moves", "expected"),
+    [
+        ([([6, 8], "x", 0.1)], ([6, 8], "x")),
+        ([([6, 8], "z", -0.1)], ([6, 8], "-z")),
+        # pulled at both ends: what one end takes, not the sum, which is nothing
+        ([([0, 2], "x", -0.05), ([6, 8], "x", 0.05)], ([0, 2], "-x")),
+        ([([0], "y", 0.01), ([6, 7, 8], "x", 0.02)], ([6, 7, 8], "x")),
+        ([([6, 7, 8], "x", [0.1, 0.2, 0.1])], ([7], "x")),
+        ([([6, 8], "x", 0.0)], None),
+        ([], None),
+    ],
+)
+def test_the_supports_that_move_farthest(cell, moves, expected):
+    case = fd.Case(cell, [fd.Impose(*move) for move in moves])
+    assert moved_supports(case) == expected
+
+
+def write(tmp_path, text):
+    file = tmp_path / "case.toml"
+    file.write_text(FOLD + text, "utf-8")
+    case_file = read_case(file)
+    path = fd.trace(case_file.case(), **case_file.analysis.arguments)
+    return path, write_path(case_file, path, tmp_path).read_text("utf-8")
+
+
+def test_loads_that_are_constant_are_named(tmp_path):
+    loads = "[[loads]]\nnodes = [0, 1]\nforce = [-1e-3, 0, 0]\n[[loads]]\ngravity = [0, 0, -9.81]\n"
+    text = loads + '[analysis]\nkind = "statics"\nconstant = "gravity"\nsteps = 2\n'
+    path, page = write(tmp_path, text)
+    assert path.attrs["constant"].tolist() == [1]
+    assert "above, but for loads 1, which act in full all along." in page
+
+
+def test_there_and_back(tmp_path):
+    """Energies over a displacement that returns are drawn over the way."""
+    moved = '[[supports]]\nnodes = [0, 1]\naxis = "x"\ndisplacement = -0.1\n'
+    text = moved + '[analysis]\nkind = "statics"\nload_factors = [0, 0.5, 1, 0.5, 0]\n'
+    path, page = write(tmp_path, text)
+    assert (tmp_path / "energies.png").exists()
+    force = fd.plots.total_reaction(path, [0, 1], "-x")
+    np.testing.assert_allclose(force[3:], force[1::-1], atol=1e-9 * force.max())
+    assert "moved along -x (m)" in page

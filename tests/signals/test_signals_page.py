@@ -1,0 +1,42 @@
+"""The page of the signals shows what there is, and what it shows runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from known_poles import Mode, receptance
+
+from foldyn import signals
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "signals.md").read_text("utf-8")
+
+
+def test_the_example_runs():
+    names: dict = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S):
+        exec(compile(block, "signals.md", "exec"), names)
+    assert names["fit"].damping_ratio == pytest.approx(0.135, abs=4 * names["fit"].damping_error)
+    assert names["rough"].damping_ratio == pytest.approx(0.135, rel=0.05)
+
+
+def test_every_function_has_a_row():
+    rows = "".join(line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `"))
+    functions = [name for name in signals.__all__ if name.islower()]
+    assert [name for name in functions if f"`{name}`" not in rows] == []
+
+
+def test_the_table_of_the_textbook_bias():
+    f = np.linspace(0.0, 60.0, 1201)
+    table = re.findall(r"^\| (0\.\d+) \| \+([\d.]+) % \| 0 \| \+([\d.]+) % \|$", PAGE, re.M)
+    assert len(table) == 5
+    for z, *shown in table:
+        H = receptance(f, Mode(9.3, float(z)))
+        for percent, size, quantity in zip(
+            shown, (H, f**2 * H), ("receptance", "accelerance"), strict=True
+        ):
+            result = signals.half_power(f, np.abs(size), quantity=quantity)
+            bias = 100 * (result.textbook_damping_ratio / float(z) - 1)
+            assert float(percent) == pytest.approx(bias, rel=0.03)
