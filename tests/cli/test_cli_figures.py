@@ -49,6 +49,19 @@ def test_a_film_instead_of_a_gif(workplace, edited) -> None:
     assert page.count("<video ") == 1
 
 
+def test_mp4_without_ffmpeg_is_refused_at_once(workplace, edited, monkeypatch) -> None:
+    def missing() -> str:
+        raise InputError("MP4 needs ffmpeg: install it")
+
+    monkeypatch.setattr("foldyn.plots.writers.find_ffmpeg", missing)
+    workplace.write(edited(("every = 0.01", 'every = 0.02\nanimation = "mp4"')))
+    done = workplace.call("run", "case.toml", "--out", "r")
+    assert done.status == 2
+    assert 'case.toml: output.animation = "mp4": MP4 needs ffmpeg' in done.err
+    assert not done.new
+    assert workplace.call("run", "case.toml", "--out", "r", "--no-figures").status == 0
+
+
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     """A sheet without loads shows some of its vertices, not hundreds of rows."""
     from foldyn.report import album, motion

@@ -33,6 +33,8 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
         case_file = read_case(path)
         task = KINDS[case_file.analysis.kind](case_file, figures)
+        if figures:
+            _check_video(case_file)
         names = [run.file for run in task.runs.values()]
         check_folder(folder, out, [*names, *(["report.html"] if figures else [])])
     say = _nothing if quiet else _say
@@ -59,10 +61,22 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     say("drawing figures")
     try:
         page = task.write(results, folder)
-    except InputError as error:
+    except (InputError, ComputationError) as error:
         raise _failed(f"{path}: figures: ", str(error), kept) from None
     say(f"wrote {', '.join(kept)}, figures and {page}")
     return folder
+
+
+def _check_video(case_file: CaseFile) -> None:
+    """Refuse an animation in MP4 before anything is computed, if there is no ffmpeg to make it."""
+    if case_file.output.animation != "mp4":
+        return
+    from foldyn.plots.writers import find_ffmpeg
+
+    try:
+        find_ffmpeg()
+    except InputError as error:
+        raise InputError(f'{case_file.path}: output.animation = "mp4": {error}') from None
 
 
 class _Introduction:
