@@ -58,7 +58,7 @@ _HOME = {
     "initial_state": "dynamics",
 }
 _MODULES = (
-    "cases", "checks", "dynamics", "errors", "formats", "materials", "mechanics", "patterns",
+    "cases", "checks", "dynamics", "errors", "formats", "linear", "materials", "mechanics", "patterns",
     "plots", "report", "results", "signals", "statics", "structures", "studies",
 )  # fmt: skip
 

@@ -212,7 +212,7 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
     named = parts["options"].pop("mass", None)
     masses = [ModelOptions().mass] if named is None else list(named)
     with _placed(path, "damping."):
-        parts["damping"] = Rayleigh(schema.damping.alpha, schema.damping.beta)
+        parts["damping"] = Rayleigh(**schema.damping.model_dump())
     parts["supports"] = []
     for i, item in enumerate(schema.supports):
         with _placed(path, f"supports[{i}]."):

@@ -111,7 +111,7 @@ class _Writer:
                 if (value := getattr(structure.sheet, f.name)) is not None
             },
             "model": self._model(structure.options),
-            "damping": {"alpha": case.damping.alpha, "beta": case.damping.beta},
+            "damping": dataclasses.asdict(case.damping),
             "supports": [self._support(support) for support in case.supports],
             "loads": [self._load(load) for load in case.loads],
         }

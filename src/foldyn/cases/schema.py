@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from foldyn.cases.actuation import check_angles, check_creases
+from foldyn.cases.damping import STATES
 from foldyn.cases.decode import check_keys, history_from, law_from
 from foldyn.cases.histories import History
 from foldyn.cases.selection import check_nodes
@@ -147,6 +148,7 @@ class DampingSection(Section):
 
     alpha: Annotated[float, Field(ge=0)] = 0.0
     beta: Annotated[float, Field(ge=0)] = 0.0
+    state: Annotated[str, PlainValidator(lambda value: choice("", value, STATES))] = "rest"
 
 
 class SupportSection(Section):

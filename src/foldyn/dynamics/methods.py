@@ -7,8 +7,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from foldyn.cases import Case
 from foldyn.dynamics import central_difference, dormand_prince, rk4
+from foldyn.dynamics.engine import Compiled, Engine
 from foldyn.dynamics.stability import Growth
+from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
 
 
@@ -25,6 +28,10 @@ class Method(NamedTuple):
     growth: Growth
     advance: Callable[..., tuple[int, int]]
     adaptive: bool = False
+
+    def engine(self, case: Case, packed: Packed) -> Engine:
+        """The method with a case and the memory that it works with."""
+        return Compiled(self.advance, packed)
 
 
 METHODS: Mapping[str, Method] = {

@@ -21,7 +21,6 @@ from foldyn.dynamics.stability import is_stable, stability_limit
 from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import expected_samples
 from foldyn.errors import FoldynWarning, InstabilityError, MotionInterrupted, PenetrationError
-from foldyn.mechanics import workspace
 from foldyn.results import trajectory_dataset
 
 if TYPE_CHECKING:
@@ -70,9 +69,10 @@ class Motion:
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
         """Advance in stretches, between which progress is told and the motion is audited."""
-        model, system, mass, callbacks, by = self._packed
+        system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
-        work, memory = workspace(model), scratch(len(course.u), len(system.waves.code))
+        engine = self.method.engine(self.case, self._packed)
+        memory = scratch(len(course.u), len(system.waves.code))
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
         began = None
@@ -81,9 +81,7 @@ class Motion:
                 done = int(course.count[0])
                 stretch = min(length, recheck - done % recheck)
                 clock = time.perf_counter()
-                code, hinge = self.method.advance(
-                    model, system, mass, course, plan, self._out, work, memory, stretch
-                )
+                code, hinge = engine.advance(course, plan, self._out, stretch)
                 clock = time.perf_counter() - clock
                 began = time.perf_counter() if began is None else began
                 self.seconds = time.perf_counter() - began

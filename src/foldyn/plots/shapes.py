@@ -10,20 +10,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from foldyn.errors import InputError
-from foldyn.plots import scene, style
+from foldyn.plots import style
 from foldyn.plots.along import check_path, evenly
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
+from foldyn.plots.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from foldyn.cases import Case
     from foldyn.structures import Structure
-
-_MOST_COLUMNS = 3
-_WIDTH, _MARGIN, _CAPTION = 9.0, 0.15, 0.42  # inches; the caption stands below its shape
-_TALLEST = 3.2  # inches
 
 
 def draw_shapes(
@@ -75,52 +71,11 @@ def draw_shapes(
             "the case that was traced"
         )
     positions = sheet.nodes + scale * displacement
-    sight = View(*view)
-    seen = scene.Seen.of(np.vstack([sheet.nodes, *positions]), sight)
-    keys = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed")]
+    notes = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed")]
     if scale != 1.0:
-        keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
-    glow = len(sheet.actuated) < len(sheet.pattern.creases)
-    keys += edge_keys(sheet, actuated=glow)
-
-    columns = min(len(numbers), _MOST_COLUMNS)
-    columns = -(-len(numbers) // -(-len(numbers) // columns))  # rows as full as can be
-    rows = -(-len(numbers) // columns)
-    cell = _WIDTH / columns
-    flat = sight.flat(np.vstack([sheet.nodes, *positions]))
-    low, size = flat.min(axis=0), np.ptp(flat, axis=0)
-    inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # per meter
-    aside = inches * (sight.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
-    top = 0.42 if title else 0.1
-    bottom = 0.12 + 0.19 * -(-len(keys) // 4)
-    step = size[1] * inches + _CAPTION
-    figure = style.new_figure(_WIDTH, top + rows * step + bottom, constrained=False)
-    height = figure.get_figheight()
-    if title:
-        figure.suptitle(
-            title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
-        )
-    for place, (number, shape) in enumerate(zip(numbers, positions, strict=True)):
-        row, column = divmod(place, columns)
-        here = min(columns, len(numbers) - row * columns)  # the last row stands in the middle
-        middle = _WIDTH / 2 + (column - 0.5 * (here - 1)) * cell
-        floor = height - top - (row + 1) * step + _CAPTION
-        center = middle + aside[0], floor + 0.5 * size[1] * inches + aside[1]
-        axes = scene.add_view(figure, seen, center, inches)
-        axes.set_axis_off()
-        add_undeformed(axes, sheet)
-        DrawnSheet(axes, sheet, shape, sight, actuated=glow)
-        figure.text(
-            middle / _WIDTH,
-            (floor - 0.08) / height,
-            describe_point(path, number),
-            ha="center",
-            va="top",
-            fontsize=style.LABEL,
-            color=style.BLACK,
-        )
-    style.legend_below(figure, keys, columns=4)
-    return style.finish(figure)
+        notes.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+    captions = [describe_point(path, number) for number in numbers]
+    return side_by_side(sheet, positions, captions, View(*view), notes, title).figure
 
 
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:

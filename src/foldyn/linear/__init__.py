@@ -1,0 +1,1 @@
+"""Small vibrations about an equilibrium: modes and frequency response."""
