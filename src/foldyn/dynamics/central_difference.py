@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import observe
-from foldyn.dynamics.outcome import DONE, NOT_FINITE
+from foldyn.dynamics.course import observe, tell
+from foldyn.dynamics.outcome import DONE
 from foldyn.dynamics.system import acceleration
-from foldyn.materials.compiled import kernel
+from foldyn.mechanics import shared
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 
@@ -39,51 +39,47 @@ def growth(omega, damping, dt):
     return np.abs(np.linalg.eigvals(step)).max(axis=-1)
 
 
-@kernel
+@shared
 def advance(model, system, mass, course, plan, out, work, s, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     `course.carry` is the acceleration, kept from one step and stretch to the next; the tally keeps
-    the powers beside the energies.
+    the powers beside the energies. Each thread of a team advances its own nodes.
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    dt, tally, count, a = plan.dt, course.tally, course.count, course.carry
-    angle, angle_now = course.angle, work.angle
-    ahead = np.empty_like(course.v)
-    u, v, fa, fahead = flat(course.u), flat(course.v), flat(a), flat(ahead)
-    last = min(count[0] + stretch, plan.steps)
-    if count[0] == 0:
-        tally[2], tally[3] = acceleration(
+    dt, team, a = plan.dt, work.team, course.carry
+    low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
+    u, v, fa, ahead = flat(course.u), flat(course.v), flat(a), flat(s.stage[0])
+    powers = s.powers
+    begun = course.count[0]
+    end = min(begun + stretch, plan.steps)
+    tell(team, 0.0, 0.0, 0)
+    if begun == 0:
+        powers[0], powers[1] = acceleration(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        found, hinge = observe(
-            model, system, mass, course, a, plan.start, count, plan.every, angle_now, angle, out, s
-        )
+        found, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
         if found != DONE:
             return found, hinge
-    while count[0] < last:
-        for i in range(u.size):
+    for step in range(begun + 1, end + 1):
+        for i in range(low, high):
             v[i] += 0.5 * dt * fa[i]
             u[i] += dt * v[i]
-            fahead[i] = v[i] + 0.5 * dt * fa[i]
-        count[0] += 1
-        count[3] += 1
-        now = plan.start + count[0] * dt
-        course.clock[0] = now
-        power_in, power_out = acceleration(model, system, mass, course.u, ahead, now, a, work, s)
-        tally[0] += 0.5 * dt * (tally[2] + power_in)
-        tally[1] += 0.5 * dt * (tally[3] + power_out)
-        tally[2], tally[3] = power_in, power_out
+            ahead[i] = v[i] + 0.5 * dt * fa[i]
+        now = plan.start + step * dt
+        power_in, power_out = acceleration(
+            model, system, mass, course.u, s.stage[0], now, a, work, s
+        )
         wrong = 0
-        for i in range(u.size):
+        for i in range(low, high):
             v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
             wrong += not abs(v[i]) < np.inf
-        if wrong > 0:
-            return NOT_FINITE, -1
-        found, hinge = observe(
-            model, system, mass, course, a, now, count, plan.every, angle_now, angle, out, s
-        )
+        tell(team, 0.5 * dt * (powers[0] + power_in), 0.5 * dt * (powers[1] + power_out), wrong)
+        powers[0], powers[1] = power_in, power_out
+        if team.number == 0:
+            course.count[3] += 1
+        found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
         if found != DONE:
             return found, hinge
     return DONE, -1

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.dynamics.system import record
 from foldyn.materials.compiled import kernel, scalar
+from foldyn.mechanics import largest, part, total, wait
+
+WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
 
 
 class Plan(NamedTuple):
@@ -58,16 +61,19 @@ def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
 
 
 @scalar
-def passed_through(now, before):
-    """Hinge whose dihedral jumped by more than pi, or -1; `before` (nh,) becomes `now`."""
+def passed_through(now, before, first, last):
+    """Hinge from first to last whose dihedral jumped by more than pi, or -1.
+
+    The dihedrals `before` (nh,) become those `now`.
+    """
     jumps = 0
-    for e in range(now.size):
+    for e in range(first, last):
         jumps += abs(now[e] - before[e]) > np.pi
     if jumps > 0:
-        for e in range(now.size):
+        for e in range(first, last):
             if abs(now[e] - before[e]) > np.pi:
                 return e
-    for e in range(now.size):
+    for e in range(first, last):
         before[e] = now[e]
     return -1
 
@@ -88,16 +94,41 @@ def sample(model, system, mass, u, v, a, t, course, out, s):
 
 
 @scalar
-def observe(model, system, mass, course, a, t, count, every, now, before, out, s):
-    """Look for panels that passed through each other, and sample every `every` steps.
+def tell(team, work_in, work_out, wrong):
+    """Tell the team what a step came to: work, energy dissipated (J), values not finite."""
+    note = team.note[team.number]
+    note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
 
-    Methods with a fixed step call it at t_n after `acceleration`, perhaps twice at the end of a
-    stretch; now and before are the dihedrals (nh,) at this step and at the last. Returns
-    (outcome, hinge).
+
+@scalar
+def observe(model, system, mass, course, a, step, plan, out, work, s):
+    """What follows `acceleration` at the time of a step, with a fixed step; all of a team call it.
+
+    The works that the members have told are added up. Motions that are no longer finite and
+    panels that passed through each other end the motion, and every plan.every steps a sample is
+    written. Returns (outcome, hinge), the same to all.
     """
-    hinge = passed_through(now, before)
+    team, count = work.team, course.count
+    wait(team)  # for the others' accelerations, dihedrals and notes
+    t = plan.start + step * plan.dt
+    wrong = total(team, WRONG)
+    first, last = part(team, work.angle.size)
+    hinge = passed_through(work.angle, course.angle, first, last)
+    team.note[team.number, HINGE] = hinge
+    wait(team)
+    hinge = int(largest(team, HINGE))
+    if team.number == 0:
+        course.tally[0] += total(team, WORK)
+        course.tally[1] += total(team, DISSIPATED)
+        course.clock[0] = t
+        count[0] = step
+        found = DONE
+        if wrong == 0.0 and hinge < 0 and step == count[1] * plan.every:
+            found = sample(model, system, mass, course.u, course.v, a, t, course, out, s)
+        team.note[0, FOUND] = found
+    wait(team)
+    if wrong > 0.0:
+        return NOT_FINITE, -1
     if hinge >= 0:
         return PENETRATION, hinge
-    if count[0] == count[1] * every:
-        return sample(model, system, mass, course.u, course.v, a, t, course, out, s), -1
-    return DONE, -1
+    return int(team.note[0, FOUND]), -1

@@ -188,7 +188,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             clock[1] = h * max(0.2, min(factor, 0.9))
             count[2] += 1
             continue
-        hinge = passed_through(work.angle, course.angle)
+        hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return PENETRATION, hinge
         after = plan.end if h == plan.end - t else t + h

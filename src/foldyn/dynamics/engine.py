@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import Course, Plan, Samples
-from foldyn.dynamics.system import Packed, scratch
-from foldyn.mechanics import workspace
+from foldyn.dynamics.system import Packed, scratches
+from foldyn.mechanics import run_together, threads_for, workspaces
 
 
 class Engine(Protocol):
-    """Integrator with the case and the memory that it works with."""
+    """Integrator with the case and the memory that it works with.
+
+    Attributes
+    ----------
+    threads : int
+        Threads that it runs on.
+    """
+
+    threads: int
 
     def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge)."""
@@ -19,14 +28,43 @@ class Engine(Protocol):
 
 
 class Compiled:
-    """An explicit method, whose whole loop is compiled."""
+    """An explicit method, whose whole loop is compiled.
 
-    def __init__(self, advance: Callable[..., tuple[int, int]], packed: Packed) -> None:
+    Parameters
+    ----------
+    advance : callable
+        The loop; see `rk4.advance`.
+    packed : Packed
+        The case.
+    threads : int
+        On how many threads it shall run at most; fewer where elements reach too far.
+    """
+
+    def __init__(
+        self, advance: Callable[..., tuple[int, int]], packed: Packed, threads: int
+    ) -> None:
         self._loop, self._packed = advance, packed
-        self._work = workspace(packed.model)
-        self._memory = scratch(len(packed.model.rest), len(packed.system.waves.code))
+        self._works = workspaces(packed.model, threads)
+        self._memories = scratches(packed.system, self._works)
+        self.threads = len(self._works)
 
     def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         """See `Engine`."""
         model, system, mass = self._packed.model, self._packed.system, self._packed.mass
-        return self._loop(model, system, mass, course, plan, out, self._work, self._memory, stretch)
+        arguments = [
+            (model, system, mass, course, plan, out, work, memory, stretch)
+            for work, memory in zip(self._works, self._memories, strict=True)
+        ]
+        return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+
+
+def threads_of(packed: Packed) -> int:
+    """Threads on which a motion of a case runs fastest.
+
+    One where something would have to be done by each of them: functions of the user, moving
+    supports, actuated folds, the substitutions of a consistent mass matrix.
+    """
+    system = packed.system
+    called = bool((system.waves.code == CALLED).any())
+    alone = system.moves or system.turns or called or not packed.mass.lumped
+    return 1 if alone else threads_for(packed.model)

@@ -15,7 +15,6 @@ from scipy.sparse import linalg
 
 from foldyn.errors import InputError
 from foldyn.materials.compiled import kernel, scalar, summing
-from foldyn.mechanics.flat import flat
 
 
 class Inertia(NamedTuple):
@@ -145,20 +144,12 @@ def times_mass(m, v, out):
                 out[i, c] += value * v[j, c]
 
 
-@scalar
-def solve_mass(m, r, a, scratch):
-    """Solve M a = r on free dofs; a is zero on fixed ones. scratch holds n numbers."""
-    if m.lumped:
-        left, right, inverse = flat(a), flat(r), flat(m.inverse)
-        for i in range(left.size):
-            left[i] = right[i] * inverse[i]
-    else:
-        substitute(m, r, a, scratch)
-
-
 @kernel
 def substitute(m, r, a, scratch):
-    """Solve M a = r with the factors of a consistent matrix."""
+    """Solve M a = r with the factors of a consistent matrix; a is zero on fixed dofs.
+
+    scratch holds n numbers.
+    """
     a[:] = 0.0
     for c in range(3):
         k = m.factor_of_axis[c]
@@ -181,9 +172,9 @@ def substitute(m, r, a, scratch):
 
 
 @summing
-def _lumped_sum(diagonal, v):
+def _lumped_sum(diagonal, v, first, last):
     total = 0.0
-    for i in range(diagonal.size):
+    for i in range(first, last):
         total += diagonal[i] * (v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
     return total
 
@@ -191,11 +182,17 @@ def _lumped_sum(diagonal, v):
 @scalar
 def kinetic_energy(m, v, product):
     """v M v / 2 (J), v (n, 3); product (n, 3) is scratch, used if the matrix is not diagonal."""
-    n, total = v.shape[0], 0.0
+    return own_kinetic_energy(m, v, product, (0, v.shape[0]))
+
+
+@scalar
+def own_kinetic_energy(m, v, product, own):
+    """`kinetic_energy` of the nodes own[0] to own[1], of all if the matrix is not diagonal."""
     if m.lumped:
-        return 0.5 * _lumped_sum(m.diagonal, v)
+        return 0.5 * _lumped_sum(m.diagonal, v, own[0], own[1])
+    total = 0.0
     times_mass(m, v, product)
-    for i in range(n):
+    for i in range(v.shape[0]):
         for c in range(3):
             total += v[i, c] * product[i, c]
     return 0.5 * total

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from foldyn.cases import Case
 from foldyn.dynamics import central_difference, dormand_prince, rk4
-from foldyn.dynamics.engine import Compiled, Engine
+from foldyn.dynamics.engine import Compiled, Engine, threads_of
 from foldyn.dynamics.stability import Growth
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
@@ -31,7 +31,7 @@ class Method(NamedTuple):
 
     def engine(self, case: Case, packed: Packed) -> Engine:
         """The method with a case and the memory that it works with."""
-        return Compiled(self.advance, packed)
+        return Compiled(self.advance, packed, 1 if self.adaptive else threads_of(packed))
 
 
 METHODS: Mapping[str, Method] = {

@@ -45,7 +45,7 @@ class Motion:
         self._begin, self._packed = begin, packed
         self._course, self._out = begin(), self._room(0)
         self.at_rest = not (self._course.u.any() or self._course.v.any())
-        self.seconds = 0.0
+        self.seconds, self.threads = 0.0, 1
 
     @property
     def expected_samples(self) -> int:
@@ -72,7 +72,8 @@ class Motion:
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
         engine = self.method.engine(self.case, self._packed)
-        memory = scratch(len(course.u), len(system.waves.code))
+        self.threads = engine.threads
+        memory = scratch(system)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
         began = None
@@ -213,6 +214,7 @@ class Motion:
             "every": plan.every,
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
+            "threads": self.threads,
             "energy_error": self._relative_error(),
             "started_from": "rest" if self.at_rest else "state",
         }

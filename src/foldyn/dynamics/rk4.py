@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import observe
-from foldyn.dynamics.outcome import DONE, NOT_FINITE
+from foldyn.dynamics.course import observe, tell
+from foldyn.dynamics.outcome import DONE
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
-from foldyn.materials.compiled import kernel
+from foldyn.mechanics import shared
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 
@@ -25,62 +25,57 @@ def growth(omega, damping, dt):
     return np.abs(1.0 + z * (1.0 + z * (1.0 / 2.0 + z * (1.0 / 6.0 + z / 24.0)))).max(axis=0)
 
 
-@kernel
+@shared
 def advance(model, system, mass, course, plan, out, work, s, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
-    Work and dissipated energy are integrated with the method's own weights.
+    Work and dissipated energy are integrated with the method's own weights. Each thread of a team
+    advances its own nodes.
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    u, v, dt = course.u, course.v, plan.dt
-    count, tally, angle, angle_now = course.count, course.tally, course.angle, work.angle
-    n = u.size
-    ut, vt = np.empty_like(u), np.empty_like(u)
-    du, dv, a = np.empty_like(u), np.empty_like(u), np.empty_like(u)
-    fu, fv, fut, fvt = flat(u), flat(v), flat(ut), flat(vt)
-    fdu, fdv, fa = flat(du), flat(dv), flat(a)
-    for i in range(n):
-        fut[i], fvt[i] = fu[i], fv[i]
-    begun = count[0]
-    for step in range(begun, min(begun + stretch, plan.steps) + 1):
+    dt, team = plan.dt, work.team
+    low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
+    u, v = flat(course.u), flat(course.v)
+    stage_u, stage_v, a = s.stage[0], s.stage[1], s.stage[2]
+    ut, vt, fa = flat(stage_u), flat(stage_v), flat(a)
+    du, dv = flat(s.stage[3]), flat(s.stage[4])
+    for i in range(low, high):
+        ut[i], vt[i] = u[i], v[i]
+    begun = course.count[0]
+    end = min(begun + stretch, plan.steps)
+    tell(team, 0.0, 0.0, 0)
+    for step in range(begun, end + 1):
         now = plan.start + step * dt
-        count[0] = step
         work_in, work_out, wrong = 0.0, 0.0, 0
         for stage in range(4):
             t = now + 0.5 * ((stage + 1) // 2) * dt
-            power_in, power_out = acceleration(model, system, mass, ut, vt, t, a, work, s)
+            power_in, power_out = acceleration(model, system, mass, stage_u, stage_v, t, a, work, s)
             weight = 2.0 if 0 < stage < 3 else 1.0
             work_in += weight * power_in
             work_out += weight * power_out
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
-                found, hinge = observe(
-                    model, system, mass, course, a, now, count, plan.every, angle_now, angle, out, s
-                )
-                if found != DONE or step == begun + stretch or step == plan.steps:
-                    course.clock[0] = now
+                found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+                if found != DONE or step == end:
                     return found, hinge
-                for i in range(n):
-                    fdu[i], fdv[i] = fvt[i], fa[i]
-                    fut[i] = fu[i] + ahead * fvt[i]
-                    fvt[i] = fv[i] + ahead * fa[i]
+                for i in range(low, high):
+                    du[i], dv[i] = vt[i], fa[i]
+                    ut[i] = u[i] + ahead * vt[i]
+                    vt[i] = v[i] + ahead * fa[i]
             elif stage < 3:
-                for i in range(n):
-                    fdu[i] += 2.0 * fvt[i]
-                    fdv[i] += 2.0 * fa[i]
-                    fut[i] = fu[i] + ahead * fvt[i]
-                    fvt[i] = fv[i] + ahead * fa[i]
+                for i in range(low, high):
+                    du[i] += 2.0 * vt[i]
+                    dv[i] += 2.0 * fa[i]
+                    ut[i] = u[i] + ahead * vt[i]
+                    vt[i] = v[i] + ahead * fa[i]
             else:
-                for i in range(n):
-                    fu[i] += dt / 6.0 * (fdu[i] + fvt[i])
-                    fv[i] += dt / 6.0 * (fdv[i] + fa[i])
-                    fut[i], fvt[i] = fu[i], fv[i]
-                    wrong += not abs(fv[i]) < np.inf
-        tally[0] += dt / 6.0 * work_in
-        tally[1] += dt / 6.0 * work_out
-        count[3] += 4
-        if wrong > 0:
-            course.clock[0] = now + dt
-            return NOT_FINITE, -1
+                for i in range(low, high):
+                    u[i] += dt / 6.0 * (du[i] + vt[i])
+                    v[i] += dt / 6.0 * (dv[i] + fa[i])
+                    ut[i], vt[i] = u[i], v[i]
+                    wrong += not abs(v[i]) < np.inf
+        tell(team, dt / 6.0 * work_in, dt / 6.0 * work_out, wrong)
+        if team.number == 0:
+            course.count[3] += 4
     return DONE, -1

@@ -57,7 +57,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Course:
     """State of the integrators at the start of a motion with displacement u and velocity v."""
     model, system, mass, callbacks, by = packed
-    s = scratch(len(u), len(system.waves.code))
+    s = scratch(system)
     place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
     if callbacks.error is not None:
         raise callbacks.error

@@ -9,6 +9,7 @@ advances q and w as if the supports stood still.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,20 +24,20 @@ from foldyn.dynamics.inertia import (
     Inertia,
     inertia,
     kinetic_energy,
-    solve_mass,
+    own_kinetic_energy,
     substitute,
     times_mass,
 )
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.materials.compiled import kernel, scalar
-from foldyn.mechanics import BarsHinges, internal_force, strain_energies
+from foldyn.mechanics import BarsHinges, Workspace, internal_force, strain_energies, wait
 from foldyn.mechanics.flat import flat
 
 
 class Entries(NamedTuple):
     """Nodal vectors times histories: value[k] stands at dof[k] and belongs to history row[k]."""
 
-    dof: NDArray  # (l,) 3 place + axis
+    dof: NDArray  # (l,) 3 place + axis, in increasing order
     value: NDArray  # (l,)
     row: NDArray  # (l,) of the waveforms
 
@@ -61,7 +62,10 @@ class System(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of one evaluation of the equation of motion."""
+    """Memory of one evaluation of the equation of motion.
+
+    Threads share it but for the histories, the range of the loads and the powers.
+    """
 
     force: NDArray  # (n, 3) F_int + beta K0 v - p
     product: NDArray  # (n, 3) the mass matrix times a vector
@@ -72,6 +76,9 @@ class Scratch(NamedTuple):
     displacement: NDArray  # (n, 3) u, where supports move at every evaluation
     velocity: NDArray  # (n, 3) v likewise
     moving: NDArray  # (n, 3) acceleration with that of the supports, at samples
+    stage: NDArray  # (5, n, 3) for methods of several stages
+    loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes
+    powers: NDArray  # (2,) in and out, at the last step, for methods that keep them, W
 
 
 class Packed(NamedTuple):
@@ -131,10 +138,10 @@ def _entries(terms, histories) -> Entries:
         dofs.append(where)
         values.append(entries[where])
         rows.append(np.full(len(where), histories.index(history)))
+    dof = np.concatenate(dofs).astype(np.int64)
+    order = np.argsort(dof, kind="stable")
     return Entries(
-        np.concatenate(dofs).astype(np.int64),
-        np.concatenate(values),
-        np.concatenate(rows).astype(np.int64),
+        dof[order], np.concatenate(values)[order], np.concatenate(rows).astype(np.int64)[order]
     )
 
 
@@ -157,12 +164,31 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
     return out
 
 
-def scratch(nodes: int, histories: int) -> Scratch:
-    """Memory for a model of so many nodes and histories."""
+def scratch(system: System) -> Scratch:
+    """Memory for one thread that has all nodes."""
+    nodes, histories = len(system.order), len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
-    never = np.full(1, np.nan)
-    return Scratch(force, product, line, energy, never, factor, displacement, velocity, moving)
+    never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
+    stage, powers = np.zeros((5, nodes, 3)), np.zeros(2)
+    return Scratch(
+        force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
+        powers,
+    )  # fmt: skip
+
+
+def scratches(system: System, works: Sequence[Workspace]) -> list[Scratch]:
+    """Memory of each thread of a team."""
+    whole = scratch(system)
+    return [
+        whole._replace(
+            powers=np.zeros(2),
+            time=whole.time.copy(),
+            factor=whole.factor.copy(),
+            loads=np.searchsorted(system.loads.dof, 3 * work.strips.own),
+        )
+        for work in works
+    ]
 
 
 @kernel
@@ -212,7 +238,10 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
 
     q'' = - M^-1 (F_int + beta K0 v - p) - alpha w on free dofs. Returns the power of loads,
     supports and actuators, and the power dissipated (W). The bracket stays in `s.force`.
+
+    A member of a team computes this for its own nodes, q and w changed there only.
     """
+    first, last = 3 * work.strips.own[0], 3 * work.strips.own[1]
     if system.varies and t != s.time[0]:  # two stages of a step may share their time
         evaluate(system.waves, t, system.moves or system.turns, s.factor)
         s.time[0] = t
@@ -222,27 +251,35 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         _carry(system.moved, s.factor, q, w, s.displacement, s.velocity)
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
+    wait(work.team)  # for q and w of the others
     internal_force(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
     loads = system.loads
-    for k in range(loads.dof.size):
+    for k in range(s.loads[0], s.loads[1]):
         dof = loads.dof[k]
         load = loads.value[k] * s.factor[loads.row[k], 0]
         force[dof] -= load
         power_in += load * speed[dof]
-    for i in range(system.stiff_indptr.size - 1):
-        viscous = 0.0
-        for p in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-            viscous += system.stiff_data[p] * speed[system.stiff_indices[p]]
-        force[i] += viscous
-        power_out += viscous * speed[i]
-    solve_mass(mass, s.force, out, s.line)
+    if system.stiff_data.size > 0:
+        for i in range(first, last):
+            viscous = 0.0
+            for p in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
+                viscous += system.stiff_data[p] * speed[system.stiff_indices[p]]
+            force[i] += viscous
+            power_out += viscous * speed[i]
+        wait(work.team)  # others look at this member's velocities
     accelerated, alpha, relative = flat(out), system.alpha, flat(w)
-    for i in range(relative.size):
-        accelerated[i] = -accelerated[i] - alpha * relative[i]
+    if mass.lumped:
+        inverse = flat(mass.inverse)
+        for i in range(first, last):
+            accelerated[i] = -force[i] * inverse[i] - alpha * relative[i]
+    else:  # on one thread only
+        substitute(mass, s.force, out, s.line)
+        for i in range(first, last):
+            accelerated[i] = -accelerated[i] - alpha * relative[i]
     if alpha > 0.0:
-        power_out += 2.0 * alpha * kinetic_energy(mass, v, s.product)
+        power_out += 2.0 * alpha * own_kinetic_energy(mass, v, s.product, work.strips.own)
     if system.moves:
         power_in += _moving_power(system.moved, system.moved_mass, alpha, s.force, s.factor)
     if system.turns:

@@ -5,7 +5,15 @@ from foldyn.mechanics.force import Workspace, internal_force, workspace, workspa
 from foldyn.mechanics.model import BarsHinges, Hinges, build
 from foldyn.mechanics.renumber import node_order, renumber
 from foldyn.mechanics.tangent import Sparsity, sparsity, tangent
-from foldyn.mechanics.threads import part, run_together, shared, threads_for, wait
+from foldyn.mechanics.threads import (
+    largest,
+    part,
+    run_together,
+    shared,
+    threads_for,
+    total,
+    wait,
+)
 
 __all__ = [
     "BarsHinges",
@@ -15,6 +23,7 @@ __all__ = [
     "angles",
     "build",
     "internal_force",
+    "largest",
     "node_order",
     "part",
     "renumber",
@@ -24,6 +33,7 @@ __all__ = [
     "strain_energies",
     "tangent",
     "threads_for",
+    "total",
     "wait",
     "workspace",
     "workspaces",

@@ -42,13 +42,14 @@ class Team(NamedTuple):
     size: int
     number: int  # of this member, 0..size - 1
     state: NDArray  # (24,) int64, of the whole team
+    note: NDArray  # (size, 8), a cache line for what each member tells the others
     pause: int  # see `_pause`
 
 
 def team(size: int) -> list[Team]:
     """Members of a team of `size` threads."""
-    state = np.zeros(24, np.int64)
-    return [Team(size, number, state, _pause()) for number in range(size)]
+    state, note = np.zeros(24, np.int64), np.zeros((size, 8))
+    return [Team(size, number, state, note, _pause()) for number in range(size)]
 
 
 @cache
@@ -171,6 +172,24 @@ def wait(team):
     """Wait until all members have come here; then what they wrote before can be read."""
     if team.size > 1:
         _wait(team)
+
+
+@scalar
+def total(team, k):
+    """Sum of note k of all members, in the same order on each: after a `wait` for them."""
+    out = 0.0
+    for member in range(team.size):
+        out += team.note[member, k]
+    return out
+
+
+@scalar
+def largest(team, k):
+    """Largest note k of all members: after a `wait` for them."""
+    out = team.note[0, k]
+    for member in range(1, team.size):
+        out = max(out, team.note[member, k])
+    return out
 
 
 @scalar
