@@ -10,27 +10,27 @@ from problem import Problem
 
 from foldyn.dynamics import rk4
 from foldyn.dynamics.course import Plan, samples
+from foldyn.dynamics.engine import Compiled
 from foldyn.dynamics.start import begin
-from foldyn.dynamics.system import pack, scratch
+from foldyn.dynamics.system import pack
 from foldyn.mechanics import internal_force, workspace
 
 
 class FoldynEngine:
     """The compiled loop that `simulate` runs, called directly so that nothing is recorded."""
 
-    name = "Foldyn"
-
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, threads: int = 1) -> None:
+        self.name = "Foldyn" if threads == 1 else f"Foldyn, {threads} threads"
         self.problem = problem
         self.packed = pack(problem.case, problem.dt)
-        self.work = workspace(self.packed.model)
-        self.memory = scratch(len(problem.rest), len(self.packed.system.waves.code))
+        self.engine = Compiled(rk4.advance, self.packed, threads)
         self._back = np.argsort(problem.order)
 
     def force(self, u: NDArray) -> NDArray:
         """Internal force (n, 3) at displacement u (n, 3), both in the twins' order."""
         out, by = np.empty_like(u), self.packed.numbering
-        internal_force(self.packed.model, by.inward(u[self._back]), out, self.work)
+        model = self.packed.model
+        internal_force(model, by.inward(u[self._back]), out, workspace(model))
         return by.outward(out)[self.problem.order]
 
     def run(self, steps: int) -> tuple[float, NDArray]:
@@ -44,9 +44,8 @@ class FoldynEngine:
         course = begin(case, start, np.zeros_like(start), plan, packed)
         course.count[1] = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
-        arguments = packed.model, packed.system, packed.mass, course, plan, out
         began = time.perf_counter()
-        code, _ = rk4.advance(*arguments, self.work, self.memory, steps)
+        code, _ = self.engine.advance(course, plan, out, steps)
         seconds = time.perf_counter() - began
         if code:
             raise RuntimeError(f"Foldyn's loop stopped with code {code}")

@@ -2,7 +2,8 @@
 
 All engines get the same Miura sheets and must first agree on the force and on a short motion.
 Then each is timed in turn, again and again, on one thread, so that what else the machine does hits
-all alike. The table gives minima with medians beside them; progress goes to stderr.
+all alike; where Foldyn would use a second thread it is timed with it, too. The table gives minima
+with medians beside them; progress goes to stderr.
 """
 
 # ruff: noqa: E402  (the environment must be set before the imports)
@@ -32,6 +33,8 @@ from numpy_twin import NumpyTwin
 from problem import LAWS, Problem, make
 from table import HEADINGS, Row, markdown, row, write_csv
 
+from foldyn.mechanics.threads import HINGES_EACH
+
 SIZES = ("1x1", "4x3", "10x10", "30x30", "100x100", "300x300")
 SLOW = {"NumPy", "JAX"}
 FORCE_TOLERANCE = 1e-12  # relative to the largest force: order of summation and fused operations
@@ -39,6 +42,7 @@ MOTION_STEPS = 20
 LARGE = 500_000  # dofs from which the motion is compared after fewer steps
 LARGE_STEPS = 3
 MOTION_TOLERANCE = 1e-11  # relative to the largest displacement
+MOST_THREADS = 2
 LENGTHS_LOSE = 1e3  # bars from lengths of positions far from the origin cancel digits
 # four evaluations of MERLIN2's force in GNU Octave at 333 dof; see docs/benchmarks.md
 MERLIN2_MICROSECONDS = 8800.0
@@ -51,7 +55,10 @@ def say(text: str) -> None:
 
 def engines(problem: Problem, library: object, skip: set[str]) -> list:
     """Foldyn first, then every twin that can run here."""
-    found = [FoldynEngine(problem)]
+    found: list = [FoldynEngine(problem)]
+    cores = min(MOST_THREADS, os.cpu_count() or 1)
+    if cores > 1 and len(problem.hinges) >= 2 * HINGES_EACH:
+        found.append(FoldynEngine(problem, min(cores, len(problem.hinges) // HINGES_EACH)))
     if library is not None:
         found += [cpp_twin.CppTwin(problem, library, name) for name in cpp_twin.kinds(library)]
     if "NumPy" not in skip:

@@ -14,7 +14,7 @@ Row = list[str]
 RATIOS = ("C++", "C++ from lengths", "C++ AVX-512", "C++ AVX-512 from lengths")
 HEADINGS = (
     "laws", "cells", "dofs", "hinges", "us/step", "median", "ns/hinge",
-    *(f"/ {name}" for name in RATIOS), "NumPy /", "JAX /", "flop %", "memory %",
+    *(f"/ {name}" for name in RATIOS), "2 threads /", "NumPy /", "JAX /", "flop %", "memory %",
 )  # fmt: skip
 
 
@@ -43,6 +43,7 @@ def row(
         f"{1e6 * np.median(times['Foldyn']):.4g}",
         f"{1e9 * best / 4 / hinges:.1f}",
         *(ratio(times, "Foldyn", name) for name in RATIOS),
+        ratio(times, "Foldyn, 2 threads", "Foldyn"),
         ratio(times, "NumPy", "Foldyn"),
         ratio(times, "JAX", "Foldyn"),
         f"{100.0 * problem.flop / best / peak:.0f}",

@@ -50,7 +50,8 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
     dt, team, a = plan.dt, work.team, course.carry
     low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
-    u, v, fa, ahead = flat(course.u), flat(course.v), flat(a), flat(s.stage[0])
+    u, v = flat(course.u)[low:high], flat(course.v)[low:high]
+    fa, ahead = flat(a)[low:high], flat(s.stage[0])[low:high]
     powers = s.powers
     begun = course.count[0]
     end = min(begun + stretch, plan.steps)
@@ -63,7 +64,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if found != DONE:
             return found, hinge
     for step in range(begun + 1, end + 1):
-        for i in range(low, high):
+        for i in range(u.size):
             v[i] += 0.5 * dt * fa[i]
             u[i] += dt * v[i]
             ahead[i] = v[i] + 0.5 * dt * fa[i]
@@ -72,7 +73,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             model, system, mass, course.u, s.stage[0], now, a, work, s
         )
         wrong = 0
-        for i in range(low, high):
+        for i in range(u.size):
             v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
             wrong += not abs(v[i]) < np.inf
         tell(team, 0.5 * dt * (powers[0] + power_in), 0.5 * dt * (powers[1] + power_out), wrong)

@@ -172,9 +172,9 @@ def substitute(m, r, a, scratch):
 
 
 @summing
-def _lumped_sum(diagonal, v, first, last):
+def _lumped_sum(diagonal, v):
     total = 0.0
-    for i in range(first, last):
+    for i in range(diagonal.size):
         total += diagonal[i] * (v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
     return total
 
@@ -189,7 +189,7 @@ def kinetic_energy(m, v, product):
 def own_kinetic_energy(m, v, product, own):
     """`kinetic_energy` of the nodes own[0] to own[1], of all if the matrix is not diagonal."""
     if m.lumped:
-        return 0.5 * _lumped_sum(m.diagonal, v, own[0], own[1])
+        return 0.5 * _lumped_sum(m.diagonal[own[0] : own[1]], v[own[0] : own[1]])
     total = 0.0
     times_mass(m, v, product)
     for i in range(v.shape[0]):

@@ -36,11 +36,11 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
     dt, team = plan.dt, work.team
     low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
-    u, v = flat(course.u), flat(course.v)
     stage_u, stage_v, a = s.stage[0], s.stage[1], s.stage[2]
-    ut, vt, fa = flat(stage_u), flat(stage_v), flat(a)
-    du, dv = flat(s.stage[3]), flat(s.stage[4])
-    for i in range(low, high):
+    u, v = flat(course.u)[low:high], flat(course.v)[low:high]
+    ut, vt, fa = flat(stage_u)[low:high], flat(stage_v)[low:high], flat(a)[low:high]
+    du, dv = np.empty_like(u), np.empty_like(v)
+    for i in range(u.size):
         ut[i], vt[i] = u[i], v[i]
     begun = course.count[0]
     end = min(begun + stretch, plan.steps)
@@ -59,22 +59,23 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                 found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
                 if found != DONE or step == end:
                     return found, hinge
-                for i in range(low, high):
+                for i in range(u.size):
                     du[i], dv[i] = vt[i], fa[i]
                     ut[i] = u[i] + ahead * vt[i]
                     vt[i] = v[i] + ahead * fa[i]
             elif stage < 3:
-                for i in range(low, high):
+                for i in range(u.size):
                     du[i] += 2.0 * vt[i]
                     dv[i] += 2.0 * fa[i]
                     ut[i] = u[i] + ahead * vt[i]
                     vt[i] = v[i] + ahead * fa[i]
             else:
-                for i in range(low, high):
+                for i in range(u.size):
                     u[i] += dt / 6.0 * (du[i] + vt[i])
                     v[i] += dt / 6.0 * (dv[i] + fa[i])
-                    ut[i], vt[i] = u[i], v[i]
                     wrong += not abs(v[i]) < np.inf
+                for i in range(u.size):
+                    ut[i], vt[i] = u[i], v[i]
         tell(team, dt / 6.0 * work_in, dt / 6.0 * work_out, wrong)
         if team.number == 0:
             course.count[3] += 4

@@ -76,7 +76,7 @@ class Scratch(NamedTuple):
     displacement: NDArray  # (n, 3) u, where supports move at every evaluation
     velocity: NDArray  # (n, 3) v likewise
     moving: NDArray  # (n, 3) acceleration with that of the supports, at samples
-    stage: NDArray  # (5, n, 3) for methods of several stages
+    stage: NDArray  # (3, n, 3) for methods of several stages
     loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes
     powers: NDArray  # (2,) in and out, at the last step, for methods that keep them, W
 
@@ -170,7 +170,7 @@ def scratch(system: System) -> Scratch:
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
     never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
-    stage, powers = np.zeros((5, nodes, 3)), np.zeros(2)
+    stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
     return Scratch(
         force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
         powers,
@@ -269,14 +269,15 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
             force[i] += viscous
             power_out += viscous * speed[i]
         wait(work.team)  # others look at this member's velocities
-    accelerated, alpha, relative = flat(out), system.alpha, flat(w)
-    if mass.lumped:
-        inverse = flat(mass.inverse)
-        for i in range(first, last):
-            accelerated[i] = -force[i] * inverse[i] - alpha * relative[i]
-    else:  # on one thread only
+    if not mass.lumped:  # on one thread only
         substitute(mass, s.force, out, s.line)
-        for i in range(first, last):
+    alpha, accelerated, relative = system.alpha, flat(out)[first:last], flat(w)[first:last]
+    if mass.lumped:
+        bracket, inverse = force[first:last], flat(mass.inverse)[first:last]
+        for i in range(bracket.size):
+            accelerated[i] = -bracket[i] * inverse[i] - alpha * relative[i]
+    else:
+        for i in range(relative.size):
             accelerated[i] = -accelerated[i] - alpha * relative[i]
     if alpha > 0.0:
         power_out += 2.0 * alpha * own_kinetic_energy(mass, v, s.product, work.strips.own)
