@@ -97,7 +97,7 @@ def discretize(
     if crease_stiffness is None:
         fold_stiffness = calibrate.fold_stiffness(crease_length, sheet)
     else:
-        per_length = _per_crease("crease_stiffness", crease_stiffness, pattern)
+        per_length = per_crease("crease_stiffness", crease_stiffness, pattern)
         if (per_length < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
         fold_stiffness = per_length * crease_length
@@ -110,7 +110,7 @@ def discretize(
         pattern=pattern,
         folds=mesh.folds,
         fold_stiffness=fold_stiffness,
-        fold_rest=_fold_rest(crease_rest, mesh.folds, x, pattern),
+        fold_rest=fold_rest(crease_rest, mesh.folds, x, pattern),
         bends=mesh.bends,
         bend_stiffness=calibrate.bend_stiffness(mesh, pattern, sheet, merlin2),
         bend_rest=hinge_angles(x, mesh.bends),
@@ -148,7 +148,8 @@ def _given_centers(
     return points
 
 
-def _per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
+def per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
+    """One number for each crease (nf,) from a number, or from one for each."""
     n = len(pattern.creases)
     try:
         array = np.asarray(value, float)
@@ -161,22 +162,31 @@ def _per_crease(field: str, value: float | Sequence[float], pattern: Pattern) ->
     return np.broadcast_to(array, (n,)).copy()
 
 
-def _fold_rest(
-    given: float | Sequence[float] | None, folds: NDArray, x: NDArray, pattern: Pattern
+def fold_rest(
+    given: float | Sequence[float] | None,
+    folds: NDArray,
+    x: NDArray,
+    pattern: Pattern,
+    crease: NDArray | None = None,
 ) -> NDArray:
-    """Rest dihedrals (rad), strictly between closed on one side and closed on the other."""
+    """Rest dihedrals (rad) of hinge rows, strictly between closed on either side.
+
+    crease : crease that each row lies on; the creases in order unless given.
+    """
+    crease = np.arange(len(folds)) if crease is None else crease
     if given is None:
         rest = hinge_angles(x, folds)
         closed = np.flatnonzero((rest < 1e-9) | (rest > 2.0 * np.pi - 1e-9) | np.isnan(rest))
         if len(closed):
-            low, high = pattern.creases[closed[0]]
+            number = crease[closed[0]]
+            low, high = pattern.creases[number]
             raise InputError(
-                f"crease {closed[0]} (vertices {low}, {high}) is folded flat upon itself: open "
+                f"crease {number} (vertices {low}, {high}) is folded flat upon itself: open "
                 "the pattern, or give crease_rest and start from an opened one"
             )
         return rest
-    degrees = _per_crease("crease_rest", given, pattern)
+    degrees = per_crease("crease_rest", given, pattern)
     if ((degrees <= 0.0) | (degrees >= 360.0)).any():
         bad = degrees[(degrees <= 0.0) | (degrees >= 360.0)][0]
         raise InputError(f"crease_rest = {bad:g}: must lie between 0 and 360 degrees (flat: 180)")
-    return np.radians(degrees)
+    return np.radians(degrees)[crease]

@@ -1,0 +1,171 @@
+"""Energy and forces of a shell of triangles, compiled.
+
+Displacements u (n, 3) and rotations x (r,); see `shells.element` and `shells.sides`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.materials.compiled import kernel
+from foldyn.materials.switch import hinge_energy, hinge_moment
+from foldyn.mechanics.dihedral import dihedral_gradient
+
+
+class ShellModel(NamedTuple):
+    """Arrays of a shell: n nodes, g fixed wings, nt triangles, nh hinges, c pieces of creases."""
+
+    rest: NDArray  # (n + g, 3) from the mean of the nodes, m
+    triangles: NDArray  # (nt, 3)
+    side: NDArray  # (nt, 3, 3) rest vectors of the sides, m
+    per_length2: NDArray  # (nt, 3) 1 / L^2
+    membrane: NDArray  # (nt, 3, 3) J
+    bending: NDArray  # (nt, 3, 3) N m
+    hinges: NDArray  # (nh, 4)
+    hinge_rest: NDArray  # (nh,) rad
+    hinge: NDArray  # (nt, 3), and so on as in `Sides`
+    weight: NDArray
+    rotation: NDArray
+    sign: NDArray
+    piece_hinge: NDArray  # (c,)
+    piece_rotations: NDArray  # (c, 2)
+    piece_stiffness: NDArray  # (c,) N m/rad
+    piece_rest: NDArray  # (c,) rad
+    piece_parameters: NDArray  # (c, 4)
+    code: int  # of the creases' law
+    addresses: NDArray  # (3,) of a law of the user's
+
+
+class ShellWork(NamedTuple):
+    """Memory of one evaluation."""
+
+    turn: NDArray  # (nh,) change of the dihedrals, rad
+    gradient: NDArray  # (nh, 12)
+    moment: NDArray  # (nh,) N m
+    piece_turn: NDArray  # (c,) dihedral of each piece of a crease, rad
+
+
+def shell_work(model: ShellModel) -> ShellWork:
+    """Memory for `model`."""
+    nh = len(model.hinges)
+    return ShellWork(
+        np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh), np.zeros(len(model.piece_hinge))
+    )
+
+
+@kernel
+def fold(model, u, x, work):
+    """Dihedrals, their gradients and the dihedrals of the creases at a state."""
+    rest, n = model.rest, u.shape[0]
+    p = np.empty(12)
+    for e in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[e, v]
+            for c in range(3):
+                p[3 * v + c] = rest[node, c] + (u[node, c] if node < n else 0.0)
+        found = dihedral_gradient(
+            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+        )
+        work.turn[e] = found[0] - model.hinge_rest[e]
+        for c in range(12):
+            work.gradient[e, c] = found[1 + c]
+    for k in range(model.piece_hinge.size):
+        e = model.piece_hinge[k]
+        work.piece_turn[k] = (
+            model.hinge_rest[e]
+            + work.turn[e]
+            - x[model.piece_rotations[k, 0]]
+            - x[model.piece_rotations[k, 1]]
+        )
+
+
+@kernel
+def side_strains(model, u, t, out):
+    """Green strains of the sides of a triangle, from displacements."""
+    for k in range(3):
+        a, b = model.triangles[t, k], model.triangles[t, (k + 1) % 3]
+        total = 0.0
+        for c in range(3):
+            du = u[b, c] - u[a, c]
+            total += du * (2.0 * model.side[t, k, c] + du)
+        out[k] = 0.5 * total * model.per_length2[t, k]
+
+
+@kernel
+def side_rotations(model, x, turn, t, out):
+    """Rotations beta of the sheet at the sides of a triangle."""
+    for k in range(3):
+        out[k] = 0.0
+        if model.hinge[t, k] >= 0:
+            out[k] += model.weight[t, k] * turn[model.hinge[t, k]]
+        if model.rotation[t, k] >= 0:
+            out[k] += model.sign[t, k] * x[model.rotation[t, k]]
+
+
+@kernel
+def shell_energy(model, u, x, work, out):
+    """Energies (J) of membrane, bending and creases, to out (3,)."""
+    fold(model, u, x, work)
+    e, beta = np.empty(3), np.empty(3)
+    out[:] = 0.0
+    for t in range(model.triangles.shape[0]):
+        side_strains(model, u, t, e)
+        side_rotations(model, x, work.turn, t, beta)
+        for k in range(3):
+            for m in range(3):
+                out[0] += 0.5 * e[k] * model.membrane[t, k, m] * e[m]
+                out[1] += 0.5 * beta[k] * model.bending[t, k, m] * beta[m]
+    p = model.piece_parameters
+    for k in range(model.piece_hinge.size):
+        w = hinge_energy(
+            model.code, work.piece_turn[k], model.piece_rest[k],
+            p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[0],
+        )  # fmt: skip
+        out[2] += model.piece_stiffness[k] * w
+
+
+@kernel
+def shell_force(model, u, x, force, couple, work):
+    """Internal force (n, 3), N, and internal moments (r,), N m, about the rotations."""
+    fold(model, u, x, work)
+    n = u.shape[0]
+    force[:] = 0.0
+    couple[:] = 0.0
+    work.moment[:] = 0.0
+    e, beta = np.empty(3), np.empty(3)
+    for t in range(model.triangles.shape[0]):
+        side_strains(model, u, t, e)
+        side_rotations(model, x, work.turn, t, beta)
+        for k in range(3):
+            stress, moment = 0.0, 0.0
+            for m in range(3):
+                stress += model.membrane[t, k, m] * e[m]
+                moment += model.bending[t, k, m] * beta[m]
+            stress *= model.per_length2[t, k]
+            a, b = model.triangles[t, k], model.triangles[t, (k + 1) % 3]
+            for c in range(3):
+                pull = stress * (model.side[t, k, c] + u[b, c] - u[a, c])
+                force[b, c] += pull
+                force[a, c] -= pull
+            if model.hinge[t, k] >= 0:
+                work.moment[model.hinge[t, k]] += model.weight[t, k] * moment
+            if model.rotation[t, k] >= 0:
+                couple[model.rotation[t, k]] += model.sign[t, k] * moment
+    p = model.piece_parameters
+    for k in range(model.piece_hinge.size):
+        moment = model.piece_stiffness[k] * hinge_moment(
+            model.code, work.piece_turn[k], model.piece_rest[k],
+            p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1],
+        )  # fmt: skip
+        work.moment[model.piece_hinge[k]] += moment
+        couple[model.piece_rotations[k, 0]] -= moment
+        couple[model.piece_rotations[k, 1]] -= moment
+    for h in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[h, v]
+            if node < n:
+                for c in range(3):
+                    force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]

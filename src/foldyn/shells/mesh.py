@@ -1,0 +1,153 @@
+"""Panels cut into small triangles that fit together along the creases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+
+Edge = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class ShellMesh:
+    """Triangles of all panels.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        The pattern's vertices in order, then points of its edges, then points inside panels, m.
+    triangles, panel : (nt, 3), (nt,)
+        Counter-clockwise from the front, and the panel of each.
+    edge_points : dict
+        Nodes along each edge of the pattern, by (low, high) vertex, from low to high.
+    """
+
+    nodes: NDArray
+    triangles: NDArray
+    panel: NDArray
+    edge_points: dict[Edge, list[int]]
+
+
+class _Points:
+    """Nodes as they are made."""
+
+    def __init__(self, vertices: NDArray) -> None:
+        self.found: list[NDArray] = list(vertices)
+
+    def add(self, point: NDArray) -> int:
+        self.found.append(point)
+        return len(self.found) - 1
+
+    def line(self, a: int, b: int, divisions: int) -> list[int]:
+        """Nodes from a to b, both included, with new ones between them."""
+        x, y = self.found[a], self.found[b]
+        inner = [self.add(x + (y - x) * (step / divisions)) for step in range(1, divisions)]
+        return [a, *inner, b]
+
+
+def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
+    """Cut every edge of a pattern into `divisions` pieces and its panels into triangles.
+
+    Quadrilaterals get a grid with alternating diagonals, triangles are divided evenly, and other
+    polygons are first cut into triangles about their centroid.
+    """
+    points = _Points(pattern.vertices)
+    edges = {
+        (low, high): points.line(low, high, divisions)
+        for low, high in np.concatenate([pattern.creases, pattern.boundary]).tolist()
+    }
+    triangles, panels = [], []
+    for number, face in enumerate(pattern.faces):
+        sides = [_side(edges, a, b) for a, b in _around(face)]
+        if len(face) == 3:
+            found = _divided(points, sides)
+        elif len(face) == 4:
+            found = _grid(points, sides)
+        else:
+            found = _fan(points, sides, divisions)
+        triangles += found
+        panels += [number] * len(found)
+    mesh = ShellMesh(
+        np.array(points.found), np.array(triangles, np.int64), np.array(panels, np.int64), edges
+    )
+    _check(mesh, pattern)
+    return mesh
+
+
+def _around(face: tuple[int, ...]) -> Iterator[Edge]:
+    return zip(face, (*face[1:], face[0]), strict=True)
+
+
+def _side(edges: dict[Edge, list[int]], a: int, b: int) -> list[int]:
+    """Nodes from vertex a to vertex b."""
+    return edges[a, b] if a < b else edges[b, a][::-1]
+
+
+def _grid(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]:
+    """Triangles of a quadrilateral with sides 0-1, 1-2, 2-3, 3-0."""
+    bottom, right, top, left = sides[0], sides[1], sides[2][::-1], sides[3][::-1]
+    n = len(bottom) - 1
+    p, q = points.found[bottom[0]], points.found[bottom[-1]]
+    r, s = points.found[top[-1]], points.found[top[0]]
+    node = np.empty((n + 1, n + 1), np.int64)
+    node[:, 0], node[:, n], node[0], node[n] = bottom, top, left, right
+    for i in range(1, n):
+        for j in range(1, n):
+            x, y = i / n, j / n
+            node[i, j] = points.add((1 - y) * ((1 - x) * p + x * q) + y * ((1 - x) * s + x * r))
+    out = []
+    for i in range(n):
+        for j in range(n):
+            a, b, c, d = node[i, j], node[i + 1, j], node[i + 1, j + 1], node[i, j + 1]
+            out += [(a, b, d), (b, c, d)] if (i + j) % 2 else [(a, b, c), (a, c, d)]
+    return out
+
+
+def _divided(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]:
+    """Triangles of a triangle with sides 0-1, 1-2, 2-0."""
+    n = len(sides[0]) - 1
+    p, q, r = (points.found[side[0]] for side in sides)
+    node = {}
+    for k in range(n + 1):
+        node[k, 0], node[n - k, k], node[0, n - k] = sides[0][k], sides[1][k], sides[2][k]
+    for i in range(1, n):
+        for j in range(1, n - i):
+            node[i, j] = points.add(p + (q - p) * (i / n) + (r - p) * (j / n))
+    out = []
+    for i in range(n):
+        for j in range(n - i):
+            out.append((node[i, j], node[i + 1, j], node[i, j + 1]))
+            if i + j < n - 1:
+                out.append((node[i + 1, j], node[i + 1, j + 1], node[i, j + 1]))
+    return out
+
+
+def _fan(points: _Points, sides: list[list[int]], divisions: int) -> list[tuple[int, int, int]]:
+    """Triangles of a polygon, cut along spokes from its corners to their mean."""
+    corners = [side[0] for side in sides]
+    center = points.add(np.mean([points.found[k] for k in corners], axis=0))
+    spokes = [points.line(k, center, divisions) for k in corners]
+    out = []
+    for k, side in enumerate(sides):
+        out += _divided(points, [side, spokes[(k + 1) % len(sides)], spokes[k][::-1]])
+    return out
+
+
+def _check(mesh: ShellMesh, pattern: Pattern) -> None:
+    """Refuse triangles without area or inside out, naming their panel."""
+    a, b, c = (mesh.nodes[mesh.triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    signed = 0.5 * np.einsum("ij,ij->i", normal, pattern.face_normals[mesh.panel])
+    small = signed <= 1e-9 * pattern.face_areas[mesh.panel]
+    if small.any():
+        number = int(mesh.panel[small][0])
+        raise InputError(
+            f"panel {number} {tuple(pattern.faces[number])}: cannot be meshed: it is not convex "
+            "enough, so that a triangle is flat or inside out; cut it into convex panels"
+        )

@@ -1,0 +1,109 @@
+"""How triangles meet: hinges on their sides, and the rotations at the middle of the sides.
+
+On a side shared by two triangles of one panel the sheet is smooth: with d the change of the
+dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a rotation without mass. On a
+crease each side has a rotation of its own, and the crease turns by what is left of the dihedral,
+d - x - y. Free sides have no moment: their rotation is eliminated in the triangle. A clamped side
+keeps its rest tangent in space: its hinge has a wing that does not move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.patterns import Pattern
+from foldyn.shells.mesh import Edge, ShellMesh
+
+
+class Sides(NamedTuple):
+    """nt triangles with nh hinges, x rotations, c pieces of creases and g fixed wings.
+
+    Side k of a triangle runs from its corner k to k + 1; its rotation is
+    beta = weight d[hinge] + sign x[rotation], where there is a hinge or a rotation (else -1).
+    """
+
+    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; nodes from n on are fixed wings
+    hinge: NDArray  # (nt, 3)
+    weight: NDArray  # (nt, 3)
+    rotation: NDArray  # (nt, 3)
+    sign: NDArray  # (nt, 3)
+    free: NDArray  # (nt, 3) bool
+    rotations: int
+    piece_hinge: NDArray  # (c,)
+    piece_rotations: NDArray  # (c, 2)
+    piece_crease: NDArray  # (c,) number of the pattern's crease
+    wings: NDArray  # (g, 3) m
+
+
+def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> Sides:
+    """Find hinges and rotations of a mesh; `clamped` are boundary edges (low, high)."""
+    crease_of = {
+        pair: number
+        for number, edge in enumerate(map(tuple, pattern.creases.tolist()))
+        for pair in _pieces(mesh.edge_points[edge])
+    }
+    held = {pair for edge in clamped for pair in _pieces(mesh.edge_points[edge])}
+    tri = mesh.triangles
+    n, count = len(mesh.nodes), len(tri)
+    a, b, third = tri.ravel(), np.roll(tri, -1, 1).ravel(), np.roll(tri, -2, 1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    order = np.lexsort((a > b, high, low))  # the triangle that runs low to high comes first
+    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+    one, two = order[:-1][same], order[1:][same]
+    alone = np.setdiff1d(np.arange(3 * count), np.concatenate([one, two]))
+
+    hinges = [np.stack([low[one], high[one], third[one], third[two]], axis=1)]
+    hinge, rotation = np.full((2, 3 * count), -1)
+    weight, sign = np.zeros((2, 3 * count))
+    numbers = np.arange(len(one))
+    folded = mesh.panel[one // 3] != mesh.panel[two // 3]
+    smooth = ~folded
+    for side, turn in ((one, 1.0), (two, -1.0)):
+        hinge[side[smooth]], weight[side[smooth]] = numbers[smooth], 0.5
+        sign[side] = turn
+    rotation[one[smooth]] = rotation[two[smooth]] = np.arange(smooth.sum())
+    pieces = smooth.sum() + np.arange(2 * folded.sum()).reshape(-1, 2)
+    rotation[one[folded]], rotation[two[folded]] = pieces.T
+    sign[one[folded]] = sign[two[folded]] = 1.0
+
+    stiff = [k for k in alone.tolist() if (int(low[k]), int(high[k])) in held]
+    wings = []
+    for k in stiff:
+        hinge[k], weight[k] = len(numbers) + len(wings), 1.0
+        row = (a[k], b[k], third[k], n + len(wings))
+        hinges.append(np.array([row]))
+        wings.append(_mirrored(mesh.nodes[[a[k], b[k], third[k]]]))
+    free = np.zeros(3 * count, bool)
+    free[alone] = True
+    free[stiff] = False
+    pairs = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
+    return Sides(
+        hinges=np.concatenate(hinges).astype(np.int64),
+        hinge=hinge.reshape(-1, 3),
+        weight=weight.reshape(-1, 3),
+        rotation=rotation.reshape(-1, 3),
+        sign=sign.reshape(-1, 3),
+        free=free.reshape(-1, 3),
+        rotations=int(smooth.sum() + 2 * folded.sum()),
+        piece_hinge=numbers[folded],
+        piece_rotations=pieces,
+        piece_crease=np.array([crease_of[pair] for pair in pairs], np.int64),
+        wings=np.array(wings).reshape(-1, 3),
+    )
+
+
+def _pieces(points: list[int]) -> list[Edge]:
+    """Pairs (low, high) of neighbors along an edge."""
+    return [(min(a, b), max(a, b)) for a, b in pairwise(points)]
+
+
+def _mirrored(corners: NDArray) -> NDArray:
+    """Third corner of a triangle, mirrored at its first side in its own plane."""
+    a, b, c = corners
+    foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))
+    return 2.0 * foot - c
