@@ -40,7 +40,7 @@ def test_extrapolated_stress_saves_iterations(monkeypatch):
     """Without it the same step takes half as many again: 11 and 7 iterations."""
     case = sheet(10, thickness=0.24e-3)
     quick = trace(case, load_factors=[1.0])
-    monkeypatch.setattr("foldyn.statics.origami.add_extrapolated_stress", lambda *given: None)
+    monkeypatch.setattr("foldyn.statics.body.add_extrapolated_stress", lambda *given: None)
     plain = trace(case, load_factors=[1.0])
     np.testing.assert_allclose(plain.displacement, quick.displacement, atol=1e-9)
     assert plain.attrs["newton_iterations"] > 1.3 * quick.attrs["newton_iterations"]

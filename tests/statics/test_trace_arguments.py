@@ -120,7 +120,7 @@ def test_start_with_nodes_on_top_of_each_other():
     case = compression()
     u = np.zeros_like(case.structure.nodes)
     u[30] = case.structure.nodes[31] - case.structure.nodes[30]
-    with pytest.raises(InputError, match="start: nodes 30 and 31, which a bar joins"):
+    with pytest.raises(InputError, match="start: the neighboring nodes 30 and 31 fall"):
         trace(case, load_factors=[0.0], start=fd.State(u))
 
 

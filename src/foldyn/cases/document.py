@@ -28,6 +28,7 @@ from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
+from foldyn.shells import Shell, shell
 from foldyn.structures import Sheet, Structure, discretize
 
 LAWS: Mapping[str, Mapping[str, type]] = {
@@ -35,6 +36,7 @@ LAWS: Mapping[str, Mapping[str, type]] = {
     "fold_law": HINGE_LAWS,
     "bend_law": HINGE_LAWS,
 }
+SHELL = "shell"  # the model's kind, where it is not bars and hinges
 PER_CREASE = ("crease_stiffness", "crease_rest")
 
 
@@ -110,7 +112,7 @@ class _Writer:
                 for f in dataclasses.fields(structure.sheet)
                 if (value := getattr(structure.sheet, f.name)) is not None
             },
-            "model": self._model(structure.options),
+            "model": self._model(structure.options) | _kind(structure),
             "damping": dataclasses.asdict(case.damping),
             "supports": [self._support(support) for support in case.supports],
             "loads": [self._load(load) for load in case.loads],
@@ -256,7 +258,11 @@ def _load(item: Mapping[str, Any]) -> Force | Gravity | Actuate:
     return Force(item["nodes"], item["force"], history)
 
 
-def _structure(sections: Mapping[str, Any]) -> Structure:
+def _kind(structure: Any) -> dict[str, str]:
+    return {"kind": SHELL} if isinstance(structure, Shell) else {}
+
+
+def _structure(sections: Mapping[str, Any]) -> Any:
     table = sections["pattern"]
     flat = table["faces"].tolist()
     faces = [flat[start:end] for start, end in pairwise(table["face_offsets"].tolist())]
@@ -270,20 +276,23 @@ def _structure(sections: Mapping[str, Any]) -> Structure:
         warnings.simplefilter("ignore", FoldynWarning)
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
         sheet = Sheet(**sections["sheet"])
-        structure = discretize(pattern, sheet, **model)
+        kind = model.pop("kind", "bars_hinges")
+        structure = (
+            shell(pattern, sheet, **model) if kind == SHELL else discretize(pattern, sheet, **model)
+        )
         if nodes.shape != structure.nodes.shape:
             raise InputError(
                 f"the result holds rest positions of shape {nodes.shape}, its structure has "
                 f"{structure.nodes.shape}: use the whole result, not a selection of its nodes"
             )
-        if not np.array_equal(nodes, structure.nodes):
+        if isinstance(structure, Structure) and not np.array_equal(nodes, structure.nodes):
             # panel centers given by hand, or found to other last digits on another machine
             centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
 
 
-def _same(one: Structure, other: Structure) -> bool:
+def _same(one: Any, other: Any) -> bool:
     """Whether two structures hold the same arrays."""
     for item in dataclasses.fields(one):
         first, second = getattr(one, item.name), getattr(other, item.name)

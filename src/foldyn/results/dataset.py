@@ -25,6 +25,8 @@ ENERGIES: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",
     "strain_folds": "strain energy of the folds",
     "strain_bends": "strain energy of the bends",
+    "strain_membrane": "strain energy of stretching",
+    "strain_bending": "strain energy of bending",
     "dissipated": "energy dissipated by damping since the start",
     "work": "work of the loads since the start",
 }
@@ -53,7 +55,7 @@ def trajectory_dataset(
     reaction : array_like, shape (nt, ns)
         Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
     energies : mapping of str to array_like, shape (nt,)
-        kinetic, strain_bars, strain_folds, strain_bends, dissipated, work (J).
+        kinetic, dissipated, work and the strain energies of the structure's `energy_groups` (J).
     statistics : mapping
         Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the
         stage times t_n and t_n + dt/2 at which functions of time are sampled.
@@ -71,8 +73,8 @@ def trajectory_dataset(
     time = np.array(time, dtype=np.float64)
     data = motion_variables("time", displacement, reaction)
     data["velocity"] = variable(("time", "node", "axis"), velocity, "m/s", "velocity")
-    for name, text in ENERGIES.items():
-        data[name] = variable(("time",), energies[name], "J", text)
+    for name, values in energies.items():
+        data[name] = variable(("time",), values, "J", ENERGIES[name])
     varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
     sampled = any(type(part.history) not in HISTORIES.values() for part in varying)
     times = stage_times(statistics) if sampled else None

@@ -10,14 +10,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
-from foldyn.results.dataset import motion_variables, result_dataset, variable
+from foldyn.results.dataset import ENERGIES, motion_variables, result_dataset, variable
 
-PATH_ENERGIES: Mapping[str, str] = {
-    "strain_bars": "strain energy of the bars",
-    "strain_folds": "strain energy of the folds",
-    "strain_bends": "strain energy of the bends",
-    "work": "work of loads, supports and actuators since the first point",
-}
+WORK = "work of loads, supports and actuators since the first point"
 _KINDS = ("regular", "limit", "bifurcation")
 
 
@@ -44,7 +39,7 @@ def path_dataset(
     reaction : array_like, shape (ns, nd)
         Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
     energies : mapping of str to array_like, shape (ns,)
-        strain_bars, strain_folds, strain_bends, work (J).
+        work and the strain energies of the structure's `energy_groups` (J).
     solution : mapping of str to array_like, shape (ns,)
         How each point was found: negative_eigenvalues (-1 if not counted), point ("regular",
         "limit" or "bifurcation"), iterations, residual.
@@ -60,8 +55,9 @@ def path_dataset(
     """
     factor = np.array(load_factor, dtype=np.float64)
     data = motion_variables("step", displacement, reaction)
-    for name, text in PATH_ENERGIES.items():
-        data[name] = variable(("step",), energies[name], "J", text)
+    for name, values in energies.items():
+        text = WORK if name == "work" else ENERGIES[name]
+        data[name] = variable(("step",), values, "J", text)
     kinds = np.array(solution["point"], dtype=f"<U{max(map(len, _KINDS))}")
     texts = {
         "negative_eigenvalues": "negative eigenvalues of the tangent (unstable if any)",

@@ -23,7 +23,8 @@ from foldyn.shells.sides import Sides, sides
 from foldyn.shells.tangent import ShellPattern, shell_pattern, shell_tangent
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import fold_stiffness
-from foldyn.structures.discretize import fold_rest, per_crease
+from foldyn.structures.discretize import fold_rest as rest_of
+from foldyn.structures.discretize import per_crease
 from foldyn.structures.mass import MASS_RULES, Surface
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
@@ -91,6 +92,11 @@ class Shell:
         )
 
     @property
+    def energy_groups(self) -> tuple[str, ...]:
+        """Names of the parts of the strain energy."""
+        return GROUPS
+
+    @property
     def rotations(self) -> int:
         """Number of rotations beside the displacements."""
         return self.sides.rotations
@@ -99,6 +105,39 @@ class Shell:
     def fold_law(self) -> HingeLaw:
         """Law of the folds."""
         return hinge_law(self.options.fold_law, "fold_law")
+
+    @cached_property
+    def folds(self) -> NDArray:
+        """Hinge row (nf, 4) of the first piece of each crease: axis j, k, wings i, l."""
+        crease, first = np.unique(self.sides.piece_crease, return_index=True)
+        rows = np.zeros((len(self.fold_stiffness), 4), np.int64)
+        rows[crease] = self.sides.hinges[self.sides.piece_hinge[first]]
+        rows.setflags(write=False)
+        return rows
+
+    @cached_property
+    def bars(self) -> NDArray:
+        """Sides of the triangles (nb, 2), each once."""
+        tri = self.triangles
+        ends = np.stack([tri, np.roll(tri, -1, axis=1)], axis=2).reshape(-1, 2)
+        found = np.unique(np.sort(ends, axis=1), axis=0)
+        found.setflags(write=False)
+        return found
+
+    @cached_property
+    def bar_length(self) -> NDArray:
+        """Rest lengths of the sides (nb,), m."""
+        length = np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
+        length.setflags(write=False)
+        return length
+
+    @cached_property
+    def fold_rest(self) -> NDArray:
+        """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
+        crease, count = self.sides.piece_crease, len(self.fold_stiffness)
+        rest = np.bincount(crease, self.piece_rest, count) / np.bincount(crease, minlength=count)
+        rest.setflags(write=False)
+        return rest
 
     @cached_property
     def model(self) -> ShellModel:
@@ -291,7 +330,7 @@ def shell(
         stiffness = per_crease("crease_stiffness", crease_stiffness, pattern) * length
         if (stiffness < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
-    rest = fold_rest(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
+    rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
     return Shell(
         nodes=x,
         triangles=mesh.triangles,

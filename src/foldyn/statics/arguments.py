@@ -157,13 +157,13 @@ def check_case(
 
 def check_start(problem: OrigamiProblem) -> None:
     """Refuse a state in which a bar has no length left."""
-    structure, u = problem.structure, problem.start()
-    x = structure.nodes + u.reshape(structure.nodes.shape)
+    structure = problem.structure
+    x = structure.nodes + problem.displacement(problem.start())
     length = np.linalg.norm(x[structure.bars[:, 1]] - x[structure.bars[:, 0]], axis=1)
     short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
     if short.size:
         one, other = structure.bars[short[0]]
-        raise InputError(f"start: nodes {one} and {other}, which a bar joins, fall together")
+        raise InputError(f"start: the neighboring nodes {one} and {other} fall together")
 
 
 def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:

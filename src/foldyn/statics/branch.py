@@ -91,7 +91,7 @@ def switch_branch(
         raise InputError(f"method = {method!r}: a branch takes 'arc_length' or 'mgdcm'")
     problem = problem_of(path, case, at)
     solver = Solver(problem, settings)
-    crossing = station_of(solver, path, at)
+    crossing = station_of(solver, problem, path, at)
     facts = {
         "method": method,
         "steps": steps,
@@ -146,11 +146,11 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
     return OrigamiProblem(case, constant, displacement, None, relief)
 
 
-def station_of(solver: Solver, path: xarray.Dataset, at: int) -> Station:
+def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at: int) -> Station:
     """A station at a step of a path, as it is stored."""
-    u = path["displacement"].values[at].ravel().copy()
     factor = float(path["load_factor"].values[at])
-    found = balance(solver.problem, u, factor, solver.problem.residual(u, factor))
+    u = problem.actuation.body(factor).dofs(path["displacement"].values[at]).copy()
+    found = balance(problem, u, factor, problem.residual(u, factor))
     station = arrive(solver, Attempt(u, factor, int(path["iterations"].values[at]), found))
     stored: dict[str, Any] = {
         "negative": int(path["negative_eigenvalues"].values[at]),

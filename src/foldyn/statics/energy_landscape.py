@@ -128,7 +128,7 @@ def landscape(
     check_result(path, "path: ")
     problem = problem_of(path, case, 0)
     walker = _Walker(problem, Solver(problem, settings))
-    stations = [station_of(walker.solver, path, k) for k in range(path.sizes["step"])]
+    stations = [station_of(walker.solver, problem, path, k) for k in range(path.sizes["step"])]
     if len(stations) < 2:
         raise InputError("path: a landscape needs at least two points")
     force = np.array([walker.force(s) for s in stations])
@@ -215,7 +215,7 @@ class _Walker:
             stable = stable and station.point.negative <= 0
         else:
             stable = station.stiffness.factors.negative() == 0
-        displacement = station.point.u.reshape(self.problem.structure.nodes.shape).copy()
+        displacement = self.problem.displacement(station.point.u).copy()
         energy = self.energy(station) - float(base)
         return Equilibrium(displacement, self.stroke(station), energy, stable)
 

@@ -24,6 +24,7 @@ from foldyn.mechanics import BarsHinges
 from foldyn.statics.linear_solver import SuperLU
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
+from foldyn.structures import Structure
 
 SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
 SUSPICIOUS = (
@@ -59,8 +60,11 @@ def mechanisms(problem: OrigamiProblem) -> list[str]:
     structure = problem.structure
     held = np.zeros(structure.nodes.size, bool)
     held[problem.held] = True
-    x = structure.nodes + problem.start().reshape(structure.nodes.shape)
-    return name_rigid_motions(x, held) or _internal(problem)
+    x = structure.nodes + problem.displacement(problem.start())
+    found = name_rigid_motions(x, held)
+    if found or not isinstance(structure, Structure):
+        return found  # a shell resists every other motion
+    return _internal(problem)
 
 
 def _internal(problem: OrigamiProblem) -> list[str]:

@@ -31,7 +31,7 @@ from foldyn.statics.settings import Settings
 from foldyn.statics.settle import settle
 from foldyn.statics.station import PathStoppedError, Point, Station, Walk
 from foldyn.statics.stepping import walk
-from foldyn.structures.structure import GROUPS
+from foldyn.structures.structure import hinge_angles
 
 if TYPE_CHECKING:
     import xarray
@@ -175,8 +175,7 @@ def on_nodes(until: Callable[[NDArray, float], bool] | None, problem: OrigamiPro
     """A user's function of displacements (n, 3) as one of flat dofs."""
     if until is None:
         return None
-    shape = problem.structure.nodes.shape
-    return lambda u, factor: bool(until(u.reshape(shape).copy(), factor))
+    return lambda u, factor: bool(until(problem.displacement(u).copy(), factor))
 
 
 class Recorder:
@@ -215,8 +214,8 @@ class Recorder:
         structure = self.problem.structure
         if not self.points or not len(structure.folds):
             return ""
-        state = self.points[-1].u.reshape(structure.nodes.shape)
-        folds = np.degrees(structure.dihedrals(state)[0])
+        state = structure.nodes + self.problem.displacement(self.points[-1].u)
+        folds = np.degrees(hinge_angles(state, structure.folds))
         crease = int(np.argmax(np.abs(folds - 180.0)))
         if abs(folds[crease] - 180.0) < CLOSED:
             return ""
@@ -231,10 +230,9 @@ class Recorder:
     def dataset(self, seconds: float, end: dict[str, Any]) -> xarray.Dataset:
         """The points so far, with the case and the facts about the run."""
         problem, points, tally = self.problem, self.points, self.solver.tally
-        shape = (len(points), *problem.structure.nodes.shape)
         residuals = [problem.residual(p.u, p.factor) for p in points]
         energies = np.array([problem.energies(p.u, p.factor) for p in points])
-        columns = dict(zip(GROUPS, energies.T, strict=True))
+        columns = dict(zip(problem.groups, energies.T, strict=True))
         statistics = {
             **end,
             **self.facts,
@@ -249,7 +247,7 @@ class Recorder:
         return path_dataset(
             problem.case,
             [p.factor for p in points],
-            np.reshape([p.u for p in points], shape),
+            [problem.displacement(p.u) for p in points],
             np.reshape([r[problem.supported] for r in residuals], (len(points), -1)),
             {**columns, "work": self._work(residuals)},
             {

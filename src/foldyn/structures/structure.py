@@ -80,6 +80,11 @@ class Structure:
             f"{len(self.folds)} folds, {len(self.bends)} bends, mass {self.options.mass}>"
         )
 
+    @property
+    def energy_groups(self) -> tuple[str, ...]:
+        """Names of the parts of the strain energy."""
+        return GROUPS
+
     @cached_property
     def bar_length(self) -> NDArray:
         """Rest lengths of the bars (nb,), m."""

@@ -1,0 +1,41 @@
+"""Side strains extrapolated along the last step: what `statics.mixed` is for bars.
+
+The strains that panels get from being moved along straight lines, of second order in their turn,
+are kept out of the geometric stiffness of the next step; the residual sees the true ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.shells.kernels import ShellModel
+from foldyn.shells.tangent import ShellPattern
+
+
+def add_extrapolated_strain(
+    model: ShellModel, pattern: ShellPattern, u: NDArray, before: NDArray, data: NDArray
+) -> None:
+    """Replace the stresses in a tangent's entries `data` at u by those extrapolated to it.
+
+    u, before : (n, 3) states after and before the last step.
+    """
+    old, new = _apart(model, before), _apart(model, u)
+    # e(u) - e(u0) - (D0 . d) / L^2 = |d|^2 / (2 L^2)
+    second = 0.5 * np.einsum("tki,tki->tk", new - old, new - old) * model.per_length2
+    excess = -np.einsum("tkl,tl->tk", model.membrane, second) * model.per_length2
+    slots, values = [], []
+    for k in range(3):
+        ends = (3 * k, 3 * ((k + 1) % 3))
+        for one in ends:
+            for other in ends:
+                for axis in range(3):
+                    slots.append(pattern.triangle[:, one + axis, other + axis])
+                    values.append(excess[:, k] if one == other else -excess[:, k])
+    sums = np.bincount(np.concatenate(slots), np.concatenate(values), len(data) + 1)
+    data += sums[: len(data)]
+
+
+def _apart(model: ShellModel, u: NDArray) -> NDArray:
+    """Relative displacements (nt, 3, 3) of the ends of the sides."""
+    return u[np.roll(model.triangles, -1, axis=1)] - u[model.triangles]
