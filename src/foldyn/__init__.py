@@ -29,6 +29,8 @@ _HOME = {
     "Sheet": "structures",
     "Structure": "structures",
     "discretize": "structures",
+    "shell": "shells",
+    "Shell": "shells",
     "Case": "cases",
     "Fix": "cases",
     "Impose": "cases",
@@ -52,14 +54,18 @@ _HOME = {
     "case_of": "results",
     "trace": "statics",
     "switch_branch": "statics",
+    "modes": "linear",
+    "mac": "linear",
+    "frf": "linear",
     "landscape": "statics",
     "simulate": "dynamics",
     "critical_step": "dynamics",
     "initial_state": "dynamics",
 }
 _MODULES = (
-    "cases", "checks", "dynamics", "errors", "formats", "linear", "materials", "mechanics", "patterns",
-    "plots", "report", "results", "signals", "statics", "structures", "studies",
+    "cases", "checks", "dynamics", "errors", "formats", "linear", "materials", "mechanics",
+    "patterns", "plots", "report", "results", "shells", "signals", "statics", "structures",
+    "studies",
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -85,9 +91,11 @@ if TYPE_CHECKING:
     )
     from foldyn.dynamics import critical_step, initial_state, simulate
     from foldyn.formats import read_pattern, write_pattern
+    from foldyn.linear import frf, mac, modes
     from foldyn.materials import BarLaw, CustomBarLaw, CustomHingeLaw, EnhancedLinear, HingeLaw
     from foldyn.patterns import Pattern
     from foldyn.results import case_of, load, save
+    from foldyn.shells import Shell, shell
     from foldyn.statics import landscape, switch_branch, trace
     from foldyn.structures import Sheet, Structure, discretize
 

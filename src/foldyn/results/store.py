@@ -1,10 +1,15 @@
-"""Results in files (NetCDF)."""
+"""Results in files (NetCDF).
+
+NetCDF has no complex numbers: a complex variable is stored as two, its real and its imaginary
+part, and put together again on loading.
+"""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from foldyn.errors import InputError
@@ -12,6 +17,8 @@ from foldyn.results.dataset import FORMAT
 from foldyn.results.origin import check_result
 
 ENGINE = "h5netcdf"
+_PARTS = ("real", "imag")
+_WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -39,7 +46,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        ds.to_netcdf(partial, engine=ENGINE)
+        _split(ds).to_netcdf(partial, engine=ENGINE)
         os.replace(partial, path)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
@@ -77,4 +84,31 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
             f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
             "version does not know; update Foldyn"
         )
+    return _joined(ds)
+
+
+def _split(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with the two parts of each complex variable instead of it."""
+    split = ds
+    for name, whole in ds.data_vars.items():
+        if np.iscomplexobj(whole.values):
+            own = {**whole.attrs, _WHOLE: str(name)}
+            parts = {f"{name}_{part}": getattr(whole, part).assign_attrs(own) for part in _PARTS}
+            split = split.drop_vars(str(name)).assign(parts)
+    return split
+
+
+def _joined(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with complex variables put together from their parts."""
+    names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
+    for name in names:
+        if name is None:
+            continue
+        real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
+        # not real + 1j * imag: an infinite part would make the other one nan
+        whole = np.empty(real.shape, np.complex128)
+        whole.real, whole.imag = real.values, imag.values
+        own = {key: value for key, value in real.attrs.items() if key != _WHOLE}
+        ds = ds.drop_vars([f"{name}_{part}" for part in _PARTS])
+        ds = ds.assign({name: (real.dims, whole, own)})
     return ds

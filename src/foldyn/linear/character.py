@@ -1,0 +1,185 @@
+"""What a mode does, in numbers and a name: axial, bending, torsion along a main axis.
+
+A shape is compared with the motions of a beam along the axis. At stations along it the sections
+move by t and turn by w, both linear in between (s the coordinate along the axis a, c(s) the center
+of mass of the section, b and c the other two axes):
+
+    phi(x) ~ t(s) + w(s) x (x - c(s))
+
+t and w are found by least squares weighted by mass. The fitted motion is the sum of its parts:
+
+    axial        t_a             bending along b    t_b and w_c
+    torsion      w_a             bending along c    t_c and w_b
+
+and phi' M (part) / phi' M phi is the share of each; what is left is distortion of the sections. The
+shares add up to 1; a small negative one can occur where sections are not symmetric.
+"""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.results import case_of, check_result
+
+if TYPE_CHECKING:
+    import xarray
+
+AXES = "xyz"
+NODES_PER_STATION = 12
+MOST_STATIONS = 9
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+
+
+def character(
+    modes: xarray.Dataset,
+    axis: str = "x",
+    nodes: Any = None,
+    *,
+    stations: int | None = None,
+    case: Case | None = None,
+) -> xarray.Dataset:
+    """Name what modes do along a main axis, by computed shares.
+
+    Parameters
+    ----------
+    modes : xarray.Dataset
+        From `foldyn.modes`.
+    axis : {"x", "y", "z"}
+        Main axis of the structure.
+    nodes : array_like of int, optional
+        Judge the motion of these nodes alone, such as a loaded edge; all unless given.
+    stations : int, optional
+        Sections along the axis, 1 for a single one; by default one for each dozen of nodes, from
+        2 to 9.
+    case : Case, optional
+        The case of the modes, needed where they cannot rebuild it (`foldyn.case_of`).
+
+    Returns
+    -------
+    xarray.Dataset
+        `share` (mode, kind) with the kinds axial, bending along each of the other two axes,
+        torsion, distortion; `kind_of` (mode), the one with the largest share, or "rigid"; `order`
+        (mode), its number among the modes of that kind in this set; `name` (mode) in words, such
+        as "second bending along y".
+
+    Raises
+    ------
+    InputError
+        Not modes, no such axis or nodes, or a shape that does not move the nodes.
+    """
+    check_result(modes, "modes: ")
+    if modes.attrs["foldyn_result"] != "modes":
+        raise InputError(f"modes: is a {modes.attrs['foldyn_result']}; give modes")
+    if axis not in tuple(AXES):
+        raise InputError(f"axis = {axis!r}: give 'x', 'y' or 'z'")
+    structure = (case_of(modes) if case is None else case).structure
+    chosen = np.arange(len(structure.nodes)) if nodes is None else _nodes(nodes, structure)
+    count = _stations(stations, len(chosen))
+    weight = np.asarray(structure.mass.sum(axis=1)).ravel()[chosen]
+    x = (structure.nodes + modes["displacement"].values)[chosen]
+    parts = _beam_parts(x, weight, AXES.index(axis), count)
+    share = _shares(modes["shape"].values[:, chosen], np.repeat(weight, 3), parts)
+    kinds = np.array([*parts, "distortion"])
+    kind = kinds[np.argmax(share, axis=1)].astype("<U20")
+    kind[modes["rigid"].values] = "rigid"
+    order = np.array([int((kind[: k + 1] == kind[k]).sum()) for k in range(len(kind))])
+    names = np.array([f"{_ordinal(n)} {what}" for n, what in zip(order, kind, strict=True)])
+    return _dataset(modes, kinds, share, kind, order, names, axis)
+
+
+def _dataset(modes, kinds, share, kind, order, names, axis) -> xarray.Dataset:
+    import xarray
+
+    return xarray.Dataset(
+        {
+            "share": (("mode", "kind"), share, {"long_name": "share of the mode's motion"}),
+            "kind_of": ("mode", kind, {"long_name": "what the mode does"}),
+            "order": ("mode", order, {"long_name": "number among the modes of its kind"}),
+            "name": ("mode", names, {"long_name": "what the mode does"}),
+        },
+        {"mode": modes["mode"], "kind": kinds},
+        {"axis": axis},
+    )
+
+
+def _beam_parts(x: NDArray, weight: NDArray, a: int, stations: int) -> dict[str, NDArray]:
+    """Motions (3n, k) of the parts of a beam at points x (n, 3)."""
+    hats = _hats(x[:, a], stations)
+    loads = hats * weight[:, None]
+    total = loads.sum(axis=0)
+    centers = (loads.T @ x) / np.where(total > 0.0, total, 1.0)[:, None]
+    arm = x - hats @ centers
+    arm[:, a] = 0.0  # sections are plane: turns about b and c move them along a alone
+    b, c = (a + 1) % 3, (a + 2) % 3
+    unit = np.eye(3)
+
+    def field(motion: NDArray) -> NDArray:
+        return np.einsum("nk,na->nak", hats, motion).reshape(-1, hats.shape[1])
+
+    def shift(axis: int) -> NDArray:
+        return field(np.broadcast_to(unit[axis], x.shape))
+
+    def turn(axis: int) -> NDArray:
+        return field(np.cross(unit[axis], arm))
+
+    across = {
+        f"bending along {AXES[b]}": np.hstack([shift(b), turn(c)]),
+        f"bending along {AXES[c]}": np.hstack([shift(c), turn(b)]),
+    }
+    return {"axial": shift(a), **dict(sorted(across.items())), "torsion": turn(a)}
+
+
+def _hats(along: NDArray, stations: int) -> NDArray:
+    """Values (n, k) at coordinates (n,) of piecewise linear functions that are 1 at one station."""
+    extent = float(np.ptp(along))
+    if stations == 1 or extent == 0.0:
+        return np.ones((len(along), 1))
+    place = (along - along.min()) / extent * (stations - 1)
+    return np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(stations)))
+
+
+def _shares(shapes: NDArray, weight: NDArray, parts: dict[str, NDArray]) -> NDArray:
+    """Shares (modes, kinds) of the parts, and last what is left."""
+    root = np.sqrt(weight)
+    flat = shapes.reshape(len(shapes), -1).T * root[:, None]
+    whole = (flat**2).sum(axis=0)
+    if not whole.all():
+        raise InputError(
+            f"nodes: mode {int(np.argmin(whole)) + 1} does not move them; choose other nodes"
+        )
+    basis = np.hstack(list(parts.values())) * root[:, None]
+    fitted = np.linalg.lstsq(basis, flat, rcond=1e-9)[0]
+    shares, start = [], 0
+    for part in parts.values():
+        rows = slice(start, start + part.shape[1])
+        shares.append(((basis[:, rows] @ fitted[rows]) * flat).sum(axis=0) / whole)
+        start = rows.stop
+    return np.stack([*shares, 1.0 - np.sum(shares, axis=0)], axis=1)
+
+
+def _ordinal(number: int) -> str:
+    return ORDINALS[number - 1] if number <= len(ORDINALS) else f"{number}th"
+
+
+def _nodes(given: Any, structure: Any) -> NDArray:
+    numbers = np.asarray(given)
+    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
+        raise InputError(f"nodes = {given!r}: give a list of numbers of nodes")
+    beyond = numbers[(numbers < 0) | (numbers >= len(structure.nodes))]
+    if beyond.size:
+        raise InputError(f"nodes: there is no node {beyond[0]}; there are {len(structure.nodes)}")
+    return numbers
+
+
+def _stations(given: int | None, nodes: int) -> int:
+    if given is None:
+        return max(2, min(MOST_STATIONS, nodes // NODES_PER_STATION))
+    if isinstance(given, bool) or not isinstance(given, Integral) or int(given) < 1:
+        raise InputError(f"stations = {given!r}: give a positive whole number")
+    return int(given)

@@ -1,0 +1,191 @@
+"""The lowest modes of K phi = lambda M phi, none missed.
+
+Few dofs are solved in full. Others by shift-invert Lanczos (ARPACK) with one factorization of
+K - s M, the shift s below every eigenvalue: there K - s M is positive definite however singular or
+unstable K is, and the modes nearest to the shift are the lowest. How many eigenvalues lie below
+the shift, and below a gap behind the last mode, is counted (`Pencil.below`); modes that Lanczos
+missed, as it may where many coincide, are sought again beside those found.
+
+Modes known beforehand (rigid ones) are taken out of the search, so that they come out pure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.linear.pencil import EPS, Pencil
+from foldyn.statics.linear_solver import Factorization, SingularTangentError
+
+MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
+DENSE = 60  # dofs up to which all modes are found at once (the other way is as quick)
+SHIFT = 1e-10  # of the pencil's scale: the first shift below zero
+LOWER = 16.0  # times the last: the next shift
+LOWERINGS = 12
+GUARD = 3  # modes beyond those asked for, among which a gap is sought
+GAP = 1e-6  # relative distance of eigenvalues that a count can tell apart
+ROUNDS = 12  # of searches for missed modes
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """The lowest eigenvalues (k,), rad2/s2, their shapes (n, k), M-orthonormal, and the checks."""
+
+    values: NDArray
+    shapes: NDArray
+    shift: float  # below which there is no eigenvalue; nan where all were computed
+    checked: int  # lowest modes that a count has shown to be complete
+    missed: int  # modes that the count tells of and that were not found
+
+
+def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
+    """The `count` lowest modes of a pencil.
+
+    Parameters
+    ----------
+    pencil : Pencil
+    count : int
+        At most the number of its modes.
+    known : (n, r)
+        M-orthonormal modes with the eigenvalue zero.
+    verify : bool
+        Whether to count the eigenvalues below a gap behind the last mode, by another
+        factorization.
+
+    Raises
+    ------
+    InputError
+        More than half of the modes of many dofs.
+    ComputationError
+        Lanczos did not converge; the pencil cannot be factorized.
+    """
+    if not np.isfinite(pencil.stiffness.data).all():
+        raise ComputationError("modes: the tangent in this state is not finite")
+    if pencil.size <= DENSE or count + GUARD >= pencil.finite // 2:
+        if pencil.size > MOST_DENSE:
+            raise InputError(
+                f"count = {count}: ask for fewer than half of the modes of {pencil.size} free dofs"
+            )
+        values, shapes = _all(pencil, known)
+        values, shapes = _sorted(pencil, values, shapes, known)
+        return Spectrum(values[:count], shapes[:, :count], float("nan"), count, 0)
+    try:
+        return _sparse(pencil, count, known, verify)
+    except SingularTangentError as error:
+        raise ComputationError(f"modes: {error}") from error
+
+
+def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
+    """All modes but the known ones, which are moved behind all others."""
+    heavy, light = np.flatnonzero(pencil.heavy), np.flatnonzero(~pencil.heavy)
+    mass = pencil.mass[heavy][:, heavy].toarray()
+    stiffness = pencil.stiffness[heavy][:, heavy].toarray()
+    follow = np.zeros((0, len(heavy)))
+    if len(light):  # what has no mass follows statically
+        across = pencil.stiffness[light][:, heavy].toarray()
+        follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
+        stiffness = stiffness + across.T @ follow
+    if known.shape[1]:
+        carried = mass @ known[heavy]
+        far = 4.0 * np.abs(stiffness).sum(axis=1).max() / mass.diagonal().min()
+        stiffness = stiffness + far * (carried @ carried.T)
+    _, found = eigh(stiffness, mass)
+    found = found[:, : len(heavy) - known.shape[1]]
+    shapes = np.zeros((pencil.size, found.shape[1]))
+    shapes[heavy], shapes[light] = found, follow @ found
+    return pencil.quotients(shapes), shapes  # more exact than the values of a full matrix
+
+
+def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectrum:
+    shift, factors, unstable = _shift(pencil)
+    wanted = max(count - known.shape[1], min(unstable, count)) + GUARD
+    values, shapes = _lanczos(pencil, shift, factors, wanted, known)
+    missed, checked = 0, 0
+    for _ in range(ROUNDS if verify else 0):
+        ordered, _ = _sorted(pencil, values, shapes, known)
+        checked, edge = _gap(pencil, ordered, count)
+        missed = pencil.below(edge) - checked if checked else 0
+        if missed <= 0:
+            break
+        beside = np.hstack([known, shapes])
+        more, others = _lanczos(pencil, shift, factors, missed + GUARD, beside)
+        values, shapes = np.r_[values, more], np.hstack([shapes, others])
+    values, shapes = _sorted(pencil, values, shapes, known)
+    return Spectrum(values[:count], shapes[:, :count], shift, min(checked, count), missed)
+
+
+def _shift(pencil: Pencil) -> tuple[float, Factorization, int]:
+    """A shift below every eigenvalue, the factors there, and how many eigenvalues are negative."""
+    shift, unstable = -SHIFT * pencil.scale, 0
+    for attempt in range(LOWERINGS):
+        factors = pencil.factorize(shift)
+        negative = factors.negative()
+        if attempt == 0:
+            unstable = negative
+        if not negative:
+            return shift, factors, unstable
+        shift *= LOWER
+    raise ComputationError(
+        f"modes: {unstable} eigenvalues of the tangent are negative, some beyond {shift:.3g} "
+        "rad2/s2: the state is far from a stable equilibrium"
+    )
+
+
+def _lanczos(
+    pencil: Pencil, shift: float, factors: Factorization, count: int, beside: NDArray
+) -> tuple[NDArray, NDArray]:
+    """The `count` lowest modes among those M-orthogonal to `beside` (n, r)."""
+    size, mass = pencil.size, pencil.mass
+    count = min(count, pencil.finite - beside.shape[1] - 1)
+    carried = mass @ beside
+
+    def inverse(force: NDArray) -> NDArray:
+        motion = factors.solve(force - carried @ (beside.T @ force))
+        return motion - beside @ (carried.T @ motion)
+
+    start = np.random.default_rng(0).standard_normal(size)
+    operator = LinearOperator((size, size), matvec=inverse, dtype=float)
+    start = inverse(mass @ start)
+    try:
+        _, shapes = eigsh(pencil.stiffness, k=count, M=mass, sigma=shift, OPinv=operator, v0=start)
+    except ArpackNoConvergence as error:
+        raise ComputationError(
+            f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "
+            "more if many frequencies coincide"
+        ) from error
+    if pencil.finite < size:  # M does not see what is without mass
+        shapes = np.stack([inverse(force) for force in (mass @ shapes).T], axis=1)
+    shapes = shapes / np.sqrt(np.einsum("ik,ik->k", shapes, mass @ shapes))
+    return pencil.quotients(shapes), shapes
+
+
+def _sorted(
+    pencil: Pencil, values: NDArray, shapes: NDArray, known: NDArray
+) -> tuple[NDArray, NDArray]:
+    """All modes by eigenvalue; what is zero to rounding is zero, and known modes lead there."""
+    rounding = pencil.noise(shapes) + EPS * SHIFT * pencil.scale
+    values = np.where(np.abs(values) <= rounding, 0.0, values)
+    values = np.r_[np.zeros(known.shape[1]), values]
+    order = np.argsort(values, kind="stable")
+    return values[order], np.hstack([known, shapes])[:, order]
+
+
+def _gap(pencil: Pencil, values: NDArray, count: int) -> tuple[int, float]:
+    """How many of the sorted values (m,) lie below a gap near the count-th, and its middle.
+
+    A gap behind the last mode asked for proves that all were found. Where a multiple eigenvalue
+    leaves none, the last gap before it is taken: those asked for are then any of the multiple.
+    """
+    apart = np.diff(values)
+    clear = apart > GAP * (np.abs(values[:-1]) + np.abs(values[1:])) + SHIFT * pencil.scale * 1e-3
+    gaps = np.flatnonzero(clear) + 1
+    if not len(gaps):
+        return 0, 0.0
+    behind = gaps[gaps >= count]
+    at = int(behind[0]) if len(behind) else int(gaps[-1])
+    return at, 0.5 * float(values[at - 1] + values[at])

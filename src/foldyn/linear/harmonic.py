@@ -1,0 +1,229 @@
+"""Frequency response of a given amplitude: superlinear hinges linearized for their own swing.
+
+Under a sine of finite amplitude each superlinear hinge swings by an amplitude A_h of its own. With
+one harmonic its moment is that of a linear hinge of the slope k_eq(A_h) (`equivalent_slope`), and
+
+    (K(A) - w^2 M + i w C) x = f,    A_h = |g_h x|,
+
+g_h the gradient of the hinge's dihedral, is a nonlinear equation for the slopes: single harmonic
+balance (Krylov and Bogoliubov 1947; Krack and Gross, Harmonic Balance for Nonlinear Vibration
+Problems, 2019). Displacements are taken as small against the structure, but for these slopes.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn import mechanics
+from foldyn.cases.values import number
+from foldyn.dynamics import Progress
+from foldyn.dynamics.progress import Reporter
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.answer import Answer
+from foldyn.linear.direct import dynamic_stiffness, solve, warn_of_resonances
+from foldyn.linear.excitation import Drive
+from foldyn.linear.linearized import Linearized
+from foldyn.linear.secant import equivalent_slope
+from foldyn.linear.transmissibility import drive_factor, drive_shape
+from foldyn.materials import Superlinear
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics.energy import hinge_dihedral
+
+REFERENCE = 1.0  # degrees: the swing for which the slopes stand in the system that is given
+DEPTH = 5  # iterations that the acceleration looks back on
+PATIENCE = 25  # accelerated iterations before slow ones are tried
+RELAXED = 0.3  # of the way in a slow iteration
+LEAST = 1e-12  # rad: a swing is never taken as smaller
+_NAMED = 5
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """Options of the harmonic method.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest change of the response in an iteration, relative to its maximum.
+    iterations : int
+        At a frequency, at most.
+    """
+
+    tolerance: float = 1e-6
+    iterations: int = 300
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        number("tolerance", self.tolerance, above=0.0)
+        count = self.iterations
+        if isinstance(count, bool) or not isinstance(count, int) or count < 2:
+            raise InputError(f"iterations = {count!r}: must be a whole number, at least 2")
+
+
+def harmonic(
+    system: Linearized,
+    drive: Drive,
+    frequency: NDArray,
+    options: HarmonicBalance,
+    report: Reporter,
+) -> Answer:
+    """Balance one harmonic at each frequency, starting from the slopes of the one before.
+
+    Where the response has several branches, rising frequencies follow one until it ends.
+
+    Parameters
+    ----------
+    system : Linearized
+        Its superlinear hinges have the slope for a swing of `REFERENCE`.
+
+    Returns
+    -------
+    Answer
+        Response at the amplitude of the drive, nan where the iteration does not converge or at a
+        resonance without damping; `swing` (m,), the largest amplitude (degrees) of a superlinear
+        hinge; the number of iterations.
+
+    Warns
+    -----
+    FoldynWarning
+        There are such frequencies.
+    """
+    case, hinges = system.case, _Hinges(system)
+    shape = drive_shape(case, drive).ravel()[system.free]
+    response = np.full((len(frequency), len(shape)), np.nan, np.complex128)
+    swing, spent = np.full(len(frequency), np.nan), 0
+    slope, failed = hinges.reference, []
+    for k, f in enumerate(frequency):
+        omega = 2.0 * np.pi * f
+        load = shape * (drive.value * drive_factor(case, drive, omega))
+        found = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
+        motion, after = found.solution(slope)
+        spent += found.iterations
+        if motion is None:
+            failed.append(k)
+        else:
+            slope, response[k] = after, motion / drive.value
+            swing[k] = np.degrees(np.abs(hinges.gradient @ motion).max(initial=0.0))
+        report(Progress(k + 1.0, float(len(frequency)), spent, 0.0))
+    _warn_of(frequency[failed], options)
+    warn_of_resonances(np.delete(frequency, failed), np.delete(response, failed, axis=0))
+    return Answer(response, {"swing": swing}, {"iterations": spent})
+
+
+class _Hinges:
+    """The superlinear hinges of a system: gradients, offsets from rest, stiffness and slopes."""
+
+    def __init__(self, system: Linearized) -> None:
+        model, u = system.case.structure.model, np.ascontiguousarray(system.displacement)
+        runs = [np.arange(a, b) for a, b, code, _ in model.hinge_runs if code == Superlinear.code]
+        rows = np.concatenate([np.zeros(0, np.int64), *runs])
+        columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
+        gradient = sparse.csr_array(
+            (_gradients(model, u)[rows].ravel(), columns.ravel(), 12 * np.arange(len(rows) + 1)),
+            shape=(len(rows), u.size),
+        )
+        self.gradient = sparse.csr_array(gradient[:, system.free])
+        self.offset = mechanics.angles(model.rest + u, model.hinges)[rows] - model.hinge_rest[rows]
+        self.stiffness = model.hinge_stiffness[rows]
+        self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
+
+    def slope(self, motion: NDArray) -> NDArray[np.float64]:
+        """Equivalent slopes / k (nh,) in a motion (nf,)."""
+        swing = np.maximum(np.abs(self.gradient @ motion), LEAST)
+        return equivalent_slope(self.offset, swing)
+
+    def change(self, slope: NDArray) -> sparse.csr_array:
+        """What slopes add to the stiffness with those of reference."""
+        weight = sparse.diags_array(self.stiffness * (slope - self.reference))
+        return self.gradient.T @ weight @ self.gradient
+
+
+@kernel
+def _gradients(model, u):
+    """Gradients (nh, 12) of all dihedrals with respect to their nodes j, k, i, l."""
+    out = np.empty((model.hinges.shape[0], 12))
+    for e in range(out.shape[0]):
+        gradient = hinge_dihedral(model, u, e)
+        for c in range(12):
+            out[e, c] = gradient[c + 1]
+    return out
+
+
+class _Balance:
+    """The iteration for the slopes at one frequency."""
+
+    def __init__(
+        self, hinges: _Hinges, stiffness: sparse.csc_array, load: NDArray, options: HarmonicBalance
+    ) -> None:
+        self.hinges, self.stiffness, self.load = hinges, stiffness, load
+        self.options, self.iterations = options, 0
+
+    def solution(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
+        """Motion (nf,), None without convergence, and the slopes in it.
+
+        Accelerated first (Anderson), which may run in circles near the end of a branch; then
+        slowly, which converges to branches that are stable.
+        """
+        quick, slow = (PATIENCE, self._anderson), (self.options.iterations, self._relaxed)
+        for most, step in (quick, slow):
+            motion, slope = self._iterate(start, step, most)
+            if motion is not None:
+                return motion, slope
+        return None, start
+
+    def _iterate(self, slope: NDArray, step, most: int) -> tuple[NDArray | None, NDArray]:
+        slopes: list[NDArray] = []
+        misses: list[NDArray] = []
+        before = None
+        # a slow step changes less than what is left to go
+        tolerance = self.options.tolerance * (1.0 if step == self._anderson else RELAXED)
+        while len(slopes) < most and self.iterations < self.options.iterations:
+            self.iterations += 1
+            matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
+            motion = solve(matrix, self.load)
+            if np.isnan(motion).any() or not len(slope):
+                return motion, slope
+            if before is not None:
+                change = np.abs(motion - before).max()
+                if change <= tolerance * np.abs(motion).max():
+                    return motion, slope
+            before = motion
+            slopes.append(slope)
+            misses.append(self.hinges.slope(motion) - slope)
+            slope = step(slopes, misses)
+        return None, slope
+
+    @staticmethod
+    def _relaxed(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
+        return slopes[-1] + RELAXED * misses[-1]
+
+    @staticmethod
+    def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
+        """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
+        plain = slopes[-1] + misses[-1]
+        if len(slopes) == 1:
+            return plain
+        moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
+        turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
+        weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
+        ahead = plain - (moved + turned) @ weight
+        return np.where(ahead > 0.0, ahead, 0.5 * plain)
+
+
+def _warn_of(failed: NDArray, options: HarmonicBalance) -> None:
+    if not failed.size:
+        return
+    shown = ", ".join(f"{f:.6g}" for f in failed[:_NAMED])
+    more = " and others" if failed.size > _NAMED else ""
+    warnings.warn(
+        f"frequencies: the harmonic balance does not converge at {shown} Hz{more} (nan) within "
+        f"{options.iterations} iterations; give more iterations, closer frequencies or more "
+        "damping",
+        FoldynWarning,
+        stacklevel=5,
+    )

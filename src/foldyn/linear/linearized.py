@@ -1,0 +1,216 @@
+"""A case linearized about a state: M q'' + C q' + K q = f on its free dofs."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn import mechanics
+from foldyn.cases import Case, State
+from foldyn.dynamics.inertia import check_mass
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.equilibrium import Station, station
+from foldyn.linear.secant import equivalent_slope
+from foldyn.materials import Superlinear
+from foldyn.mechanics import BarsHinges
+from foldyn.statics.body import BarsHingesBody, Body, body_of
+
+SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
+# (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
+
+
+@dataclass(frozen=True, eq=False)
+class Linearized:
+    """Matrices of small motions about a state, on the free dofs (3 node + axis).
+
+    Attributes
+    ----------
+    case : Case
+    displacement : (n, 3)
+        The state, m.
+    free : (nf,)
+        Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
+        that a shell has beside the displacements of its nodes.
+    stiffness, mass, damping : (nf, nf)
+        Sparse and symmetric: tangent (N/m), mass (kg) and alpha M + beta K0 (N s/m). K0 is the
+        exact tangent at rest, or in this state where the damping says so.
+    soft : int
+        Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
+        they count without stiffness. 0 with `secant`.
+    secant : float or None
+        Amplitude (degrees) for which superlinear hinges have their equivalent slope.
+    residual : float
+        How far the state is from an equilibrium, as a fraction of the forces at play.
+    unbalanced : float
+        The same in N.
+    """
+
+    case: Case
+    displacement: NDArray
+    free: NDArray
+    stiffness: sparse.csc_array
+    mass: sparse.csc_array
+    damping: sparse.csc_array
+    soft: int
+    secant: float | None
+    residual: float = 0.0
+    unbalanced: float = 0.0
+
+
+def linearize(
+    case: Case,
+    state: State | str | None = None,
+    secant: float | None = None,
+    load_factor: float = 1.0,
+) -> Linearized:
+    """Linearize a case about an equilibrium.
+
+    Parameters
+    ----------
+    case : Case
+        Its loads and imposed displacements are preloads, in full; histories play no part.
+    state : State or "equilibrium", optional
+        Where: a state, as `fd.initial_state(path)`; the equilibrium under the loads, found by
+        statics; without it the rest state, in which no load acts.
+    secant : float, optional
+        Amplitude (degrees) of the turns of the hinges: superlinear hinges get the slope that is
+        equivalent to an oscillation of that amplitude (see `equivalent_slope`), all others keep
+        their tangent.
+    load_factor : float
+        How far actuated folds are folded in a given state.
+
+    Raises
+    ------
+    InputError
+        Nothing can move; a free node has no mass; a state of another size.
+    ComputationError
+        No equilibrium is found.
+
+    Warns
+    -----
+    FoldynWarning
+        The state is no equilibrium; loads do not act at rest; hinges have no slope.
+    """
+    amplitude = _amplitude(secant)
+    check_mass(case.structure.mass, case.fixed)
+    where = station(case, state, load_factor)
+    body = where.body
+    free = np.concatenate([case.free_dofs, body.hidden])
+    exact = body.tangent(where.dofs)
+    change, soft = _slope_change(case, body, where.displacement, amplitude)
+    if soft:
+        _warn_of(soft)
+    stiffness = exact if change is None else sparse.csr_array(exact + change)
+    mass = _all_mass(case, len(body.hidden))
+    return Linearized(
+        case=case,
+        displacement=where.displacement,
+        free=free,
+        stiffness=_block(stiffness, free),
+        mass=_block(mass, free),
+        damping=_damping(case, where, exact, mass, free),
+        soft=soft,
+        secant=None if secant is None else float(secant),
+        residual=where.relative,
+        unbalanced=where.residual,
+    )
+
+
+def _amplitude(secant: float | None) -> float | None:
+    if secant is None:
+        return None
+    if isinstance(secant, bool) or not isinstance(secant, Real):
+        raise InputError(f"secant = {secant!r}: give an amplitude in degrees, or leave it out")
+    if not (math.isfinite(secant) and 0.0 < secant <= 180.0):
+        raise InputError(f"secant = {secant!r}: give an amplitude between 0 and 180 degrees")
+    return math.radians(secant)
+
+
+def _slope_change(
+    case: Case, body: Body, displacement: NDArray, amplitude: float | None
+) -> tuple[sparse.csr_array | None, int]:
+    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft."""
+    if not isinstance(body, BarsHingesBody):
+        if isinstance(case.structure.fold_law, Superlinear):
+            raise InputError(
+                'fold_law = "superlinear": the folds of a shell have no slope at rest; modes and '
+                'frequency responses of shells take "linear" or "enhanced"'
+            )
+        return None, 0
+    model = body.model
+    theta = mechanics.angles(model.rest + displacement, model.hinges)
+    change, soft = np.zeros(len(theta)), 0
+    for start, end, code, _ in model.hinge_runs:
+        if code != Superlinear.code:
+            continue
+        rows = slice(start, end)
+        offset = theta[rows] - model.hinge_rest[rows]
+        slope = Superlinear().slope(theta[rows], model.hinge_rest[rows])
+        if amplitude is not None:
+            change[rows] = equivalent_slope(offset, amplitude) - slope
+        else:
+            at_rest = (slope < SOFT) & (model.hinge_stiffness[rows] > 0.0)
+            soft += int(at_rest.sum())
+            change[rows] = np.where(at_rest, -slope, 0.0)
+    if not change.any():
+        return None, soft
+    alone = _only_slopes(model, theta, change)
+    return mechanics.tangent(alone, case.structure.sparsity, displacement).tocsr(), soft
+
+
+def _only_slopes(model: BarsHinges, theta: NDArray, slope: NDArray) -> BarsHinges:
+    """The model of hinges alone, without moment at angles (nh,) and with given slopes / k there."""
+    runs = model.hinge_runs.copy()
+    runs[:, 2] = 0  # the linear law
+    return model._replace(
+        bar_runs=model.bar_runs[:0],
+        hinge_runs=runs,
+        hinge_stiffness=model.hinge_stiffness * slope,
+        hinge_rest=theta,
+    )
+
+
+def _all_mass(case: Case, hidden: int) -> sparse.csr_array:
+    """Mass (m, m) of all dofs."""
+    nodal = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
+    if hidden:
+        nodal = sparse.block_diag([nodal, sparse.csr_array((hidden, hidden))], format="csr")
+    return sparse.csr_array(nodal)
+
+
+def _damping(
+    case: Case, where: Station, exact: sparse.csr_array, mass: sparse.csr_array, free: NDArray
+) -> sparse.csc_array:
+    """alpha M + beta K0 on the free dofs."""
+    damping = case.damping
+    matrix = _block(mass, free) * damping.alpha
+    if damping.beta == 0.0:
+        return matrix
+    reference = exact
+    if damping.state == "rest":
+        body = body_of(case.structure)
+        reference = body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
+    return sparse.csc_array(matrix + damping.beta * _block(reference, free))
+
+
+def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:
+    block = sparse.csc_array(sparse.csr_array(matrix)[free][:, free])
+    block.sort_indices()
+    return block
+
+
+def _warn_of(soft: int) -> None:
+    warnings.warn(
+        f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
+        "vanishes: they count without stiffness, and motions that only they resist have the "
+        "frequency zero. Give secant = an amplitude in degrees, such as 1, for the slopes of an "
+        'oscillation of that amplitude, or take bend_law = "linear"',
+        FoldynWarning,
+        stacklevel=4,
+    )

@@ -1,0 +1,157 @@
+"""Modal assurance criterion: how alike the shapes of two sets of modes are.
+
+MAC_ij = |a_i^H W b_j|^2 / ((a_i^H W a_i) (b_j^H W b_j)): 1 for the same shape, whatever its size
+and sign, 0 for orthogonal ones. W is the mass, or the identity (Allemang and Brown, Proc. 1st Int.
+Modal Analysis Conf., 1982; with weights Allemang, Sound and Vibration 37, 2003).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.optimize import linear_sum_assignment
+
+from foldyn.errors import InputError
+
+
+def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float64]:
+    """Modal assurance criteria between two sets of shapes.
+
+    Parameters
+    ----------
+    a, b : xarray.Dataset or array_like, shapes (ka, n, 3) and (kb, n, 3)
+        Modes from `foldyn.modes`, or shapes of any other origin, also complex ones (measured, or of
+        a damped structure). Arrays (k, n) are shapes with one component per node.
+    mass : array_like or sparse matrix, optional
+        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `structure.mass`, of the
+        nodes that are compared. With it the modes of one structure are orthogonal:
+        the matrix of a set with itself is the identity. Without it all nodes count alike.
+    nodes : array_like of int, or a pair of them, optional
+        Which nodes are compared: numbers that mean the same node in both sets, or (numbers in a,
+        numbers in b) of models that share some nodes only. All unless given.
+
+    Returns
+    -------
+    ndarray, shape (ka, kb)
+        Numbers from 0 to 1; nan where a shape does not move the nodes that are compared.
+
+    Raises
+    ------
+    InputError
+        The sets have different nodes, or the mass does not belong to them.
+    """
+    first, second = _chosen(_shapes("a", a), _shapes("b", b), nodes)
+    left, right = _flat(first), _flat(second)
+    weight = _weight(mass, first.shape[1], first.shape[2])
+    heavy_left, heavy_right = weight(left), weight(right)
+    cross = np.abs(left.conj() @ heavy_right.T) ** 2
+    own_left = np.einsum("ki,ki->k", left.conj(), heavy_left).real
+    own_right = np.einsum("ki,ki->k", right.conj(), heavy_right).real
+    own = np.outer(own_left, own_right)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.minimum(np.where(own > 0.0, cross / own, np.nan), 1.0)
+
+
+class Pairs(NamedTuple):
+    """Modes of two sets that belong together, numbered from 0 as the rows of the sets."""
+
+    first: NDArray[np.int64]  # (k,) increasing
+    second: NDArray[np.int64]  # (k,) their partners
+    mac: NDArray[np.float64]  # (k,)
+
+
+def pair_modes(values: ArrayLike, least: float = 0.0) -> Pairs:
+    """Pair the modes of two sets so that the sum of their MAC is greatest.
+
+    Each mode has one partner at most. A pair of equal frequencies, whose shapes may turn into each
+    other, is better compared as a pair than mode by mode.
+
+    Parameters
+    ----------
+    values : array_like, shape (ka, kb)
+        From `mac`.
+    least : float
+        Pairs with a smaller MAC are left out.
+
+    Returns
+    -------
+    Pairs
+        Numbers of the modes in the first set, of their partners in the second, and their MAC.
+    """
+    matrix = np.asarray(values, float)
+    if matrix.ndim != 2 or not matrix.size:
+        raise InputError(f"values: shape {matrix.shape}: give the matrix of mac(a, b)")
+    known = np.nan_to_num(matrix, nan=0.0)
+    first, second = linear_sum_assignment(known, maximize=True)
+    kept = known[first, second] >= least
+    first, second = first[kept], second[kept]
+    return Pairs(first, second, matrix[first, second])
+
+
+def _shapes(name: str, given: Any) -> NDArray:
+    """Shapes (k, n, components) of a dataset or an array."""
+    if hasattr(given, "data_vars"):
+        if "shape" not in given:
+            raise InputError(f"{name}: the dataset has no shapes; give modes from foldyn.modes")
+        given = given["shape"].transpose("mode", "node", "axis").values
+    array = np.asarray(given)
+    if array.ndim == 2:
+        array = array[:, :, None]
+    if array.ndim != 3 or not array.size or array.dtype.kind not in "fciu":
+        raise InputError(
+            f"{name}: shape {array.shape}: give shapes (modes, nodes, axes) or modes from "
+            "foldyn.modes"
+        )
+    return array if array.dtype.kind == "c" else array.astype(float)
+
+
+def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArray]:
+    """The shapes at the nodes that are compared."""
+    if nodes is not None:
+        pair = nodes if isinstance(nodes, tuple) and len(nodes) == 2 else (nodes, nodes)
+        first, second = (_at(s, n) for s, n in zip((first, second), pair, strict=True))
+    if first.shape[1:] != second.shape[1:]:
+        raise InputError(
+            f"a has {first.shape[1]} nodes with {first.shape[2]} components, b "
+            f"{second.shape[1]} with {second.shape[2]}: give nodes = (numbers in a, numbers in b) "
+            "of those that are the same"
+        )
+    return first, second
+
+
+def _at(shapes: NDArray, nodes: Any) -> NDArray:
+    numbers = np.asarray(nodes)
+    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
+        raise InputError(f"nodes = {nodes!r}: give numbers of nodes, or a pair of such lists")
+    beyond = numbers[(numbers < 0) | (numbers >= shapes.shape[1])]
+    if beyond.size:
+        raise InputError(f"nodes: there is no node {beyond[0]}; there are {shapes.shape[1]}")
+    return shapes[:, numbers]
+
+
+def _flat(shapes: NDArray) -> NDArray:
+    return shapes.reshape(len(shapes), -1)
+
+
+def _weight(mass: Any, nodes: int, components: int) -> Any:
+    """Function that multiplies flat shapes (k, nodes * components) by the mass."""
+    if mass is None:
+        return lambda flat: flat
+    matrix = mass if sparse.issparse(mass) else np.asarray(mass, float)
+    if matrix.shape == (nodes,):
+        matrix = sparse.diags_array(matrix)
+    if matrix.shape != (nodes, nodes):
+        raise InputError(
+            f"mass: shape {matrix.shape}: give masses ({nodes},) or a matrix ({nodes}, {nodes}) "
+            "of the nodes that are compared"
+        )
+
+    def heavy(flat: NDArray) -> NDArray:
+        by_node = flat.reshape(-1, nodes, components)
+        product = matrix @ by_node.transpose(1, 0, 2).reshape(nodes, -1)
+        return product.reshape(nodes, -1, components).transpose(1, 0, 2).reshape(flat.shape)
+
+    return heavy

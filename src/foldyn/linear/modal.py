@@ -1,0 +1,118 @@
+"""Frequency response by superposition of modes, with what the modes left out add statically."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics import Progress
+from foldyn.dynamics.progress import Reporter
+from foldyn.errors import InputError
+from foldyn.linear.answer import Answer
+from foldyn.linear.direct import warn_of_resonances
+from foldyn.linear.eigen import Spectrum, lowest
+from foldyn.linear.excitation import Drive
+from foldyn.linear.linearized import Linearized
+from foldyn.linear.pencil import Pencil
+from foldyn.linear.rigid_modes import rigid_space, unresisted
+from foldyn.linear.transmissibility import drive_factor, drive_shape
+
+DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
+BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Options of the modal method.
+
+    Parameters
+    ----------
+    count : int, optional
+        How many modes, the lowest ones; all without it.
+    static_correction : bool
+        Whether to add the static response of the modes left out: errors then fall as the fourth
+        power of the highest frequency kept instead of as the second.
+    """
+
+    count: int | None = None
+    static_correction: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        count = self.count
+        whole = not isinstance(count, bool) and isinstance(count, int | np.integer)
+        if count is not None and (not whole or count < 1):
+            raise InputError(f"count = {count!r}: give a positive whole number of modes")
+        if not isinstance(self.static_correction, bool):
+            raise InputError(f"static_correction = {self.static_correction!r}: give True or False")
+
+
+def modal(
+    system: Linearized, drive: Drive, frequency: NDArray, options: Modal, report: Reporter
+) -> Answer:
+    """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
+
+    The matrix of the modal damping is taken whole: modes that damping couples (beta K0 about a
+    state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
+    is the response of all other modes at the squared frequency s: 0, or slightly below for a body
+    that is free to move (mode acceleration: Craig and Kurdila, Fundamentals of Structural
+    Dynamics, 2nd ed. 2006, chapter 11).
+
+    At a resonance without damping the response is nan.
+
+    Warns
+    -----
+    FoldynWarning
+        There are such resonances.
+    """
+    case, size = system.case, len(system.free)
+    count = size if options.count is None else int(options.count)
+    if count > size:
+        raise InputError(f"count = {count}: the case has only {size} free dofs")
+    pencil = Pencil(system.stiffness, system.mass)
+    modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
+    shape = drive_shape(case, drive).ravel()[system.free]
+    load = modes.shapes.T @ shape
+    damping = modes.shapes.T @ (system.damping @ modes.shapes)
+    left = np.zeros(size)
+    if options.static_correction and count < size:
+        left = _residual(pencil, modes, shape, load)
+    noise = pencil.noise(modes.shapes)
+    response = np.empty((len(frequency), size), np.complex128)
+    for k, f in enumerate(frequency):
+        omega = 2.0 * np.pi * f
+        q = _amplitudes(modes.values, noise, damping, omega, load)
+        response[k] = (modes.shapes @ q + left) * drive_factor(case, drive, omega)
+        report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
+    warn_of_resonances(frequency, response)
+    facts = {"modes": count, "static_correction": options.static_correction}
+    return Answer(response, {}, facts)
+
+
+def _amplitudes(
+    values: NDArray, noise: NDArray, damping: NDArray, omega: float, load: NDArray
+) -> NDArray:
+    """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values."""
+    own = damping.diagonal()
+    detuned = values - omega**2
+    scale = np.sqrt(np.outer(own, own))
+    if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
+        return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
+    resonant = (np.abs(detuned) <= noise) & (omega * own == 0.0)
+    amplitudes = load / np.where(resonant, 1.0, detuned + 1j * omega * own)
+    return np.where(resonant, np.nan, amplitudes)
+
+
+def _residual(pencil: Pencil, modes: Spectrum, shape: NDArray, load: NDArray) -> NDArray:
+    """Static response (nf,) of the modes left out."""
+    positive = modes.values[modes.values > 0.0]
+    shift = 0.0
+    if modes.values[0] <= 0.0:
+        beside = positive[0] if positive.size else pencil.scale
+        shift = float(modes.values[0] - BESIDE * beside)
+    factors = pencil.factorize(shift)
+    whole = factors.solve(shape)
+    whole = whole + factors.solve(shape - (pencil.stiffness - shift * pencil.mass) @ whole)
+    return whole - modes.shapes @ (load / (modes.values - shift))

@@ -1,0 +1,231 @@
+"""Peaks of a frequency response, and the damping that they tell."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.supports import AXES, check_axis
+from foldyn.cases.values import choice
+from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.linear.quantity import PER_FORCE, convert, quantity_of
+from foldyn.signals import (
+    CircleFit,
+    circle_fit,
+    circle_fits,
+    find_peaks,
+    half_power,
+    without_window,
+)
+
+if TYPE_CHECKING:
+    import xarray
+
+SIDES = 1.5  # half-power widths on either side of a peak that a circle fit takes at most
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A peak of a frequency response; nan where it does not tell.
+
+    Attributes
+    ----------
+    frequency, height : float
+        Of the peak (Hz), refined between the frequencies, and in the unit of the response.
+    half_power, textbook : float
+        Damping ratio from the half-power points: exact for a single mode, and
+        (upper - lower) / (2 peak).
+    asymmetry : float
+        Of the half-power points; above 0.1 the peak is not that of a single mode.
+    natural_frequency, damping_ratio : float
+        From the circle fit (Hz).
+    frequency_error, damping_error : float
+        Standard errors of the circle fit.
+    misfit : float
+        Of the circle, as a part of its radius.
+    note : str
+        Why something is nan.
+    """
+
+    frequency: float
+    height: float
+    half_power: float = math.nan
+    textbook: float = math.nan
+    asymmetry: float = math.nan
+    natural_frequency: float = math.nan
+    damping_ratio: float = math.nan
+    frequency_error: float = math.nan
+    damping_error: float = math.nan
+    misfit: float = math.nan
+    note: str = ""
+
+
+def peaks_of(
+    response: xarray.Dataset,
+    node: int,
+    axis: str,
+    quantity: str | None = None,
+    prominence: float = 0.05,
+    count: int | None = None,
+) -> tuple[Peak, ...]:
+    """Peaks of a frequency response at one node along one axis, by increasing frequency.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        A result of `frf`.
+    node : int
+    axis : {"x", "y", "z"}
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        The curve whose peaks and half-power points are meant; by default what the response holds.
+        A strongly damped mode peaks at the lowest frequency in the receptance, at its natural
+        frequency in the mobility. The circle fit does not depend on it.
+    prominence : float
+        Least prominence of a peak, as a part of the curve's maximum.
+    count : int, optional
+        Only the so many most prominent peaks.
+
+    Returns
+    -------
+    tuple of Peak
+        Circles are fitted to all peaks together, or, where that does not succeed, to each alone.
+        Where the response was estimated with an exponential window, `half_power`,
+        `natural_frequency` and `damping_ratio` are without its damping.
+
+    Raises
+    ------
+    InputError
+        Not a frequency response; no such node, axis or quantity.
+    """
+    held = quantity_of(response)
+    column = AXES.index(check_axis("axis", axis))
+    if isinstance(node, bool) or node not in response["node"].values:
+        raise InputError(f"node = {node!r}: the response has nodes 0 to {len(response.node) - 1}")
+    shown = held
+    if quantity is not None:
+        shown = choice("quantity", quantity, PER_FORCE)
+        response = convert(response, shown)
+    f = response["frequency"].values
+    curve = response[shown].values[:, int(node), column]
+    usable = np.isfinite(curve)
+    f, curve = f[usable], curve[usable]
+    if f.size < 3 or not curve.any():
+        return ()
+    kind = shown if shown in PER_FORCE else "receptance"
+    rate = float(response.attrs.get("window_rate", 0.0))
+    found = find_peaks(f, curve, prominence, count, kind)
+    halves = [_half_power(f, curve, float(peak), kind, rate) for peak in found.frequency]
+    bands = _bands(f, np.abs(curve), found.index, [half.width for half in halves])
+    circles = _circles(f, _modal(response, f, curve, shown, axis, rate), bands, kind, rate)
+    return tuple(
+        Peak(
+            frequency=float(found.frequency[k]),
+            height=float(found.height[k]),
+            half_power=half.damping_ratio,
+            textbook=half.textbook,
+            asymmetry=half.asymmetry,
+            natural_frequency=circle.natural_frequency,
+            damping_ratio=circle.damping_ratio,
+            frequency_error=circle.frequency_error,
+            damping_error=circle.damping_error,
+            misfit=circle.misfit,
+            note="; ".join(filter(None, (half.note, circle.note))),
+        )
+        for k, (half, circle) in enumerate(zip(halves, circles, strict=True))
+    )
+
+
+class _Half(NamedTuple):
+    damping_ratio: float = math.nan
+    textbook: float = math.nan
+    asymmetry: float = math.nan
+    width: float = math.inf  # Hz
+    note: str = ""
+
+
+class _Circle(NamedTuple):
+    natural_frequency: float = math.nan
+    damping_ratio: float = math.nan
+    frequency_error: float = math.nan
+    damping_error: float = math.nan
+    misfit: float = math.nan
+    note: str = ""
+
+
+def _half_power(f: NDArray, curve: NDArray, near: float, kind: str, rate: float) -> _Half:
+    """What the half-power points of a peak tell."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
+        try:
+            points = half_power(f, curve, near, kind)
+        except InputError as error:
+            return _Half(note=f"half power: {error}")
+    ratio = points.damping_ratio
+    if rate > 0.0:
+        ratio = float(without_window(points.natural_frequency, ratio, rate)[1])
+    width = points.upper - points.lower
+    return _Half(ratio, points.textbook_damping_ratio, points.asymmetry, width)
+
+
+def _bands(
+    f: NDArray, size: NDArray, index: NDArray, widths: list[float]
+) -> list[tuple[float, float]]:
+    """Band (Hz) of each peak: to the lowest point before the next one, but not too wide."""
+    ends = [0, *index.tolist(), len(f) - 1]
+    valleys = [
+        ends[k] + int(np.argmin(size[ends[k] : ends[k + 1] + 1])) for k in range(len(index) + 1)
+    ]
+    bands = []
+    for k, at in enumerate(index):
+        low, high = f[valleys[k]], f[valleys[k + 1]]
+        reach = SIDES * widths[k]
+        bands.append((max(low, f[at] - reach), min(high, f[at] + reach)))
+    return bands
+
+
+def _modal(
+    response: xarray.Dataset, f: NDArray, curve: NDArray, shown: str, axis: str, rate: float
+) -> NDArray[np.complex128]:
+    """The curve as one in which a mode makes a circle.
+
+    A transmissibility is 1 - (s^2 + alpha s) times the receptance of what the base accelerates,
+    s = i w and the rate of the window, if any.
+    """
+    if shown in PER_FORCE:
+        return curve
+    s = 2j * np.pi * f + rate
+    still = 1.0 if axis == response.attrs["base_axis"] else 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (still - curve) / (s * (s + float(response.attrs["alpha"])))
+
+
+def _circles(
+    f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str, rate: float
+) -> list[_Circle]:
+    """What the circle fits of all peaks tell."""
+    try:
+        return [_told(fit, rate) for fit in circle_fits(f, curve, bands, kind)] if bands else []
+    except (InputError, ComputationError):
+        return [_alone(f, curve, band, kind, rate) for band in bands]
+
+
+def _alone(
+    f: NDArray, curve: NDArray, band: tuple[float, float], kind: str, rate: float
+) -> _Circle:
+    try:
+        return _told(circle_fit(f, curve, band, kind), rate)
+    except (InputError, ComputationError) as error:
+        return _Circle(note=str(error))
+
+
+def _told(fit: CircleFit, rate: float) -> _Circle:
+    """A fit, without the damping of the window."""
+    natural, ratio = fit.natural_frequency, fit.damping_ratio
+    if rate > 0.0:
+        natural, ratio = (float(value) for value in without_window(natural, ratio, rate))
+    return _Circle(natural, ratio, fit.frequency_error, fit.damping_error, fit.misfit)

@@ -1,0 +1,140 @@
+"""Motions of a case about a state, from which frequency responses are estimated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import (
+    Actuate,
+    BaseMotion,
+    Case,
+    Fix,
+    Force,
+    History,
+    Impose,
+    State,
+    Table,
+    resolve_nodes,
+)
+from foldyn.cases.supports import AXES, Support
+from foldyn.cases.values import choice, number
+from foldyn.dynamics import METHODS, Progress, simulate
+from foldyn.dynamics.progress import Reporter
+from foldyn.linear.equilibrium import Station
+from foldyn.linear.excitation import Drive
+
+
+@dataclass(frozen=True)
+class Integration:
+    """How the motions of a frequency response are integrated.
+
+    Parameters
+    ----------
+    integrator : str
+        Method of `simulate`.
+    dt : float, optional
+        Largest time step (s), shortened to divide the sampling interval. Without it, the default
+        of `simulate`.
+    tolerance : float, optional
+        As of `simulate`.
+    """
+
+    integrator: str = "rk4"
+    dt: float | None = None
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        choice("integrator", self.integrator, METHODS)
+        for name in ("dt", "tolerance"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), above=0.0)
+
+
+class Rig:
+    """A case held in a state by its loads, ready to be driven.
+
+    The loads of the case act as the constant forces that balance the state, so that nothing moves
+    without the drive, whatever the tolerance with which the state was found.
+    """
+
+    def __init__(self, station: Station, drive: Drive, integration: Integration) -> None:
+        self.case, self.state = station.problem.case, station.displacement
+        self.drive, self.integration = drive, integration
+        folded = [load for load in self.case.loads if isinstance(load, Actuate)]
+        history = Table([0.0, 1.0], [station.factor, station.factor])
+        self._loads: list[Force | Actuate] = [
+            *(replace(load, history=history) for load in folded if station.factor != 0.0),
+            *self._holding(station),
+        ]
+        self._supports = [*self._held()]
+
+    def _holding(self, station: Station) -> list[Force]:
+        problem = station.problem
+        force = problem.internal(problem.start(), station.factor)
+        force[self.case.supported_dofs] = 0.0
+        force[np.abs(force) <= problem.force_rounding] = 0.0
+        return forces(force.reshape(-1, 3))
+
+    def _held(self) -> list[Support]:
+        """Supports that stay where the state puts them; a base of the case's own stands still."""
+        held: list[Support] = [s for s in self.case.supports if isinstance(s, Fix)]
+        for support in self.case.supports:
+            if isinstance(support, Impose):
+                nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")
+                where = self.state[nodes, AXES.index(support.axis)]
+                held.append(Impose(nodes.tolist(), support.axis, where.tolist()))
+        return held
+
+    def driven(self, history: History) -> Case:
+        """The case under its drive."""
+        loads, supports = list(self._loads), list(self._supports)
+        if self.drive.axis is None:
+            loads += forces(self.drive.vector, history)
+        else:
+            supports.append(BaseMotion(self.drive.axis, history, self.drive.value))
+        return Case(self.case.structure, supports, loads, self.case.damping)
+
+    def run(
+        self,
+        history: History,
+        duration: float,
+        every: float,
+        progress: Reporter,
+        start: float = 0.0,
+        initial: State | None = None,
+    ) -> tuple[NDArray, NDArray, State]:
+        """Times, response (nt, n, 3) less the state, and the state at the end of a motion."""
+        how = self.integration
+        dt = None if how.dt is None else every / math.ceil(every / how.dt * (1.0 - 1e-12))
+        motion = simulate(
+            self.driven(history), duration, how.integrator, dt, every,
+            initial or State(self.state), tolerance=how.tolerance, start=start, progress=progress,
+        )  # fmt: skip
+        displacement, velocity = motion["displacement"].values, motion["velocity"].values
+        return (
+            motion["time"].values,
+            displacement - self.state,
+            State(displacement[-1], velocity[-1]),
+        )
+
+
+def forces(vectors: NDArray, history: History | None = None) -> list[Force]:
+    """Forces (n, 3) on nodes as loads, equal ones together."""
+    distinct, which = np.unique(vectors, axis=0, return_inverse=True)
+    return [
+        Force(np.flatnonzero(which.ravel() == k).tolist(), vector.tolist(), history)
+        for k, vector in enumerate(distinct)
+        if vector.any()
+    ]
+
+
+def overall(report: Reporter, before: float, total: float) -> Callable[[Progress], Any]:
+    """Reporter of one of several motions: `before` of `total` simulated seconds are done."""
+    return lambda now: report(Progress(before + now.time, total, now.steps, now.energy_error))

@@ -1,0 +1,153 @@
+"""What modes do: shares of a beam's motions, and names."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import TOP, body, paper_specimen
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.linear import character, modes
+from foldyn.results import modes_dataset
+
+STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
+KINDS = ["axial", "bending along y", "bending along z", "torsion", "distortion"]
+
+
+def tall():
+    """A Kresling column of many storeys along z."""
+    pattern = fd.patterns.kresling(sides=8, radius=1, height=0.5, twist=20, storeys=12)
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), **STRAIGHT)
+
+
+def given(s, shapes):
+    """A set of modes with shapes (k, n, 3) that were not computed."""
+    k = len(shapes)
+    nothing = {"participation": np.zeros((k, 3)), "effective_mass": np.zeros((k, 3))}
+    values = {
+        "frequency": np.arange(1.0, k + 1), "eigenvalue": np.ones(k), "shape": shapes,
+        "rigid": np.zeros(k, bool), "rigid_share": np.zeros(k), "damping_ratio": np.zeros(k),
+        "displacement": np.zeros(s.nodes.shape), **nothing,
+    }  # fmt: skip
+    return modes_dataset(fd.Case(s), values, {})
+
+
+def beam(s, axis="z"):
+    """Motions of a beam along an axis on the nodes of a structure, by kind."""
+    a = "xyz".index(axis)
+    b, c = (a + 1) % 3, (a + 2) % 3
+    x = s.nodes - s.nodes.mean(axis=0)
+    t = (x[:, a] - x[:, a].min()) / np.ptp(x[:, a])
+    out = {name: np.zeros(x.shape) for name in ("axial", "b", "c", "torsion")}
+    out["axial"][:, a] = t
+    out["b"][:, b], out["b"][:, a] = t**2, -2 * t * x[:, b] / np.ptp(x[:, a])
+    out["c"][:, c], out["c"][:, a] = t**2, -2 * t * x[:, c] / np.ptp(x[:, a])
+    out["torsion"] = t[:, None] * np.cross(np.eye(3)[a], x)
+    return list(out.values())
+
+
+@pytest.mark.parametrize(
+    ("axis", "kinds"),
+    [
+        ("x", ["axial", "bending along y", "bending along z", "torsion"]),
+        ("y", ["axial", "bending along z", "bending along x", "torsion"]),
+        ("z", ["axial", "bending along x", "bending along y", "torsion"]),
+    ],
+)
+def test_motions_of_a_beam_are_recognized(axis, kinds):
+    s = tall()
+    found = character(given(s, beam(s, axis)), axis)
+    assert found.kind_of.values.tolist() == kinds
+    leading = found.share.max("kind").values
+    assert (leading > 0.97).all()
+    np.testing.assert_allclose(found.share.sum("kind"), 1.0, atol=1e-12)
+    assert found.name.values.tolist() == [f"first {kind}" for kind in kinds]
+
+
+def test_breathing_is_distortion():
+    s = tall()
+    outward = s.nodes * [1.0, 1.0, 0.0]
+    oval = s.nodes * [1.0, -1.0, 0.0]
+    found = character(given(s, [outward, oval]), "z")
+    assert found.kind_of.values.tolist() == ["distortion"] * 2
+    assert found.name.values.tolist() == ["first distortion", "second distortion"]
+    assert (found.share.sel(kind="distortion") > 0.99).all()
+
+
+def test_a_mixture_is_shared_by_its_kinetic_energy():
+    s = tall()
+    along, turned = beam(s)[0], beam(s)[3]
+    weight = s.mass.diagonal()[:, None]
+    along = along / np.sqrt((weight * along**2).sum())
+    turned = turned / np.sqrt((weight * turned**2).sum())
+    found = character(given(s, [0.6 * along + 0.8 * turned]), "z")
+    assert found.share.sel(kind="axial").item() == pytest.approx(0.36, abs=5e-3)
+    assert found.share.sel(kind="torsion").item() == pytest.approx(0.64, abs=5e-3)
+
+
+def test_the_modes_of_a_column():
+    """Its sections are alike in x and y: bending comes in pairs of equal frequency."""
+    s = tall()
+    base = np.flatnonzero(s.nodes[:, 2] < 1e-9)
+    found = modes(fd.Case(s, [fd.Fix(base, "xyz")]), 6)
+    kinds = character(found, "z").kind_of.values.tolist()
+    assert kinds[:2] == kinds[4:] == ["distortion"] * 2  # its ends become oval
+    assert sorted(kinds[2:4]) == ["bending along x", "bending along y"]
+    assert float(found.frequency[2]) == pytest.approx(float(found.frequency[3]))
+
+
+@pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
+@pytest.mark.parametrize(
+    ("rest", "state"), [("stress_free", None), ("as_published", "equilibrium")]
+)
+def test_the_wobbles_of_the_specimen_are_bending_in_its_plane(rest, state, mass):
+    """The paper's first wobble, axial mode, second wobble (3.8, 9.3, 16.7 Hz) along x.
+
+    The sheet, 0.1 x 0.087 m, sways along y in its plane and its top edge turns about z, so that
+    the corners move along x: what its FRF shows at a corner.
+    """
+    found = modes(paper_specimen(mass, rest), 8, state, secant=0.5)
+    what = character(found)
+    named = dict(zip(what.name.values.tolist(), found.frequency.values, strict=True))
+    for name, frequency in (
+        ("first bending along y", 3.8), ("first axial", 9.3), ("second bending along y", 16.7),
+    ):  # fmt: skip
+        assert 0.9 < named[name] / frequency < 1.3, name
+    assert named["first bending along z"] < 0.65 * named["first axial"]
+    share = what.share.sel(kind=["axial", "bending along y"]).max("kind")
+    for name in ("first bending along y", "first axial", "second bending along y"):
+        assert float(share[what.name.values.tolist().index(name)]) > 0.85
+    edge = character(found, nodes=TOP, stations=1)
+    assert edge.kind.values.tolist() == KINDS
+    first = edge.isel(mode=what.name.values.tolist().index("first bending along y"))
+    assert float(first.share.sel(kind="bending along y")) > 0.95
+
+
+def test_rigid_modes_are_called_so():
+    found = modes(fd.Case(tall()), 8)
+    names = character(found, "z").name.values.tolist()
+    assert names[:2] == ["first rigid", "second rigid"] and names[5] == "sixth rigid"
+    assert "rigid" not in names[6]
+
+
+def test_one_dozen_of_nodes_has_two_stations():
+    pattern = fd.patterns.kresling(sides=6, radius=1, height=0.9, twist=30, storeys=1)
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    t = s.nodes[:, 2:] / 0.9 * [0.0, 0.0, 1.0]
+    assert character(given(s, [t]), "z").kind_of.values.tolist() == ["axial"]
+
+
+def test_refused():
+    found = modes(fd.Case(body("miura"), [fd.Fix([0, 1, 2], "xyz")]), 2, secant=1.0)
+    with pytest.raises(InputError, match="axis = 'xy'"):
+        character(found, "xy")
+    with pytest.raises(InputError, match="no node 41"):
+        character(found, nodes=[41])
+    with pytest.raises(InputError, match="mode 1 does not move them"):
+        character(found, nodes=[0, 1])
+    with pytest.raises(InputError, match="stations = 0"):
+        character(found, stations=0)
+    path = fd.trace(paper_specimen(rest="as_published"), load_factors=[0.0])
+    with pytest.raises(InputError, match="is a path; give modes"):
+        character(path)

@@ -1,0 +1,74 @@
+"""The page of the modes: what it shows runs, and its numbers are computed."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import paper_specimen
+
+from foldyn.linear import character, equivalent_slope, modes
+from foldyn.results.modes import MODE_VARIABLES
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "modes.md").read_text("utf-8")
+
+
+def test_the_examples_run():
+    names: dict = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S):
+        exec(compile(block, "modes.md", "exec"), names)
+    omega = 2 * np.pi * names["found"].frequency.values
+    np.testing.assert_allclose(names["found"].damping_ratio, 0.03 / omega, rtol=1e-9)
+    assert float(names["full"].displacement[40, 0]) > float(names["half"].displacement[40, 0]) > 0
+    assert names["values"].shape == (4, 4)
+    assert names["pairs"].mac[0] > 0.9
+    assert float(names["what"].share.max("kind")[0]) > 0.9
+
+
+def test_every_variable_has_a_row():
+    rows = "".join(line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `"))
+    assert [name for name in MODE_VARIABLES if f"`{name}`" not in rows] == []
+
+
+def test_the_slope_at_rest():
+    assert f"= {float(equivalent_slope(0.0, 1.0)):.3f}," in PAGE
+
+
+def test_the_table_of_the_specimen():
+    header = next(line for line in PAGE.splitlines() if line.startswith("| `secant`"))
+    names = [cell.strip() for cell in header.split("|")[2:-1]]
+    rows = re.findall(r"^\| ([\d.]+) \| ([\d. |]+) \|$", PAGE, re.M)
+    assert len(rows) == 5
+    for amplitude, cells in rows:
+        found = modes(paper_specimen(), 8, secant=float(amplitude))
+        named = dict(zip(character(found).name.values, found.frequency.values, strict=True))
+        shown = [float(cell) for cell in cells.split("|")]
+        assert [named[name] for name in names] == pytest.approx(shown, abs=0.006)
+
+
+def test_what_the_page_says_of_the_turns_of_bends():
+    found = modes(paper_specimen(), 6, secant=0.03)
+    s, medians = found.attrs, []
+    structure = paper_specimen().structure
+    rest = structure.dihedrals(np.zeros_like(structure.nodes))[1]
+    assert s["secant"] == 0.03
+    for name in ("first bending along y", "first axial", "second bending along y"):
+        shape = found["shape"].values[character(found).name.values.tolist().index(name)]
+        small = 1e-7 * shape / np.abs(shape[[0, 6], 0]).max()
+        turns = np.degrees(np.abs(structure.dihedrals(small)[1] - rest)) * 1e4
+        medians.append(float(np.median(turns)))
+    low, high = re.search(
+        r"more than ([\d.]+) to ([\d.]+) degrees", PAGE.replace("\n", " ")
+    ).groups()
+    assert (min(medians), max(medians)) == pytest.approx((float(low), float(high)), rel=0.15)
+
+
+def test_modes_without_a_secant_warn_on_this_page():
+    assert "warns of it with the number of hinges" in PAGE
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        modes(paper_specimen(), 2)
+    assert "192 hinges" in str(caught[0].message)
