@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 import foldyn as fd
 from foldyn.cases import Table, read_case
-from foldyn.cases.analyses import KINDS
+from foldyn.cases.kinds import KINDS
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -39,7 +39,7 @@ def test_the_case_file_page_shows_a_case_file(tmp_path):
 
 
 def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
-    page, moving, actuated, _ = blocks("case-file.md", "toml")
+    page, moving, actuated, *_ = blocks("case-file.md", "toml")
     rest = re.sub(r"^\[\[(supports|loads)\]\]\n(.+\n)*", "", page, flags=re.M)
     (tmp_path / "case.toml").write_text(rest + moving + actuated, "utf-8")
     case = read_case(tmp_path / "case.toml").case()
@@ -50,7 +50,7 @@ def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
-    page, *_, slow = blocks("case-file.md", "toml")
+    page, *_, slow, _ = blocks("case-file.md", "toml")
     rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)
     rest = rest[: rest.index("[[loads]]")]
     (tmp_path / "case.toml").write_text(rest + slow, "utf-8")
@@ -59,6 +59,19 @@ def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
     moved = path.displacement.sel(node=7, axis="x").values
     assert moved[-1] >= 0.02 > moved[-2]  # until
     assert case_file.output.shapes == (0, -1)
+
+
+def test_the_response_of_the_case_file_page_can_be_computed(tmp_path):
+    page, *_, shaken = blocks("case-file.md", "toml")
+    rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)
+    rest = rest[: rest.index("[[loads]]")]
+    (tmp_path / "case.toml").write_text(rest + shaken, "utf-8")
+    case_file = read_case(tmp_path / "case.toml")
+    response = fd.linear.frf(case_file.case(), **case_file.analysis.arguments)
+    (drive,) = case_file.analysis.arguments["drive"]
+    assert response.attrs["drive_force"] == pytest.approx(0.001 * 3)  # on three vertices
+    assert drive.nodes == "xmax"
+    assert case_file.output.quantity == "mobility"
 
 
 def test_compress_release_vibrate_of_the_quasi_static_page():

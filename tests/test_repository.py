@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import shutil
@@ -12,9 +13,12 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
-from foldyn.cases import analyses
-from foldyn.cases.casefile import SETTINGS
+from foldyn.cases import analyses, vibrations
+from foldyn.cases.reading import SETTINGS
 from foldyn.kernel_cache import remove_stale_caches
+from foldyn.linear import METHODS as RESPONSES
+from foldyn.linear.burst_random import ESTIMATORS
+from foldyn.linear.quantity import PER_FORCE
 from foldyn.plots.writers import WRITERS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -112,6 +116,26 @@ def test_case_files_may_name_every_kind_of_animation():
 
 def test_case_files_may_name_every_method_of_following_a_path():
     assert tuple(fd.statics.METHODS) == analyses.PATH_METHODS
+
+
+def test_frequency_responses_that_case_files_name_are_those_there_are():
+    keys = {
+        method.name: tuple(field.name for field in dataclasses.fields(method.options))
+        for method in RESPONSES.values()
+    }
+    assert keys == {name: tuple(keys) for name, keys in vibrations.FRF_METHODS.items()}
+    linear = [m.name for m in RESPONSES.values() if m.linear and m.secant is None]
+    assert tuple(linear) == vibrations.LINEAR_METHODS
+    assert tuple(PER_FORCE) == vibrations.QUANTITIES
+    assert set(ESTIMATORS) == set(vibrations.ESTIMATORS)
+
+
+def test_defaults_of_frequency_responses_in_case_files_are_those_of_the_methods():
+    for method in RESPONSES.values():
+        for option in dataclasses.fields(method.options):
+            ours = vibrations.FrfSection.model_fields[option.name].default
+            shared = sum(option.name in keys for keys in vibrations.FRF_METHODS.values())
+            assert ours == option.default or (ours is None and shared > 1), option.name
 
 
 def test_settings_of_a_path_in_case_files_are_those_of_the_solver():

@@ -207,9 +207,9 @@ BAD = {
         "pattern: give only one of kind and file",
     ),
     "no pattern": ([('kind = "miura"\n', "")], "pattern: give kind (a generator), file, or"),
-    "later analysis": (
-        [('kind = "dynamics"', 'kind = "modes"')],
-        'analysis.kind = "modes": not available in this version; available: dyn',
+    "other analysis": (
+        [('kind = "dynamics"', 'kind = "mode"')],
+        "analysis.kind = \"mode\": did you mean 'modes'? choose one of dynamics, statics, modes",
     ),
     "analysis": (
         [('kind = "dynamics"', 'kind = "dynamic"')],

@@ -146,7 +146,7 @@ BAD = {
     ),
     "key of a motion": (
         [('"statics"', '"statics"\nduration = 1.0')],
-        'analysis.duration: only for analysis.kind = "dynamics"; leave it out',
+        'analysis.duration: only for analysis.kind = "dynamics" or "frf"; leave it out',
     ),
     "output of a motion": (
         [('"statics"', '"statics"\n[output]\nevery = 0.1')],
@@ -278,7 +278,7 @@ def test_a_bad_file_gets_one_message(read, name) -> None:
 
 def test_keys_of_a_path_in_a_motion_are_told_as_such(read, short) -> None:
     text = short + "[output]\nshapes = 3\n"
-    check(read, text, 'output.shapes: only for analysis.kind = "statics"; leave it out')
+    check(read, text, 'output.shapes: only for analysis.kind = "statics" or "modes"; leave it out')
     text = short.replace("duration = 10", "duration = 10\nsteps = 5")
     check(read, text, 'analysis.steps: only for analysis.kind = "statics"; leave it out')
 
@@ -288,4 +288,4 @@ def test_a_file_that_does_not_say_its_kind(read) -> None:
     with pytest.raises(InputError) as caught:
         read(text)
     (line,) = str(caught.value).splitlines()  # what depends on the kind is not complained about
-    assert line.endswith("analysis.kind: missing; choose one of dynamics, statics")
+    assert line.endswith("analysis.kind: missing; choose one of dynamics, statics, modes, frf")

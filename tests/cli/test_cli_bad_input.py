@@ -134,9 +134,9 @@ BAD = {
         "output.every: 2.69e+09 samples of 13 nodes need 1.86e+03 GiB",
         "raise it",
     ),
-    "modes": (
-        [('kind = "dynamics"', 'kind = "modes"')],
-        'analysis.kind = "modes": not available in this version; available: dynamics, statics',
+    "unknown analysis": (
+        [('kind = "dynamics"', 'kind = "buckling"')],
+        'analysis.kind = "buckling": choose one of dynamics, statics, modes, frf',
     ),
     "axes": (
         [('axes = "xyz"', 'axes = "xq"')],

@@ -11,6 +11,7 @@ import pytest
 import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.formats import FORMATS
+from foldyn.linear import METHODS as RESPONSES
 from foldyn.structures import MASS_RULES
 from foldyn.studies import shipped_cases
 
@@ -30,7 +31,8 @@ def test_info(workplace) -> None:
     (solver,) = [line for line in lines if line.startswith("optional solver")]
     found = fd.statics.SOLVERS["pardiso"].present
     assert solver.endswith("pardiso, found" if found else "missing: pip install pypardiso")
-    for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES, *fd.statics.METHODS):
+    methods = (*fd.statics.METHODS, *RESPONSES)
+    for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES, *methods):
         assert name in told.out
     for name in shipped_cases():
         assert f"  {name}" in lines

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.dynamics import numbering
+from foldyn.dynamics import METHODS, numbering
 from foldyn.mechanics import renumber
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
@@ -31,7 +31,7 @@ def everything(mass: str) -> fd.Case:
     return fd.Case(s, supports, loads, fd.Rayleigh(alpha=1.0, beta=1e-5))
 
 
-@pytest.mark.parametrize("method", ["rk4", "central_difference", "dormand_prince"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_a_motion_in_another_order(mass, method, monkeypatch):
     case = everything(mass)

@@ -130,6 +130,24 @@ def test_modes_that_damping_couples():
     assert largest_error(modal, direct) < 1e-9
 
 
+def test_a_shell():
+    """Its edges' rotations have no mass: they follow, and do not show."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    shell = fd.shells.shell(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), divisions=2)
+    supports = miura_case().supports
+    case = fd.Case(shell, supports, damping=fd.Rayleigh(0.5, 1e-3))
+    drive = fd.Force([7], (0.01, 0, 0))
+    direct, modal, harmonic = (
+        frf(case, drive, F, method=m).receptance.values for m in ("direct", "modal", "harmonic")
+    )
+    assert direct.shape == (len(F), len(shell.nodes), 3)
+    assert largest_error(modal, direct) < 1e-6
+    assert largest_error(harmonic, direct) < 1e-8
+    natural = fd.linear.modes(case, 4).frequency.values
+    (peak, *_) = peaks_of(frf(case, drive, np.arange(0.2, 1.5, 0.02)), 7, "x")
+    assert np.abs(peak.natural_frequency / natural - 1.0).min() < 1e-3
+
+
 def test_static_correction_converges_faster():
     case, drive = miura_case(), fd.Force([7], (0.01, 0, 0))
     direct = frf(case, drive, F).receptance.values

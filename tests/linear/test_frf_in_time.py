@@ -185,6 +185,22 @@ def test_folds_turned_part_of_the_way():
     assert largest_error(found.receptance, direct.receptance.values) < 5e-4
 
 
+def test_damping_of_the_state():
+    """K0 in the state about which it moves; steps of a sine start elsewhere and are refused."""
+    loaded = miura_case([fd.Force([7], (0.004, 0, 0))])
+    damping = fd.Rayleigh(2.0, 5e-3, state="start")
+    case = fd.Case(loaded.structure, loaded.supports, loaded.loads, damping)
+    drive, f = fd.Force([7], (1e-6, 0, 0)), np.arange(0.5, 3.01, 0.5)
+    direct = frf(case, drive, f, state="equilibrium")
+    found = frf(case, drive, f, state="equilibrium", method="impulse")
+    assert largest_error(found.receptance, direct.receptance.values) < 5e-4
+    at_rest = fd.Case(loaded.structure, loaded.supports, loaded.loads, fd.Rayleigh(2.0, 5e-3))
+    other = frf(at_rest, drive, f, state="equilibrium")
+    assert largest_error(other.receptance, direct.receptance.values) > 0.05
+    with pytest.raises(InputError, match='use state = "rest"'):
+        frf(case, drive, f, state="equilibrium", method="stepped_sine")
+
+
 def test_imposed_nodes_stay_where_the_state_puts_them():
     loaded = miura_case(alpha=4.0)
     supports = [*loaded.supports, fd.Impose([8], "x", 0.05)]
@@ -220,6 +236,7 @@ def test_progress(method):
         ("burst_random", {"frequencies": [0.0, 1.0]}, "cannot give 0 Hz"),
         ("impulse", {"pulse": 1.0}, "pulse = 1 s: has no strength left at 4 Hz"),
         ("impulse", {"pulse": 0.3, "duration": 0.2}, "does not end within"),
+        ("impulse", {"pulse": 0.01, "every": 0.01}, "has only 1 samples"),
         ("impulse", {"secant": 1.0}, "takes the laws as they are"),
         ("impulse", {"integrator": "euler"}, "integrator"),
         ("impulse", {"dt": -1.0}, "dt"),

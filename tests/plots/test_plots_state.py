@@ -6,10 +6,12 @@ import subprocess
 import sys
 
 import matplotlib
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+import foldyn as fd
 from foldyn import plots
 
 
@@ -37,6 +39,14 @@ def _figures(case, trajectory):
     yield plots.plot_load_history(case, 1.0)
     yield plots.plot_laws(case.structure)
     yield plots.plot_energies(trajectory)
+    shaken = fd.Case(case.structure, case.supports, damping=fd.Rayleigh(alpha=1.0))
+    modes = fd.modes(shaken, count=2, secant=1.0)
+    yield plots.draw_modes(shaken, modes)
+    yield plots.plot_mac(fd.mac(modes, modes), ["a", "b"])
+    drive = [fd.Force([7], (0.01, 0, 0))]
+    response = fd.frf(shaken, drive, np.linspace(0.1, 2.0, 60), secant=1.0)
+    yield plots.plot_frf({"one": response}, [6, 7])
+    yield plots.plot_nyquist(response, 7)
 
 
 def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
@@ -59,7 +69,7 @@ def test_global_settings_are_neither_changed_nor_followed(case, trajectory):
     odd |= {"axes.labelcolor": "green", "axes.edgecolor": "red", "legend.labelcolor": "red"}
     with matplotlib.rc_context(odd):
         unusual = [_pixels(figure) for figure in _figures(case, trajectory)]
-    assert [a == b for a, b in zip(usual, unusual, strict=True)] == [True] * 5
+    assert [a == b for a, b in zip(usual, unusual, strict=True)] == [True] * 9
 
 
 def _pixels(figure):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cases.casefile import read_case
+from foldyn.cases import read_case
 from foldyn.report import write_path
 from foldyn.report.path import moved_supports
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cases.actuation import Actuate
@@ -26,7 +27,8 @@ from foldyn.cases.state import State
 from foldyn.cases.supports import BaseMotion, Fix, Impose
 
 if TYPE_CHECKING:
-    from foldyn.cases.casefile import CaseFile, read_case
+    from foldyn.cases.casefile import CaseFile
+    from foldyn.cases.reading import read_case
 
 __all__ = [
     "HISTORIES",
@@ -57,9 +59,11 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in ("CaseFile", "read_case"):  # they need pydantic, which is slow to import
-        from foldyn.cases import casefile
+_HOMES = {"CaseFile": "casefile", "read_case": "reading"}
+"""What needs pydantic, which is slow to import, and is loaded when first used."""
 
-        return getattr(casefile, name)
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""The case file's contract, kind by kind: what each analysis takes, and what its output may be.
+"""The case file's contract for motions and paths: what each takes, and what its output may be.
 
 A path has no time: what only a motion can use (histories, moving bases, spectra, lists of mass
 rules) is refused, as it would be left out without a word otherwise.
@@ -6,10 +6,9 @@ rules) is refused, as it would be left out without a word otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from foldyn.cases.schema import (
     CaseSchema,
@@ -26,10 +25,11 @@ from foldyn.cases.values import choice, indices, number, show
 from foldyn.errors import InputError
 from foldyn.structures import MASS_RULES
 
-LATER_ANALYSES = ("modes", "frf")
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
-METHODS = ("rk4", "central_difference", "dormand_prince")
+METHODS = (
+    "rk4", "central_difference", "dormand_prince", "newmark", "generalized_alpha", "energy_momentum",
+)
 """Integrators that a case file may name."""
 PATH_METHODS = ("newton", "displacement", "mgdcm", "arc_length")
 """Methods of following a path that a case file may name."""
@@ -215,21 +215,6 @@ class PathLoad(LoadSection):
     history: Annotated[Any, PlainValidator(_timeless)] = None
 
 
-def _known_kind(value: Any) -> Any:
-    """Refuse an analysis whose kind is missing or unknown."""
-    if not isinstance(value, Mapping):
-        return value
-    if "kind" not in value:
-        raise InputError(f".kind: missing; choose one of {', '.join(KINDS)}")
-    if value["kind"] in LATER_ANALYSES:
-        raise InputError(
-            f".kind = {show(value['kind'])}: not available in this version; available: "
-            f"{', '.join(KINDS)}"
-        )
-    choice(".kind", value["kind"], KINDS)
-    return value
-
-
 class MotionSchema(CaseSchema):
     """A case file of kind "dynamics"."""
 
@@ -247,22 +232,3 @@ class PathSchema(CaseSchema):
     initial: PathStart | None = None
     analysis: StaticsSection
     output: PathOutput = PathOutput()
-
-
-class UnknownSchema(CaseSchema):
-    """A case file that does not say its kind: the sections of its kind are left alone."""
-
-    initial: Any = None
-    analysis: Annotated[dict[str, Any], BeforeValidator(_known_kind)]
-    output: Any = None
-
-
-KINDS: Mapping[str, type[CaseSchema]] = {"dynamics": MotionSchema, "statics": PathSchema}
-"""What a case file of each kind looks like."""
-
-
-def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
-    """Schema of a case file by the kind that it names."""
-    analysis = document.get("analysis")
-    kind = analysis.get("kind") if isinstance(analysis, Mapping) else None
-    return KINDS.get(kind, UnknownSchema) if isinstance(kind, str) else UnknownSchema

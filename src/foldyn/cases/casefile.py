@@ -1,10 +1,7 @@
-"""Reading a case file: a TOML text that is checked whole before anything runs."""
+"""A case file that has been read: what it says, and the cases and states that it makes."""
 
 from __future__ import annotations
 
-import os
-import tomllib
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,31 +10,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from foldyn.cases.actuation import Actuate
-from foldyn.cases.analyses import KINDS, StaticsSection, schema_of
 from foldyn.cases.case import Case
-from foldyn.cases.damping import Rayleigh
-from foldyn.cases.decode import call_from
 from foldyn.cases.initial import Initial, rigid_motion
-from foldyn.cases.loads import Force, Gravity
-from foldyn.cases.messages import describe
-from foldyn.cases.schema import LoadSection, SupportSection
-from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.state import State
-from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
-from foldyn.cases.until import Reached
 from foldyn.cases.values import choice, show
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.formats import read_pattern
-from foldyn.patterns import GENERATORS, Pattern
-from foldyn.structures import MASS_RULES, ModelOptions, Sheet, discretize
-
-SAMPLES = 2000
-"""Samples that a motion keeps when the file does not say."""
-SETTINGS = ("tolerance", "largest_turn", "stability")
-"""Keys of a path's analysis that are settings of its solver."""
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+from foldyn.structures import MASS_RULES, Sheet, discretize
 
 
 @dataclass(frozen=True)
@@ -47,9 +27,9 @@ class Analysis:
     Attributes
     ----------
     kind : str
-        "dynamics" or "statics".
+        "dynamics", "statics", "modes" or "frf".
     arguments : dict
-        Keyword arguments of its function: `simulate` or `trace`.
+        Keyword arguments of its function: `simulate`, `trace`, `modes` or `frf`.
     settings : dict
         Of a path: arguments of its `foldyn.statics.Settings`.
     """
@@ -67,6 +47,8 @@ class Output:
     ----------
     nodes : ndarray of int64
         Nodes that figures and spectra show.
+    named : bool
+        Whether the file names these nodes, or they are those of the default.
     axis : str or None
         Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
         one in which a node moves most.
@@ -77,15 +59,20 @@ class Output:
     max_frequency : float or None
         Of a motion: where the axes of spectra end (Hz); None: at half the sampling rate.
     shapes : int, tuple of int or None
-        Of a path: how many deformed shapes are drawn, or the numbers of their points.
+        Of a path: how many deformed shapes are drawn, or the numbers of their points. Of modes:
+        how many are drawn, or their numbers.
+    quantity : str or None
+        Of a frequency response: "receptance", "mobility" or "accelerance"; None: what it is.
     """
 
     nodes: NDArray[np.int64]
+    named: bool = False
     axis: str | None = None
     animation: str = "gif"
     every: int | float | None = None
     max_frequency: float | None = None
     shapes: int | tuple[int, ...] | None = None
+    quantity: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +92,8 @@ class CaseFile:
     analysis : Analysis
     output : Output
     start : Initial or None
-        How the motion or path starts if not at rest; `initial` makes a state of it.
+        How the motion or path starts, or about what modes swing, if not at rest; `initial` makes a
+        state of it.
     """
 
     path: Path
@@ -123,13 +111,13 @@ class CaseFile:
         """Case with one of the mass rules, by default the first that the file names."""
         rule = self.masses[0] if mass is None else choice("mass", mass, MASS_RULES)
         if rule not in self._cases:
-            self._cases[rule] = _build(self.path, self.pattern, self.sheet, rule, self._parts)
+            self._cases[rule] = build(self.path, self.pattern, self.sheet, rule, self._parts)
         return self._cases[rule]
 
     def initial(
         self, mass: str | None = None, read: Callable[[Path, int], State] | None = None
     ) -> State | None:
-        """State that the motion or path starts from; None for rest.
+        """State that the motion or path starts from, or about which modes swing; None for rest.
 
         Parameters
         ----------
@@ -150,7 +138,7 @@ class CaseFile:
             return None
         case = self.case(mass)
         if self.start.file is None:
-            with _placed(self.path, "initial: "):
+            with placed(self.path, "initial: "):
                 return rigid_motion(case, self.start)
         if read is None:
             raise InputError(
@@ -175,164 +163,18 @@ class CaseFile:
         return state
 
 
-def read_case(path: str | os.PathLike[str]) -> CaseFile:
-    """Read a case file and check it whole.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file; see the documentation for its keys. Relative paths in it start at its folder.
-
-    Returns
-    -------
-    CaseFile
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or anything in it cannot be used; the message names the file, the
-        key, the value and what to do.
-    """
-    path = Path(path)
-    document = _read_toml(path)
-    shape: Any = schema_of(document)
-    try:
-        schema = shape.model_validate(document, context={"folder": path.parent})
-    except ValidationError as error:
-        raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
-    with _placed(path, "pattern"):
-        pattern = _pattern(schema.pattern, path.parent)
-    with _placed(path, ""):
-        sheet = Sheet(**schema.sheet.model_dump())
-    if sheet.density is None and schema.analysis.kind == "dynamics":
-        raise InputError(f"{path}: sheet.density: missing; a motion needs it (kg/m3)")
-    parts: dict[str, Any] = {
-        "options": {name: getattr(schema.model, name) for name in schema.model.model_fields_set},
-    }
-    named = parts["options"].pop("mass", None)
-    masses = [ModelOptions().mass] if named is None else list(named)
-    with _placed(path, "damping."):
-        parts["damping"] = Rayleigh(**schema.damping.model_dump())
-    parts["supports"] = []
-    for i, item in enumerate(schema.supports):
-        with _placed(path, f"supports[{i}]."):
-            parts["supports"].append(_support(item))
-    parts["loads"] = [_load(item) for item in schema.loads]
-
-    cases = {masses[0]: _build(path, pattern, sheet, masses[0], parts)}
-    with warnings.catch_warnings():  # the other rules would only repeat them
-        warnings.simplefilter("ignore", FoldynWarning)
-        for rule in masses[1:]:
-            cases[rule] = _build(path, pattern, sheet, rule, parts)
-    case = cases[masses[0]]
-    with _placed(path, ""):
-        analysis = _analysis(schema, case)
-        nodes = _output_nodes(case, schema.output.nodes, analysis.kind)
-    output = {name: value for name, value in schema.output if name not in ("nodes", "every")}
-    case_file = CaseFile(
-        path=path,
-        title=schema.title,
-        pattern=pattern,
-        sheet=sheet,
-        masses=masses,
-        analysis=analysis,
-        output=Output(nodes, every=analysis.arguments.get("every"), **output),
-        start=None if schema.initial is None else Initial(**schema.initial.model_dump()),
-        _parts=parts,
-        _cases=cases,
-    )
-    if case_file.start is not None and case_file.start.file is None:
-        for rule in masses:
-            case_file.initial(rule)  # a support may hold what the rigid motion moves
-    return case_file
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_bytes().decode("utf-8-sig")  # some editors begin with a mark
-        return tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give a case file (TOML)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file in UTF-8; give a case file (TOML)") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-
-
-def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
-    if "kind" in table:
-        arguments = {name: value for name, value in table.items() if name != "kind"}
-        return call_from(GENERATORS[table["kind"]], arguments)
-    try:
-        if "file" in table:
-            return read_pattern(folder / table["file"])
-        return Pattern(table["vertices"], table["faces"], table.get("assignments"))
-    except InputError as error:
-        place = f'.file = "{table["file"]}": ' if "file" in table else ": "
-        raise InputError(f"{place}{error}") from None
-
-
-def _support(item: SupportSection) -> Support:
-    if item.base is not None:
-        value = 1.0 if item.displacement is None else item.displacement
-        return BaseMotion(item.base, item.history, value)
-    if item.axis is not None:
-        return Impose(item.nodes, item.axis, item.displacement, item.history)
-    return Fix(item.nodes, item.axes)
-
-
-def _load(item: LoadSection) -> Force | Gravity | Actuate:
-    if item.gravity is not None:
-        return Gravity(item.gravity, item.history)
-    if item.creases is not None:
-        return Actuate(item.creases, item.angle, item.history)
-    return Force(item.nodes, item.force, item.history)
-
-
-def _analysis(schema: Any, case: Case) -> Analysis:
-    section = schema.analysis
-    arguments = {name: value for name, value in section if name != "kind"}
-    if not isinstance(section, StaticsSection):
-        every = schema.output.every
-        every = section.duration / SAMPLES if every is None else every
-        return Analysis(section.kind, {**arguments, "every": every})
-    if section.until is not None:
-        resolve_nodes(case.structure, (section.until.node,), "analysis.until.node")
-        arguments["until"] = Reached(**section.until.model_dump())
-    settings = {name: arguments.pop(name) for name in SETTINGS}
-    return Analysis(section.kind, arguments, settings)
-
-
-def _build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
-    with _placed(path, "model: "):
+def build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
+    """Make the case of a file with one mass rule."""
+    with placed(path, "model: "):
         structure = discretize(pattern, sheet, mass=mass, **parts["options"])
         if sheet.density is not None:
             _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
-    with _placed(path, ""):
+    with placed(path, ""):
         return Case(structure, parts["supports"], parts["loads"], parts["damping"])
 
 
-def _output_nodes(case: Case, chosen: Any, kind: str) -> NDArray[np.int64]:
-    """Nodes to show: those chosen, else those with a force, else every vertex that can move.
-
-    Of a path without forces, those that supports move come before every vertex.
-    """
-    if chosen is not None:
-        return resolve_nodes(case.structure, chosen, "output.nodes")
-    if case.loaded_nodes.size:
-        return case.loaded_nodes
-    if kind == "statics" and case.imposed.any():
-        return np.flatnonzero(case.imposed.any(axis=1))
-    vertices = len(case.structure.pattern.vertices)
-    return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
-
-
 @contextmanager
-def _placed(path: Path, place: str) -> Iterator[None]:
+def placed(path: Path, place: str) -> Iterator[None]:
     """Put the file and the place in front of an error from a lower layer."""
     try:
         yield

@@ -21,6 +21,7 @@ _TEXTS = {
     "greater_than_equal": "must be at least {ge:g}",
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be at most {le:g}",
+    "too_short": "must have at least one entry",
 }
 
 
@@ -64,7 +65,8 @@ def _line(
         at, key = location[:-1], str(location[-1])
         owners = [name for name, other in kinds.items() if key in _keys(other, at)]
         if owners:
-            return f'{place}: only for analysis.kind = "{owners[0]}"; leave it out'
+            kinds_of_it = " or ".join(show(owner) for owner in owners)
+            return f"{place}: only for analysis.kind = {kinds_of_it}; leave it out"
         return f"{place}: {unknown_key(key, _keys(schema, at))}"
     if kind == "missing":
         return f"{place}: {_TEXTS[kind]}"

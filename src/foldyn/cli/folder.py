@@ -15,9 +15,10 @@ DRAWN = (
     "report.html",
     *(f"{name}.png" for name in ("structure", "laws", "load", "motion", "energies")),
     *(f"{name}.png" for name in ("reaction", "curve", "shapes")),
-    *(f"{name}.{kind}" for name in ("motion", "path") for kind in ("gif", "mp4")),
+    *(f"{name}.png" for name in ("modes", "mac", "response", "nyquist")),
+    *(f"{name}.{kind}" for name in ("motion", "path", "modes") for kind in ("gif", "mp4")),
 )
-"""All that `report.write_motion` and `report.write_path` write."""
+"""All that the pages of `report` come with."""
 
 
 def check_folder(folder: Path, out: str | None, names: list[str]) -> None:

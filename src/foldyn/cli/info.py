@@ -15,6 +15,7 @@ REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplo
 
 def info() -> str:
     """Text of the command."""
+    from foldyn.cases.vibrations import FRF_METHODS
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
     from foldyn.patterns import GENERATORS
@@ -33,6 +34,7 @@ def info() -> str:
         f"optional parts: ffmpeg for MP4 animations, {_ffmpeg()}",
         *(f"optional solver for large structures: {text}" for text in _solvers()),
         f"methods of paths: {', '.join(PATH_METHODS)}",
+        f"methods of frequency responses: {', '.join(FRF_METHODS)}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
         f"mass rules: {', '.join(MASS_RULES)}",
         "shipped cases:",

@@ -11,6 +11,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from foldyn import __version__
 from foldyn.errors import ComputationError, FoldynWarning, InputError
@@ -31,12 +32,35 @@ def parser() -> argparse.ArgumentParser:
         help="run a case file",
         description="Run a case file: figures, report.html and result.nc go to a folder.",
     )
-    run.add_argument("case", help="case file (TOML), or the name of a shipped one: see foldyn info")
-    run.add_argument("--out", help="folder of the results (default: NAME-results)")
-    run.add_argument(
-        "--no-figures", action="store_true", help="write the result only, no figures and report"
+    _add_common(run, "results")
+
+    modes = commands.add_parser(
+        "modes",
+        help="natural frequencies and mode shapes of a case file of any kind",
+        description="Natural frequencies and mode shapes of the structure of a case file of any "
+        "kind; what its [analysis] says, if it is of kind modes, holds unless given here.",
     )
-    run.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    _add_common(modes, "modes")
+    modes.add_argument("--count", type=int, help="how many modes (default: 6)")
+    _add_state(modes)
+
+    frf = commands.add_parser(
+        "frf",
+        help="frequency response of a case file of any kind",
+        description="Frequency response of the structure of a case file of any kind to its "
+        "[[drive]], or else to its forces or the motion of its base; what its [analysis] says, if "
+        "it is of kind frf, holds unless given here.",
+    )
+    _add_common(frf, "frf")
+    frf.add_argument(
+        "--frequencies",
+        type=float,
+        nargs=3,
+        metavar=("FIRST", "LAST", "COUNT"),
+        help="frequencies (Hz), spaced evenly",
+    )
+    frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
+    _add_state(frf)
 
     commands.add_parser(
         "info",
@@ -46,21 +70,42 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _add_common(command: argparse.ArgumentParser, results: str) -> None:
+    """Add what all commands on case files take."""
+    command.add_argument(
+        "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
+    )
+    command.add_argument("--out", help=f"folder of the results (default: NAME-{results})")
+    command.add_argument(
+        "--no-figures", action="store_true", help="write the result only, no figures and report"
+    )
+    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+
+
+def _add_state(command: argparse.ArgumentParser) -> None:
+    """Add what says about which state a structure vibrates."""
+    command.add_argument(
+        "--state",
+        metavar="rest|equilibrium|FILE",
+        help="about which state: rest (default), the equilibrium under the loads, or the last "
+        "state of a result (NetCDF)",
+    )
+    command.add_argument(
+        "--secant",
+        type=float,
+        metavar="DEGREES",
+        help="amplitude of the hinges' turns for which superlinear hinges are linearized",
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     given = parser().parse_args(arguments)
     with warnings.catch_warnings():
         warnings.simplefilter("always", FoldynWarning)
-        warnings.showwarning = _show_warning
+        warnings.showwarning = _Warnings()
         try:
-            if given.command == "run":
-                from foldyn.cli.run import run
-
-                run(given.case, given.out, figures=not given.no_figures, quiet=given.quiet)
-            else:
-                from foldyn.cli.info import info
-
-                print(info())
+            _call(given)
         except InputError as error:
             print(f"foldyn: {error}", file=sys.stderr)
             return BAD_INPUT
@@ -82,9 +127,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return DONE
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
-    name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
-    print(f"foldyn: warning: {name}{message}", file=sys.stderr)
+def _call(given: argparse.Namespace) -> None:
+    """Call what the command line asks for."""
+    if given.command == "info":
+        from foldyn.cli.info import info
+
+        print(info())
+        return
+    from foldyn.cli.run import run
+
+    how: dict[str, Any] = {"figures": not given.no_figures, "quiet": given.quiet}
+    if given.command != "run":
+        from foldyn.cli.shortcuts import read_as
+
+        kind, flags = given.command, _flags(given)
+        how |= {"read": lambda path: read_as(path, kind, flags), "results": kind}
+    run(given.case, given.out, **how)
+
+
+def _flags(given: argparse.Namespace) -> dict[str, Any]:
+    """Keys of [analysis] that the command line gives; None where it does not."""
+    flags = {key: getattr(given, key, None) for key in ("count", "method", "state", "secant")}
+    if getattr(given, "frequencies", None) is not None:
+        first, last, count = given.frequencies
+        whole = int(count) if count.is_integer() else count
+        flags["frequencies"] = {"first": first, "last": last, "count": whole}
+    return flags
+
+
+class _Warnings:
+    """Writes warnings as the command's own lines, each once: mass rules would repeat them."""
+
+    def __init__(self) -> None:
+        self.told: set[str] = set()
+
+    def __call__(self, message: Warning | str, category: type[Warning], *_: object) -> None:
+        name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
+        text = f"foldyn: warning: {name}{message}"
+        if text not in self.told:
+            print(text, file=sys.stderr)
+        self.told.add(text)
 
 
 if __name__ == "__main__":

@@ -8,30 +8,44 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from foldyn.cases.casefile import CaseFile, read_case
+from foldyn.cases.casefile import CaseFile
+from foldyn.cases.reading import read_case
 from foldyn.cli.folder import check_folder, remove_drawn, save_result
 from foldyn.cli.motions import Motions
 from foldyn.cli.paths import Paths
 from foldyn.cli.runs import Task
+from foldyn.cli.vibrations import Modes, Responses
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
     import xarray
 
-KINDS: Mapping[str, Callable[[CaseFile, bool], Task]] = {"dynamics": Motions, "statics": Paths}
+KINDS: Mapping[str, Callable[[CaseFile, bool], Task]] = {
+    "dynamics": Motions,
+    "statics": Paths,
+    "modes": Modes,
+    "frf": Responses,
+}
 """What is computed for each kind of analysis."""
 
 
-def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -> Path:
-    """Run a case file and write its results; returns their folder.
+def run(
+    case: str,
+    out: str | None,
+    figures: bool = True,
+    quiet: bool = False,
+    read: Callable[[Path], CaseFile] = read_case,
+    results: str = "results",
+) -> Path:
+    """Run a case file and write its results; returns their folder, by default NAME-`results`.
 
     Everything is checked before the first step is computed and before anything is written.
     """
     path = find_case(case)
-    folder = Path(f"{path.stem}-results" if out is None else out)
+    folder = Path(f"{path.stem}-{results}" if out is None else out)
     with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
-        case_file = read_case(path)
+        case_file = read(path)
         task = KINDS[case_file.analysis.kind](case_file, figures)
         if figures:
             _check_video(case_file)
@@ -40,11 +54,11 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
     say = _nothing if quiet else _say
     progress = not quiet and sys.stderr.isatty()
     introduction = _Introduction(case_file, task, told, say)
-    results: dict[str, xarray.Dataset] = {}
+    done: dict[str, xarray.Dataset] = {}
     kept: list[str] = []
     for name, one in task.runs.items():
         try:
-            results[name] = one.compute(progress, introduction)
+            done[name] = one.compute(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
@@ -53,14 +67,14 @@ def run(case: str, out: str | None, figures: bool = True, quiet: bool = False) -
             if isinstance(error, MotionInterrupted):
                 raise MotionInterrupted(str(failed), error.partial) from None
             raise failed from None
-        kept.append(_keep(results[name], folder, one.file, kept))
-        say(one.line(results[name]))
+        kept.append(_keep(done[name], folder, one.file, kept))
+        say(one.line(done[name]))
     if not figures:
         say(f"wrote {', '.join(kept)}")
         return folder
     say("drawing figures")
     try:
-        page = task.write(results, folder)
+        page = task.write(done, folder)
     except (InputError, ComputationError) as error:
         raise _failed(f"{path}: figures: ", str(error), kept) from None
     say(f"wrote {', '.join(kept)}, figures and {page}")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 KEYS = {
     "analysis": (
         "duration", "method", "dt", "load_factors", "steps", "first_step", "constant",
-        "inertia_relief",
+        "inertia_relief", "count", "secant", "frequencies", "amplitude",
     ),
     "output": ("every",),
 }  # fmt: skip

@@ -11,18 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.dynamics.kinds import folds_of
 from foldyn.dynamics.numbering import Numbering
 from foldyn.materials import EnhancedLinear
 from foldyn.materials.compiled import kernel
 from foldyn.materials.enhanced_linear import TWO_PI, energy, moment
 from foldyn.materials.switch import hinge_rest_slope
-from foldyn.mechanics import BarsHinges
+from foldyn.shells.kernels import ShellModel
 
 
 class Actuators(NamedTuple):
     """Rest angle of hinge[k]: start[k] + span[k] times the factor of history row[k], rad."""
 
-    hinge: NDArray  # (a,) row of model.hinges
+    hinge: NDArray  # (a,) row of what `folds_of` gives
     start: NDArray  # (a,)
     span: NDArray  # (a,)
     row: NDArray  # (a,) of the waveforms
@@ -32,8 +33,8 @@ class Actuators(NamedTuple):
 
 
 def actuators(
-    structure: Any, model: BarsHinges, by: Numbering, terms: Any, histories: list
-) -> tuple[BarsHinges, Actuators]:
+    structure: Any, model: Any, by: Numbering, terms: Any, histories: list
+) -> tuple[Any, Actuators]:
     """Model with rest angles of its own, and the folds that turn."""
     law = structure.fold_law
     numbers, spans, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
@@ -43,15 +44,28 @@ def actuators(
         spans.append(np.asarray(span)[turned])
         rows.append(np.full(len(turned), histories.index(history)))
     folds = np.concatenate(numbers)
-    if len(folds):
-        model = model._replace(
-            hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
-        )
+    span, row = np.concatenate(spans), np.concatenate(rows).astype(np.int64)
+    start = np.asarray(structure.fold_rest, float)[folds]
+    if isinstance(model, ShellModel):
+        pieces = [np.flatnonzero(structure.sides.piece_crease == fold) for fold in folds]
+        hinge = np.concatenate([np.zeros(0, np.int64), *pieces])
+        times = [len(each) for each in pieces]
+        span, row, start = np.repeat(span, times), np.repeat(row, times), model.piece_rest[hinge]
+        if len(folds):
+            model = model._replace(
+                piece_rest=model.piece_rest.copy(), piece_parameters=model.piece_parameters.copy()
+            )
+    else:
+        hinge = by.hinge[structure.hinge_of_fold[folds]]
+        if len(folds):
+            model = model._replace(
+                hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
+            )
     found = Actuators(
-        hinge=by.hinge[structure.hinge_of_fold[folds]],
-        start=np.asarray(structure.fold_rest, float)[folds],
-        span=np.concatenate(spans),
-        row=np.concatenate(rows).astype(np.int64),
+        hinge=hinge,
+        start=start,
+        span=span,
+        row=row,
         code=int(law.code),
         address=int(law.addresses[0]) if law.addresses else 0,
         stress_free=isinstance(law, EnhancedLinear) and law.rest == "stress_free",
@@ -62,13 +76,13 @@ def actuators(
 @kernel
 def turn(model, actuators, factor):
     """Set the rest angles for the factors (h, 3); one that leaves 0..2 pi becomes nan."""
-    p = model.hinge_parameters
+    rest_angle, p, _ = folds_of(model)
     for k in range(actuators.hinge.size):
         e = actuators.hinge[k]
         rest = actuators.start[k] + actuators.span[k] * factor[actuators.row[k], 0]
         if not 0.0 <= rest <= TWO_PI:
             rest = np.nan
-        model.hinge_rest[e] = rest
+        rest_angle[e] = rest
         if actuators.stress_free:
             p[e, 2] = moment(rest, rest, p[e, 0], p[e, 1])
             p[e, 3] = energy(rest, rest, p[e, 0], p[e, 1])
@@ -77,13 +91,13 @@ def turn(model, actuators, factor):
 @kernel
 def actuator_power(model, actuators, factor, angle):
     """Power (W) that turning folds with dihedrals `angle` (nh,) put into the structure."""
-    p, power = model.hinge_parameters, 0.0
+    (rest_angle, p, stiffness), power = folds_of(model), 0.0
     for k in range(actuators.hinge.size):
         e = actuators.hinge[k]
         slope = hinge_rest_slope(
-            actuators.code, angle[e], model.hinge_rest[e], p[e, 0], p[e, 1],
+            actuators.code, angle[e], rest_angle[e], p[e, 0], p[e, 1],
             actuators.stress_free, actuators.address,
         )  # fmt: skip
         rate = actuators.span[k] * factor[actuators.row[k], 1]
-        power += model.hinge_stiffness[e] * slope * rate
+        power += stiffness[e] * slope * rate
     return power

@@ -79,12 +79,12 @@ def passed_through(now, before, first, last):
 
 
 @kernel
-def sample(model, system, mass, u, v, a, t, course, out, s):
+def sample(model, system, mass, u, v, a, t, course, out, work, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
     k = course.count[1]
     out.time[k] = t
     record(
-        model, system, mass, u, v, a, course.tally, s,
+        model, system, mass, u, v, a, course.tally, work, s,
         out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
     if not np.isfinite(out.energy[k].sum()):
@@ -124,7 +124,7 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         count[0] = step
         found = DONE
         if wrong == 0.0 and hinge < 0 and step == count[1] * plan.every:
-            found = sample(model, system, mass, course.u, course.v, a, t, course, out, s)
+            found = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
         team.note[0, FOUND] = found
     wait(team)
     if wrong > 0.0:

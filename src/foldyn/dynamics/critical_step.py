@@ -73,7 +73,9 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     Parameters
     ----------
     case : Case
-    method : {"rk4", "central_difference"}
+    method : str
+        One of `foldyn.dynamics.METHODS`; nothing but accuracy limits the step of an implicit one:
+        inf.
     u : (n, 3), optional
         Displacement (m) about which the stiffness is taken; rest by default.
 
@@ -83,6 +85,9 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     with which no vibration grows, for all frequencies w up to the highest of the structure: for
     RK4 ``|R(s dt)| <= 1``.
     """
+    growth = method_of(method).growth
+    if growth is None:
+        return np.inf
     alpha, beta = case.damping.alpha, case.damping.beta
     omega = largest_frequency(case, u)
-    return MARGIN * stability_limit(method_of(method).growth, omega, alpha, beta)
+    return MARGIN * stability_limit(growth, omega, alpha, beta)

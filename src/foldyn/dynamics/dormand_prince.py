@@ -144,7 +144,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         )
         if count[1] == 0:
             clock[3], clock[4] = _largest(u), _largest(v)
-            found = sample(model, system, mass, course.u, course.v, a, plan.start, course, out, s)
+            found = sample(
+                model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
+            )
             if found != DONE:
                 return found, -1
     else:
@@ -210,7 +212,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                     tally[k] += h * weights[j] * powers[k, j]
             acceleration(model, system, mass, ut, vt, due, a, work, s)
             count[3] += 1
-            found = sample(model, system, mass, ut, vt, a, due, course, out, s)
+            found = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
             if found != DONE:
                 return found, -1
             due = plan.start + count[1] * plan.interval
@@ -227,7 +229,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if plan.every > 0 and count[0] % plan.every == 0:
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
             count[3] += 1
-            found = sample(model, system, mass, course.u, course.v, a, after, course, out, s)
+            found = sample(model, system, mass, course.u, course.v, a, after, course, out, work, s)
             if found != DONE:
                 return found, -1
     tally[2], tally[3] = powers[0, 0], powers[1, 0]

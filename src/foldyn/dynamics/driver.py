@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Rayleigh, State
+from foldyn.dynamics import generalized_alpha
+from foldyn.dynamics.course import Plan
 from foldyn.dynamics.critical_step import critical_step
-from foldyn.dynamics.inertia import check_mass
-from foldyn.dynamics.methods import method_of
+from foldyn.dynamics.inertia import check_mass, is_lumped
+from foldyn.dynamics.methods import Method, method_of
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
-from foldyn.dynamics.start import begin, check_start, check_steady
+from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
     check_memory,
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
 MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
+IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
+LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -47,6 +51,7 @@ def simulate(
     force: bool = False,
     tolerance: float | None = None,
     start: float = 0.0,
+    spectral_radius: float | None = None,
     progress: bool | Reporter | None = None,
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
@@ -102,9 +107,12 @@ def simulate(
     Notes
     -----
     Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. Damping is
-    C = alpha M + beta K0, K0 the tangent at rest.
+    C = alpha M + beta K0, K0 the tangent at rest or, with the damping's state = "start", at the
+    initial displacement.
     """
-    motion = prepare(case, duration, method, dt, every, initial, force, tolerance, start)
+    motion = prepare(
+        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius
+    )
     return motion.run(progress)
 
 
@@ -118,6 +126,7 @@ def prepare(
     force: bool = False,
     tolerance: float | None = None,
     start: float = 0.0,
+    spectral_radius: float | None = None,
 ) -> Motion:
     """Check everything that `simulate` checks and choose the step, without computing a motion.
 
@@ -136,20 +145,13 @@ def prepare(
     if isinstance(start, bool) or not isinstance(start, Real) or not math.isfinite(start):
         raise InputError(f"start = {start!r}: give a finite time (s)")
     u, v = check_start(case, initial)
-    check_mass(case.structure.mass, case.fixed)
+    integrator = _with_radius(integrator, spectral_radius)
+    if not integrator.implicit or not is_lumped(case.structure.mass):
+        check_mass(case.structure.mass, case.fixed)
     critical = critical_step(case, method, u)
-    if integrator.adaptive:
-        tolerance = TOLERANCE if tolerance is None else positive("tolerance", tolerance)
-        largest = math.inf if force else critical
-        plan = variable_steps(duration, dt, every, largest, float(start), tolerance)
-    elif tolerance is not None:
-        raise InputError(
-            f"tolerance = {tolerance!r}: {method} has fixed steps; give dt, or choose "
-            "dormand_prince"
-        )
-    else:
-        plan = fixed_steps(duration, dt, every, critical, float(start))
+    plan = _plan(integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, method, u, critical)
+    warn_of_unstable_damping(case, u)
     if not force and plan.dt > critical:
         raise InputError(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
@@ -165,21 +167,57 @@ def prepare(
             FoldynWarning,
             stacklevel=3,
         )
-    packed = pack(case, SPAN * min(plan.dt, critical))
+    span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
+    packed = pack(case, span, u)
     beginning = partial(begin, case, u, v, plan, packed)
     return Motion(case, integrator, plan, critical, force, beginning, packed)
 
 
+def _with_radius(method: Method, spectral_radius: float | None) -> Method:
+    """The method with the spectral radius that is asked for."""
+    if spectral_radius is None:
+        return method
+    if method.name != "generalized_alpha":
+        raise InputError(
+            f"spectral_radius = {spectral_radius!r}: {method.name} has none; leave it out, or "
+            "choose generalized_alpha"
+        )
+    number = isinstance(spectral_radius, Real) and not isinstance(spectral_radius, bool)
+    if not number or not 0.0 <= spectral_radius <= 1.0:
+        raise InputError(f"spectral_radius = {spectral_radius!r}: give a number from 0 to 1")
+    return method._replace(scheme=generalized_alpha.scheme(float(spectral_radius)))
+
+
+def _plan(
+    method: Method, duration: float, dt: float | None, every: int | float, critical: float,
+    force: bool, tolerance: float | None, start: float,
+) -> Plan:  # fmt: skip
+    """Steps and samples that the arguments of `simulate` ask for."""
+    if tolerance is not None:
+        positive("tolerance", tolerance)
+        if not method.adaptive and not method.implicit:
+            raise InputError(
+                f"tolerance = {tolerance!r}: {method.name} has fixed steps; give dt, or choose "
+                "dormand_prince or an implicit method"
+            )
+    if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
+        default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
+        largest = math.inf if force else critical
+        return variable_steps(duration, dt, every, largest, start, tolerance or default)
+    return fixed_steps(duration, dt, every, critical, start)
+
+
 def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
     """Say so where stiffness-proportional damping makes an explicit step very small."""
-    if case.damping.beta == 0.0:
+    if case.damping.beta == 0.0 or not math.isfinite(critical):
         return
     without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
     if without > DAMPING_COST * critical:
         warnings.warn(
             f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "
             f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
-            "resolve the damping of the fastest vibration; alpha costs nothing",
+            "resolve the damping of the fastest vibration; an implicit one need not: "
+            'method = "generalized_alpha" (alpha costs nothing)',
             FoldynWarning,
             stacklevel=4,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import Course, Plan, Samples
@@ -24,6 +24,10 @@ class Engine(Protocol):
 
     def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge)."""
+        ...
+
+    def facts(self) -> dict[str, Any]:
+        """Statistics of its own, for the result's attributes."""
         ...
 
 
@@ -56,6 +60,10 @@ class Compiled:
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+
+    def facts(self) -> dict[str, Any]:
+        """See `Engine`."""
+        return {}
 
 
 def threads_of(packed: Packed) -> int:

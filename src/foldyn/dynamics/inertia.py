@@ -51,12 +51,17 @@ def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
         )
 
 
+def is_lumped(mass: sparse.csr_array) -> bool:
+    """Whether a mass matrix is diagonal."""
+    return sparse.csr_array(mass - sparse.diags_array(mass.diagonal())).count_nonzero() == 0
+
+
 def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
     """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3)."""
     mass = sparse.csr_array(mass)
     mass.sort_indices()
     diagonal = mass.diagonal()
-    lumped = sparse.csr_array(mass - sparse.diags_array(diagonal)).count_nonzero() == 0
+    lumped = is_lumped(mass)
     if lumped:
         inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])
         factor_of_axis, factors = np.zeros(3, np.int64), []

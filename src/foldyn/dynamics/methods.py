@@ -5,51 +5,94 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from foldyn.cases import Case
-from foldyn.dynamics import central_difference, dormand_prince, rk4
+from foldyn.dynamics import (
+    central_difference,
+    dormand_prince,
+    energy_momentum,
+    generalized_alpha,
+    newmark,
+    rk4,
+)
 from foldyn.dynamics.engine import Compiled, Engine, threads_of
+from foldyn.dynamics.implicit.alpha import residual
+from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.stability import Growth
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
 
 
 class Method(NamedTuple):
-    """An explicit integrator.
+    """An integrator.
 
-    `advance` is a compiled function with the arguments of `rk4.advance`, `growth(omega, damping,
-    dt)` the largest factor by which a step multiplies a free vibration, `order` what tests hold it
-    to, and `adaptive` whether it chooses its steps by their error.
+    Parameters
+    ----------
+    name : str
+    order : int
+        What tests hold it to.
+    loop : callable
+        The compiled function at its core: of an explicit method the loop over its steps, with
+        the arguments of `rk4.advance`; of an implicit one the residual of a step.
+    growth : callable, optional
+        Of an explicit method: the largest factor by which a step multiplies a free vibration, as
+        a function of omega, damping and dt.
+    adaptive : bool
+        Whether it always chooses its steps by their error.
+    scheme : callable, optional
+        Of an implicit method: its steps from a `Bench`.
     """
 
     name: str
     order: int
-    growth: Growth
-    advance: Callable[..., tuple[int, int]]
+    loop: Callable[..., Any]
+    growth: Growth | None = None
     adaptive: bool = False
+    scheme: Callable[..., Any] | None = None
+
+    @property
+    def implicit(self) -> bool:
+        """Whether a step solves equations: then nothing but accuracy limits it."""
+        return self.scheme is not None
 
     def engine(self, case: Case, packed: Packed) -> Engine:
         """The method with a case and the memory that it works with."""
-        return Compiled(self.advance, packed, 1 if self.adaptive else threads_of(packed))
+        if self.scheme is not None:
+            jumps = [time for _, history in case.load_terms for time in history.jumps()]
+            return Implicit(self.scheme, packed, tuple(jumps))
+        return Compiled(self.loop, packed, 1 if self.adaptive else threads_of(packed))
 
 
 METHODS: Mapping[str, Method] = {
     method.name: method
     for method in (
-        Method("rk4", rk4.ORDER, rk4.growth, rk4.advance),
+        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth),
         Method(
             "central_difference",
             central_difference.ORDER,
-            central_difference.growth,
             central_difference.advance,
+            central_difference.growth,
         ),
         Method(
             "dormand_prince",
             dormand_prince.ORDER,
-            dormand_prince.growth,
             dormand_prince.advance,
+            dormand_prince.growth,
             adaptive=True,
+        ),
+        Method("newmark", newmark.ORDER, residual, scheme=newmark.scheme),
+        Method(
+            "generalized_alpha",
+            generalized_alpha.ORDER,
+            residual,
+            scheme=generalized_alpha.scheme(),
+        ),
+        Method(
+            "energy_momentum",
+            energy_momentum.ORDER,
+            energy_momentum.residual,
+            scheme=energy_momentum.EnergyMomentum,
         ),
     )
 }
@@ -64,8 +107,7 @@ def method_of(name: str) -> Method:
 
 def compiled(name: str) -> bool:
     """Whether a method's kernels are in Numba's cache on disk (else its first use compiles)."""
-    advance = method_of(name).advance
-    folder = Path(advance.stats.cache_path)  # type: ignore[attr-defined]
-    function = advance.py_func  # type: ignore[attr-defined]
+    loop: Any = method_of(name).loop
+    folder, function = Path(loop.stats.cache_path), loop.py_func
     stem = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-"
     return any(folder.glob(f"{stem}*py{sys.version_info.major}{sys.version_info.minor}*.nbi"))

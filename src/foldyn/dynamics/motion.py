@@ -15,6 +15,7 @@ from foldyn.dynamics import outcome
 from foldyn.dynamics.audit import AUDITED, energy_error, energy_scale
 from foldyn.dynamics.course import Course, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
+from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.stability import is_stable, stability_limit
@@ -38,14 +39,15 @@ class Motion:
 
     def __init__(
         self, case: Case, method: Method, plan: Plan, critical: float, force: bool,
-        begin: Callable[[], Course], packed: Packed,
+        begin: Callable[[], Course], packed: Packed, reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
-        self.critical, self.force = critical, force
+        self.critical, self.force, self.reason = critical, force, reason
         self._begin, self._packed = begin, packed
         self._course, self._out = begin(), self._room(0)
         self.at_rest = not (self._course.u.any() or self._course.v.any())
-        self.seconds, self.threads = 0.0, 1
+        self.seconds = 0.0
+        self._engine: Engine | None = None
 
     @property
     def expected_samples(self) -> int:
@@ -71,8 +73,7 @@ class Motion:
         """Advance in stretches, between which progress is told and the motion is audited."""
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
-        engine = self.method.engine(self.case, self._packed)
-        self.threads = engine.threads
+        engine = self._engine = self.method.engine(self.case, self._packed)
         memory = scratch(system)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
@@ -97,11 +98,13 @@ class Motion:
                 report(Progress(now - plan.start, plan.end - plan.start, step, self._audit()))
                 if ended:
                     return
-                if plan.steps and step % recheck == 0 and step > done and not self.force:
+                watched = plan.steps and not self.force and self.method.growth is not None
+                if watched and step % recheck == 0 and step > done:
                     place(system, course.u, course.v, now, memory)
                     self._recheck(by.outward(memory.displacement))
                 growth = REPORT_EVERY / max(clock, 1e-9)
-                length = max(CHUNK, min(int(length * min(growth, 8.0)), 100_000))
+                least = 1 if self.method.implicit else CHUNK
+                length = max(least, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:
             raise MotionInterrupted(
                 f"interrupted at t = {course.clock[0]:.6g} s", self._dataset()
@@ -136,8 +139,10 @@ class Motion:
         return worst
 
     def _smaller_step(self) -> str:
-        if self.method.adaptive:
+        if not self.plan.steps:
             return f"use a tolerance below {self.plan.tolerance:.3g}"
+        if self.method.implicit:
+            return f"use a step below {self.plan.dt:.3g} s, or leave dt out"
         return (
             f"use a step below {self.plan.dt:.3g} s (critical at the start: {self.critical:.3g} s)"
         )
@@ -145,9 +150,10 @@ class Motion:
     def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
         damping = self.case.damping.alpha, self.case.damping.beta
-        omega = largest_frequency(self.case, u)
-        if not is_stable(self.method.growth, omega, *damping, self.plan.dt):
-            limit = stability_limit(self.method.growth, omega, *damping)
+        omega, growth = largest_frequency(self.case, u), self.method.growth
+        assert growth is not None  # of explicit methods
+        if not is_stable(growth, omega, *damping, self.plan.dt):
+            limit = stability_limit(growth, omega, *damping)
             raise InstabilityError(
                 f"the structure has stiffened: at t = {self._course.clock[0]:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
@@ -183,8 +189,14 @@ class Motion:
                 "too often, or the motion is too violent; raise the tolerance, or use rk4",
                 self._dataset(),
             )
+        if code == outcome.NOT_CONVERGED:
+            raise InstabilityError(
+                f"at {moment} no end of a step was found that is in equilibrium, however small the "
+                "step: a mass or a stiffness may be missing, or the motion is too violent",
+                self._dataset(),
+            )
         reason = "a load is not finite"
-        if not self.method.adaptive:
+        if plan.steps and not self.method.implicit:
             reason = (
                 f"the step of {plan.dt:.3g} s is too large (critical at the start: "
                 f"{self.critical:.3g} s) or {reason}"
@@ -214,11 +226,13 @@ class Motion:
             "every": plan.every,
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
-            "threads": self.threads,
+            "threads": self._engine.threads if self._engine else 1,
             "energy_error": self._relative_error(),
             "started_from": "rest" if self.at_rest else "state",
         }
-        if self.method.adaptive:
+        if self.reason:
+            told["method_reason"] = self.reason
+        if not plan.steps:
             told |= {
                 "dt": float(course.clock[0] - plan.start) / max(steps, 1),
                 "steps": steps,
@@ -229,7 +243,7 @@ class Motion:
                 "largest_step": float(course.clock[6]),
             }
         told["force_evaluations"] = int(course.count[3])
-        return told
+        return told | (self._engine.facts() if self._engine else {})
 
     def _relative_error(self) -> float:
         energy = self._out.energy[: self.stored]

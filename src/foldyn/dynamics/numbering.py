@@ -7,27 +7,41 @@ the case's own numbers.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.mechanics import BarsHinges, node_order, renumber
+from foldyn.dynamics.kinds import rows_of
+from foldyn.mechanics import node_order, renumber
+from foldyn.shells.kernels import ShellModel
 
 SMALL = 300  # nodes below which all values are in the cache anyway
 
 
 class Numbering(NamedTuple):
-    """Place k in memory holds node order[k]; node i stands at place rank[i]."""
+    """Place k in memory holds node order[k]; node i stands at place rank[i].
+
+    After the nodes come the rows of the dofs that a shell has beside displacements.
+    """
 
     order: NDArray  # (n,)
     rank: NDArray  # (n,)
     hinge: NDArray  # (nh,) row of each hinge of the case's model in the renumbered one
+    rows: int  # of arrays in memory, n or more
 
     def inward(self, values: NDArray) -> NDArray:
-        """Values per node (n, ...) as they stand in memory."""
-        return np.ascontiguousarray(values[self.order])
+        """Values per node (n, ...) as they stand in memory, zero in further rows (rows, ...)."""
+        out = np.zeros((self.rows, *values.shape[1:]), values.dtype)
+        out[: len(self.order)] = values[self.order]
+        return out
+
+    def held(self, fixed: NDArray) -> NDArray:
+        """Mask of held dofs (n, 3) as it stands in memory, True in further rows (rows, 3)."""
+        out = self.inward(fixed)
+        out[len(self.order) :] = True
+        return out
 
     def outward(self, values: NDArray) -> NDArray:
         """Values per place (n, ...) by node."""
@@ -38,23 +52,27 @@ class Numbering(NamedTuple):
         return (3 * self.rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
-        """Nodal (n, n) or dof (3n, 3n) matrix as it stands in memory."""
-        places = self.order
-        if matrix.shape[0] == 3 * len(places):
+        """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""
+        places, size = self.order, self.rows
+        if matrix.shape[0] > len(places):
             places = (3 * places[:, None] + np.arange(3)).ravel()
-        found = sparse.csr_array(matrix[places][:, places])
+            places = np.concatenate([places, np.arange(len(places), matrix.shape[0])])
+            size = 3 * self.rows
+        found = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
+        found.resize((size, size))
         found.sort_indices()
         return found
 
 
-def renumbered(model: BarsHinges) -> tuple[BarsHinges, Numbering]:
-    """Model with its nodes along the sheet, if it is large enough to gain from it."""
-    if len(model.rest) < SMALL:
-        nodes = np.arange(len(model.rest))
-        return model, Numbering(nodes, nodes, np.arange(len(model.hinges)))
+def renumbered(model: Any) -> tuple[Any, Numbering]:
+    """Model with its nodes along the sheet, if it is one that gains from it."""
+    if isinstance(model, ShellModel) or len(model.rest) < SMALL:
+        count = model.nodes if isinstance(model, ShellModel) else len(model.rest)
+        nodes = np.arange(count)
+        return model, Numbering(nodes, nodes, np.arange(len(model.hinges)), rows_of(model))
     order = node_order(model)
     model, rows = renumber(model, order)
-    return model, Numbering(order, _inverse(order), _inverse(rows))
+    return model, Numbering(order, _inverse(order), _inverse(rows), len(order))
 
 
 def _inverse(order: NDArray) -> NDArray:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases import Case, State
 from foldyn.dynamics.course import Course, Plan
+from foldyn.dynamics.kinds import angles_of
 from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
-from foldyn.errors import InputError
-from foldyn.mechanics import angles
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.statics.body import body_of
+from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
+ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
 AGREES = 1e-9  # of the longest bar: how near a node must stand to where it is imposed
 
 
@@ -54,6 +60,29 @@ def check_steady(case: Case, start: float, end: float) -> None:
                 )
 
 
+def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
+    """Warn where the stiffness at the start u (n, 3), by which damping goes, is not positive."""
+    if case.damping.beta == 0.0 or case.damping.state != "start":
+        return
+    free = np.asarray(case.free_dofs)
+    matrix = sparse.csc_array(case.structure.tangent(u)[free][:, free])
+    shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
+    try:
+        factors = SuperLU(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
+        negative = factors.negative()
+    except SingularTangentError:
+        return
+    if negative:
+        warnings.warn(
+            f'damping: with state = "start" beta K0 drives {negative} '
+            f"motion{'s' if negative > 1 else ''} instead of damping "
+            f"{'them' if negative > 1 else 'it'}: the stiffness is not positive where the motion "
+            'starts; take state = "rest", or start from a stable state',
+            FoldynWarning,
+            stacklevel=4,
+        )
+
+
 def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Course:
     """State of the integrators at the start of a motion with displacement u and velocity v."""
     model, system, mass, callbacks, by = packed
@@ -77,12 +106,16 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
     tally[0] = -moving_energy(system.moved_mass, s.factor)
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
+    inward = by.inward(q)
+    if by.rows > len(u):  # the dofs beside the displacements stand where they are in balance
+        hidden = body_of(case.structure).dofs(u)[u.size :]
+        inward.ravel()[u.size : u.size + len(hidden)] = hidden
     return Course(
-        u=by.inward(q),
+        u=inward,
         v=by.inward(w),
-        carry=np.zeros_like(u),
+        carry=np.zeros_like(inward),
         tally=tally,
-        angle=angles(model.rest + by.inward(u), model.hinges),
+        angle=angles_of(model, by.inward(u)),
         count=np.zeros(4, np.int64),
         clock=clock,
     )

@@ -10,7 +10,7 @@ advances q and w as if the supports stood still.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,10 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
+from foldyn.dynamics.kinds import energies_of, fold_angles, force_of
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.materials.compiled import kernel, scalar
-from foldyn.mechanics import BarsHinges, Workspace, internal_force, strain_energies, wait
+from foldyn.mechanics import Workspace, wait
 from foldyn.mechanics.flat import flat
 
 
@@ -48,6 +49,7 @@ class System(NamedTuple):
     varies: bool  # whether there are histories,
     moves: bool  # supports that move,
     turns: bool  # folds that are actuated
+    rows: int  # of arrays: n, and those of the dofs that a shell has beside displacements
     order: NDArray  # (n,) node number of each place in memory
     supported: NDArray  # (s,) dofs 3 place + axis, in the order of the case's
     alpha: float
@@ -84,19 +86,22 @@ class Scratch(NamedTuple):
 class Packed(NamedTuple):
     """A case for compiled integrators; `callbacks` must live as long as the others serve."""
 
-    model: BarsHinges
+    model: Any  # BarsHinges or ShellModel
     system: System
     mass: Inertia
     callbacks: Callbacks
     numbering: Numbering
 
 
-def pack(case: Case, span: float) -> Packed:
-    """Arrays of a case; `span` (s) is short against the variations of the loads."""
+def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
+    """Arrays of a case; `span` (s) is short against the variations of the loads.
+
+    start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
+    """
     structure = case.structure
     model, by = renumbered(structure.model)
     nodal = by.matrix(structure.mass)
-    mass = inertia(nodal, by.inward(case.fixed))
+    mass = inertia(nodal, by.held(case.fixed))
     histories: list[History] = []
     for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms):
         if term[1] not in histories:
@@ -107,7 +112,9 @@ def pack(case: Case, span: float) -> Packed:
     ]
     callbacks = Callbacks()
     if case.damping.beta > 0.0:
-        k0 = by.matrix(structure.tangent(np.zeros_like(structure.nodes))) * case.damping.beta
+        state = start if case.damping.state == "start" else None
+        state = np.zeros_like(structure.nodes) if state is None else state
+        k0 = by.matrix(structure.tangent(state)) * case.damping.beta
     else:
         k0 = sparse.csr_array((0, 0))
     model, turned = actuators(structure, model, by, case.actuation_terms, histories)
@@ -115,6 +122,7 @@ def pack(case: Case, span: float) -> Packed:
         varies=bool(histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
+        rows=by.rows,
         order=by.order,
         supported=by.dofs(case.supported_dofs),
         alpha=float(case.damping.alpha),
@@ -166,7 +174,7 @@ def _moved_mass(mass: sparse.csr_array, moves, histories) -> NDArray:
 
 def scratch(system: System) -> Scratch:
     """Memory for one thread that has all nodes."""
-    nodes, histories = len(system.order), len(system.waves.code)
+    nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
     never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
@@ -252,7 +260,7 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
     wait(work.team)  # for q and w of the others
-    internal_force(model, u, s.force, work)
+    force_of(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
     loads = system.loads
@@ -284,12 +292,12 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     if system.moves:
         power_in += _moving_power(system.moved, system.moved_mass, alpha, s.force, s.factor)
     if system.turns:
-        power_in += actuator_power(model, system.actuators, s.factor, work.angle)
+        power_in += actuator_power(model, system.actuators, s.factor, fold_angles(work))
     return power_in, power_out
 
 
 @kernel
-def record(model, system, mass, q, w, a, tally, s, displacement, velocity, reaction, energy):
+def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity, reaction, energy):
     """Write one sample after `acceleration`.
 
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
@@ -305,7 +313,7 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
         u[dof] += value * s.factor[row, 0]
         v[dof] += value * s.factor[row, 1]
         moving[dof] += value * s.factor[row, 2]
-    for i in range(q.shape[0]):
+    for i in range(system.order.size):
         for c in range(3):
             displacement[system.order[i], c] = s.displacement[i, c]
             velocity[system.order[i], c] = s.velocity[i, c]
@@ -317,7 +325,7 @@ def record(model, system, mass, q, w, a, tally, s, displacement, velocity, react
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
         reaction[k] += system.alpha * product[system.supported[k]]
-    strain_energies(model, s.displacement, s.energy)
+    energies_of(model, s.displacement, work, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
     energy[4] = tally[1]

@@ -77,7 +77,8 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     """
     alpha = rig.case.damping.alpha
     quiet = 1.0 - options.burst
-    record = record_of(frequency, alpha, quiet, options.every, options.duration, PER_CYCLE)
+    every = 1.0 / (PER_CYCLE * float(frequency[-1])) if options.every is None else options.every
+    record = record_of(frequency, alpha, quiet, every, options.duration)
     count = int(options.burst * record.samples)
     random = np.random.default_rng(options.seed)
     drives = np.zeros((options.averages, record.length))

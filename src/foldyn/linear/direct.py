@@ -19,6 +19,7 @@ from foldyn.linear.linearized import Linearized
 from foldyn.linear.transmissibility import drive_factor, drive_shape
 
 LOST = 1e-3  # of the response: rounding above which it is a resonance without damping
+PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
 _EPS = float(np.finfo(np.float64).eps)
 _NAMED = 5  # frequencies that a message shows
 
@@ -41,13 +42,12 @@ def direct(
     FoldynWarning
         There are such frequencies.
     """
-    case = system.case
-    shape = drive_shape(case, drive).ravel()[system.free]
+    shape = drive_shape(system, drive)
     response = np.empty((len(frequency), len(shape)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         solution = solve(dynamic_stiffness(system, omega), shape)
-        response[k] = solution * drive_factor(case, drive, omega)
+        response[k] = solution * drive_factor(system, drive, omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_of_resonances(frequency, response)
     return Answer(response, {}, {})
@@ -68,7 +68,12 @@ def solve(matrix: sparse.csc_array, load: NDArray) -> NDArray[np.complex128]:
     """
     lost = np.full(len(load), np.nan, np.complex128)
     try:
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        factors = splu(
+            matrix,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=PIVOT,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError:  # exactly singular
         return lost
     solution = factors.solve(load.astype(np.complex128))

@@ -174,7 +174,7 @@ def frf(
     facts = {
         "method": how.name,
         **driven.facts(),
-        "state": state if isinstance(state, str) else "rest" if state is None else "state",
+        "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": secant,
         "alpha": case.damping.alpha,
         "beta": case.damping.beta,
@@ -198,7 +198,7 @@ def _linear(
     _warn_of_instability(system)
     found = how.compute(system, drive, frequency, options, report)
     return system.displacement, Answer(
-        absolute(case, drive, found.response),
+        absolute(system, drive, found.response),
         found.more,
         {"soft_hinges": system.soft, **found.facts},
     )

@@ -33,11 +33,13 @@ from foldyn.linear.transmissibility import drive_factor, drive_shape
 from foldyn.materials import Superlinear
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.energy import hinge_dihedral
+from foldyn.structures import Structure
 
 REFERENCE = 1.0  # degrees: the swing for which the slopes stand in the system that is given
 DEPTH = 5  # iterations that the acceleration looks back on
 PATIENCE = 25  # accelerated iterations before slow ones are tried
 RELAXED = 0.3  # of the way in a slow iteration
+FURTHEST = 1.5  # times: how far slopes are extrapolated from one frequency to the next
 LEAST = 1e-12  # rad: a swing is never taken as smaller
 _NAMED = 5
 
@@ -93,21 +95,29 @@ def harmonic(
     FoldynWarning
         There are such frequencies.
     """
-    case, hinges = system.case, _Hinges(system)
-    shape = drive_shape(case, drive).ravel()[system.free]
+    case = system.case
+    if len(case.actuated_creases) and isinstance(case.structure.fold_law, Superlinear):
+        raise InputError(
+            "method = 'harmonic': cannot tell how far actuated folds of the superlinear law are "
+            "from their rest angle; give the folds another law, or take stepped_sine"
+        )
+    hinges = _Hinges(system)
+    shape = drive_shape(system, drive)
     response = np.full((len(frequency), len(shape)), np.nan, np.complex128)
     swing, spent = np.full(len(frequency), np.nan), 0
-    slope, failed = hinges.reference, []
+    done: list[tuple[float, NDArray]] = []
+    failed: list[int] = []
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        load = shape * (drive.value * drive_factor(case, drive, omega))
+        load = shape * (drive.value * drive_factor(system, drive, omega))
         found = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
-        motion, after = found.solution(slope)
+        motion, slope = found.solution(_ahead(done, float(f), hinges.reference))
         spent += found.iterations
         if motion is None:
             failed.append(k)
         else:
-            slope, response[k] = after, motion / drive.value
+            done = [*done[-1:], (float(f), slope)]
+            response[k] = motion / drive.value
             swing[k] = np.degrees(np.abs(hinges.gradient @ motion).max(initial=0.0))
         report(Progress(k + 1.0, float(len(frequency)), spent, 0.0))
     _warn_of(frequency[failed], options)
@@ -115,21 +125,40 @@ def harmonic(
     return Answer(response, {"swing": swing}, {"iterations": spent})
 
 
+def _ahead(
+    done: list[tuple[float, NDArray]], frequency: float, first: NDArray
+) -> NDArray[np.float64]:
+    """Slopes to begin with: on the straight line through those of the last two frequencies."""
+    if not done:
+        return first
+    (f1, s1), (f2, s2) = done[0], done[-1]
+    if len(done) == 1:
+        return s2
+    line = s2 + (s2 - s1) * (frequency - f2) / (f2 - f1)
+    return np.clip(line, s2 / FURTHEST, s2 * FURTHEST)
+
+
 class _Hinges:
     """The superlinear hinges of a system: gradients, offsets from rest, stiffness and slopes."""
 
     def __init__(self, system: Linearized) -> None:
-        model, u = system.case.structure.model, np.ascontiguousarray(system.displacement)
-        runs = [np.arange(a, b) for a, b, code, _ in model.hinge_runs if code == Superlinear.code]
-        rows = np.concatenate([np.zeros(0, np.int64), *runs])
-        columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
-        gradient = sparse.csr_array(
-            (_gradients(model, u)[rows].ravel(), columns.ravel(), 12 * np.arange(len(rows) + 1)),
-            shape=(len(rows), u.size),
-        )
-        self.gradient = sparse.csr_array(gradient[:, system.free])
-        self.offset = mechanics.angles(model.rest + u, model.hinges)[rows] - model.hinge_rest[rows]
-        self.stiffness = model.hinge_stiffness[rows]
+        structure, u = system.case.structure, np.ascontiguousarray(system.displacement)
+        self.gradient = sparse.csr_array((0, len(system.free)))
+        self.offset = self.stiffness = np.zeros(0)
+        if isinstance(structure, Structure):  # shells have none
+            model = structure.model
+            codes = np.repeat(model.hinge_runs[:, 2], np.diff(model.hinge_runs[:, :2]).ravel())
+            rows = np.flatnonzero(codes == Superlinear.code)
+            count = len(rows)
+            columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
+            entries = _gradients(model, u)[rows].ravel()
+            whole = sparse.csr_array(
+                (entries, columns.ravel(), 12 * np.arange(count + 1)), shape=(count, u.size)
+            )
+            self.gradient = sparse.csr_array(whole[:, system.free])
+            angle = mechanics.angles(model.rest + u, model.hinges)
+            self.offset = (angle - model.hinge_rest)[rows]
+            self.stiffness = model.hinge_stiffness[rows]
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 
     def slope(self, motion: NDArray) -> NDArray[np.float64]:
@@ -166,8 +195,9 @@ class _Balance:
     def solution(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
         """Motion (nf,), None without convergence, and the slopes in it.
 
-        Accelerated first (Anderson), which may run in circles near the end of a branch; then
-        slowly, which converges to branches that are stable.
+        Accelerated first (Anderson), which may run in circles near the end of a branch, or find
+        the branch between two others, where the motion does not stay; then slowly, which converges
+        to the others only.
         """
         quick, slow = (PATIENCE, self._anderson), (self.options.iterations, self._relaxed)
         for most, step in (quick, slow):
@@ -191,7 +221,8 @@ class _Balance:
             if before is not None:
                 change = np.abs(motion - before).max()
                 if change <= tolerance * np.abs(motion).max():
-                    return motion, slope
+                    between = step == self._anderson and _repels(slopes, misses)
+                    return (None if between else motion), slope
             before = motion
             slopes.append(slope)
             misses.append(self.hinges.slope(motion) - slope)
@@ -213,6 +244,16 @@ class _Balance:
         weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
         ahead = plain - (moved + turned) @ weight
         return np.where(ahead > 0.0, ahead, 0.5 * plain)
+
+
+def _repels(slopes: list[NDArray], misses: list[NDArray]) -> bool:
+    """Whether plain iterations would leave the solution: a multiplier above 1, of those seen."""
+    moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
+    if not moved.size:
+        return False
+    turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
+    seen = np.linalg.lstsq(moved, moved + turned, rcond=1e-8)[0]
+    return bool(np.linalg.eigvals(seen).real.max() > 1.0)
 
 
 def _warn_of(failed: NDArray, options: HarmonicBalance) -> None:

@@ -14,9 +14,10 @@ from foldyn.linear.answer import Answer
 from foldyn.linear.records import Record, record_of, smooth_history, transform
 from foldyn.linear.time_domain import Integration, Rig
 
-PER_CYCLE = 20  # samples in a cycle of the highest frequency
+PER_PULSE = 10  # samples in the pulse
 WIDTH = 0.5  # of a cycle of the highest frequency: the pulse
-SHARPEST = 4  # samples in a pulse, at least
+WEAK = 1.5  # cycles of a frequency in a pulse, from which it has next to no strength there
+FEWEST = 4  # samples in the pulse
 STILL = 8  # samples of rest before and after it, in which its spline dies away
 
 
@@ -33,7 +34,8 @@ class Impulse(Integration):
         Time (s) to simulate. Without it until damping leaves 1e-5 of a motion; without alpha, the
         inverse of the frequencies' spacing.
     every : float, optional
-        Largest sampling interval (s); a 20th of a cycle of the highest frequency by default.
+        Largest sampling interval (s); a tenth of the pulse by default, at most a 20th of a cycle
+        of the highest frequency.
     window_rate : float
         Decay rate (1/s) of an exponential window, for motions that have not died away at the end.
         It adds its damping to the response, which `peaks_of` takes off again.
@@ -61,9 +63,11 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     FoldynWarning
         The motion has not died away at the end.
     """
-    alpha = rig.case.damping.alpha
-    record = record_of(frequency, alpha, 1.0, options.every, options.duration, PER_CYCLE)
-    factor = _pulse(frequency, options.pulse, record)
+    width = WIDTH / float(frequency[-1])
+    pulse = width if options.pulse is None else options.pulse
+    every = min(pulse, width) / PER_PULSE if options.every is None else options.every
+    record = record_of(frequency, rig.case.damping.alpha, 1.0, every, options.duration)
+    factor = _pulse(float(frequency[-1]), pulse, record)
     history = smooth_history(factor, record.every)
     _, response, _ = rig.run(history, record.duration, record.every, report)
     pushed = rig.drive.value * np.pad(factor, (0, record.length - len(factor)))
@@ -78,15 +82,19 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     return Answer(found.response, {}, facts)
 
 
-def _pulse(frequency: NDArray, pulse: float | None, record: Record) -> NDArray[np.float64]:
+def _pulse(highest: float, pulse: float, record: Record) -> NDArray[np.float64]:
     """Samples of the pulse between two of rest."""
-    pulse = WIDTH / float(frequency[-1]) if pulse is None else pulse
-    if frequency[-1] * pulse > 1.5:
+    if highest * pulse > WEAK:
         raise InputError(
-            f"pulse = {pulse:g} s: has no strength left at {frequency[-1]:g} Hz; take at most "
-            f"{1.0 / frequency[-1]:.3g} s, or lower frequencies"
+            f"pulse = {pulse:g} s: has no strength left at {highest:g} Hz; take at most "
+            f"{1.0 / highest:.3g} s, or lower frequencies"
         )
-    count = max(round(pulse / record.every), SHARPEST)
+    count = round(pulse / record.every)
+    if count < FEWEST:
+        raise InputError(
+            f"every = {record.every:g} s: the pulse of {pulse:g} s has only {count} samples, and at "
+            f"least {FEWEST} are needed; sample faster, or leave every out"
+        )
     if count + 2 * STILL >= record.samples:
         raise InputError(
             f"pulse = {pulse:g} s: does not end within the {record.duration:.3g} s of the motion; "

@@ -67,24 +67,23 @@ def modal(
     FoldynWarning
         There are such resonances.
     """
-    case, size = system.case, len(system.free)
-    count = size if options.count is None else int(options.count)
-    if count > size:
-        raise InputError(f"count = {count}: the case has only {size} free dofs")
     pencil = Pencil(system.stiffness, system.mass)
+    count = pencil.finite if options.count is None else int(options.count)
+    if count > pencil.finite:
+        raise InputError(f"count = {count}: the case has only {pencil.finite} free dofs")
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
-    shape = drive_shape(case, drive).ravel()[system.free]
+    shape = drive_shape(system, drive)
     load = modes.shapes.T @ shape
     damping = modes.shapes.T @ (system.damping @ modes.shapes)
-    left = np.zeros(size)
-    if options.static_correction and count < size:
+    left = np.zeros(pencil.size)
+    if options.static_correction and count < pencil.finite:
         left = _residual(pencil, modes, shape, load)
     noise = pencil.noise(modes.shapes)
-    response = np.empty((len(frequency), size), np.complex128)
+    response = np.empty((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         q = _amplitudes(modes.values, noise, damping, omega, load)
-        response[k] = (modes.shapes @ q + left) * drive_factor(case, drive, omega)
+        response[k] = (modes.shapes @ q + left) * drive_factor(system, drive, omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_of_resonances(frequency, response)
     facts = {"modes": count, "static_correction": options.static_correction}

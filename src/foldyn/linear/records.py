@@ -49,9 +49,8 @@ class Record:
 
 
 def record_of(
-    frequency: NDArray, alpha: float, quiet: float, every: float | None, duration: float | None,
-    per_cycle: int,
-) -> Record:  # fmt: skip
+    frequency: NDArray, alpha: float, quiet: float, every: float, duration: float | None
+) -> Record:
     """Choose the sampling of a transient record.
 
     Parameters
@@ -62,18 +61,17 @@ def record_of(
         Mass-proportional damping (1/s): a motion falls at least as fast as exp(-alpha t / 2).
     quiet : float
         Part of the record after the drive has ended.
-    every, duration : float, optional
-        Largest sampling interval, and the time to simulate (s).
-    per_cycle : int
-        Samples in a cycle of the highest frequency, unless `every` is given.
+    every : float
+        Largest sampling interval (s).
+    duration : float, optional
+        Time to simulate (s).
     """
     spacing = common_spacing(frequency)
     if duration is None:
         decay = 2.0 * math.log(1.0 / DECAYED) / alpha if alpha > 0.0 else 0.0
         duration = decay / quiet if decay > 0.0 else 1.0 / spacing
     whole = math.ceil(duration * spacing * (1.0 - 1e-9)) / spacing
-    largest = 1.0 / (per_cycle * float(frequency[-1])) if every is None else every
-    length = math.ceil(whole / largest * (1.0 - 1e-9))
+    length = math.ceil(whole / every * (1.0 - 1e-9))
     every = whole / length
     check_resolved(frequency, every)
     samples = min(math.ceil(duration / every * (1.0 - 1e-9)), length)

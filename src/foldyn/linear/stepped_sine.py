@@ -64,7 +64,7 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     FoldynWarning
         Motions have not settled.
     """
-    if getattr(rig.case.damping, "state", "rest") == "start":
+    if rig.case.damping.state == "start":
         raise InputError(
             'damping: with state = "start" each motion would take K0 where the one before has '
             'ended; use state = "rest", or method = "impulse" or "burst_random"'

@@ -76,10 +76,9 @@ class Rig:
         self._supports = [*self._held()]
 
     def _holding(self, station: Station) -> list[Force]:
-        problem = station.problem
-        force = problem.internal(problem.start(), station.factor)
+        force = station.body.internal(station.dofs)[: self.state.size]
         force[self.case.supported_dofs] = 0.0
-        force[np.abs(force) <= problem.force_rounding] = 0.0
+        force[np.abs(force) <= station.problem.force_rounding] = 0.0
         return forces(force.reshape(-1, 3))
 
     def _held(self) -> list[Support]:

@@ -20,32 +20,38 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.linear.excitation import Drive
+from foldyn.linear.linearized import Linearized
 
 
-def drive_shape(case: Case, drive: Drive) -> NDArray[np.float64]:
-    """Load (n, 3) per unit of the drive: forces per N, or masses (kg) that the base accelerates."""
+def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
+    """Load (nf,) per unit of the drive: forces per N, or masses (kg) that the base accelerates."""
     if drive.axis is None:
-        return drive.vector / drive.value
-    shape = np.zeros(case.fixed.shape)
-    shape[:, AXES.index(drive.axis)] = np.asarray(case.structure.mass.sum(axis=1)).ravel()
+        load = drive.vector / drive.value
+    else:
+        load = np.zeros_like(drive.vector)
+        mass = np.asarray(system.case.structure.mass.sum(axis=1)).ravel()
+        load[:, AXES.index(drive.axis)] = mass
+    shape = np.zeros(len(system.free))
+    nodal = system.free < load.size
+    shape[nodal] = load.ravel()[system.free[nodal]]
     return shape
 
 
-def drive_factor(case: Case, drive: Drive, omega: float) -> complex:
+def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
     """Factor on the shape of the load at an angular frequency (rad/s)."""
     if drive.axis is None:
         return 1.0
-    return omega**2 - 1j * omega * case.damping.alpha
+    return omega**2 - 1j * omega * system.case.damping.alpha
 
 
-def absolute(case: Case, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
+def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
     """Response (m, n, 3) to the drive from that of the free dofs (m, nf), relative to the base."""
-    response = np.zeros((len(relative), case.fixed.size), np.complex128)
-    response[:, case.free_dofs] = relative
-    response = response.reshape(-1, *case.fixed.shape)
+    response = np.zeros((len(relative), drive.vector.size), np.complex128)
+    nodal = system.free < drive.vector.size
+    response[:, system.free[nodal]] = relative[:, nodal]
+    response = response.reshape(-1, *drive.vector.shape)
     if drive.axis is not None:
         response[:, :, AXES.index(drive.axis)] += 1.0
     return response

@@ -4,7 +4,7 @@ from foldyn.mechanics.energy import angles, strain_energies
 from foldyn.mechanics.force import Workspace, internal_force, workspace, workspaces
 from foldyn.mechanics.model import BarsHinges, Hinges, build
 from foldyn.mechanics.renumber import node_order, renumber
-from foldyn.mechanics.tangent import Sparsity, sparsity, tangent
+from foldyn.mechanics.tangent import Sparsity, add_tangent, sparsity, tangent
 from foldyn.mechanics.threads import (
     largest,
     part,
@@ -20,6 +20,7 @@ __all__ = [
     "Hinges",
     "Sparsity",
     "Workspace",
+    "add_tangent",
     "angles",
     "build",
     "internal_force",

@@ -112,6 +112,13 @@ def tangent(
     """
     n = len(model.rest)
     data = np.zeros((len(pattern.indices), 3, 3))
+    add_tangent(model, pattern, u, floor, data)
+    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))
+
+
+def add_tangent(
+    model: BarsHinges, pattern: Sparsity, u: NDArray, floor: float, data: NDArray
+) -> None:
+    """Add the blocks of `tangent` to `data` (nnz, 3, 3)."""
     _add_bars(model, u, pattern.bar_slots, data)
     _add_hinges(model, u, pattern.hinge_slots, data, floor)
-    return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))

@@ -1,7 +1,8 @@
-"""Figures of structures, laws, loads, motions and equilibrium paths.
+"""Figures of structures, laws, loads, motions, equilibrium paths, modes and responses.
 
 Every function returns a `matplotlib.figure.Figure`, ready for ``figure.savefig(path)``; `animate`
-writes a GIF or an MP4. Matplotlib is imported on first use, and its global state is never touched.
+and `animate_modes` write a GIF or an MP4. Matplotlib is imported on first use, and its global state
+is never touched.
 """
 
 from __future__ import annotations
@@ -12,9 +13,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from foldyn.plots.animation import animate
     from foldyn.plots.energies import plot_energies
+    from foldyn.plots.frf import plot_frf
     from foldyn.plots.history import plot_history
     from foldyn.plots.laws import plot_laws
     from foldyn.plots.loads import plot_load_history
+    from foldyn.plots.mac import plot_mac
+    from foldyn.plots.mode_film import animate_modes
+    from foldyn.plots.modes import draw_modes
+    from foldyn.plots.nyquist import plot_nyquist
     from foldyn.plots.path import plot_load_displacement, plot_reaction, total_reaction
     from foldyn.plots.path_energies import energy_shares, plot_path_energies
     from foldyn.plots.shapes import draw_shapes
@@ -22,14 +28,19 @@ if TYPE_CHECKING:
 
 __all__ = [
     "animate",
+    "animate_modes",
+    "draw_modes",
     "draw_shapes",
     "draw_structure",
     "energy_shares",
     "plot_energies",
+    "plot_frf",
     "plot_history",
     "plot_laws",
     "plot_load_displacement",
     "plot_load_history",
+    "plot_mac",
+    "plot_nyquist",
     "plot_path_energies",
     "plot_reaction",
     "total_reaction",
@@ -37,14 +48,19 @@ __all__ = [
 
 _HOMES = {
     "animate": "animation",
+    "animate_modes": "mode_film",
+    "draw_modes": "modes",
     "draw_shapes": "shapes",
     "draw_structure": "structure",
     "energy_shares": "path_energies",
     "plot_energies": "energies",
+    "plot_frf": "frf",
     "plot_history": "history",
     "plot_laws": "laws",
     "plot_load_displacement": "path",
     "plot_load_history": "loads",
+    "plot_mac": "mac",
+    "plot_nyquist": "nyquist",
     "plot_path_energies": "path_energies",
     "plot_reaction": "path",
     "total_reaction": "path",

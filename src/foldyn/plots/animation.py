@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from foldyn.cases import Case
     from foldyn.structures import Structure
 
-_DPI = {".gif": 100, ".mp4": 200}
+DPI = {".gif": 100, ".mp4": 200}
+"""Dots per inch of an animation by the end of the file's name."""
 _FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs of shorter frames
 _TRAVELS = 0.25  # path of the center of mass, in sizes of the sheet, that is worth a line
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
@@ -83,7 +84,7 @@ def animate(
         ffmpeg could not write the file.
     """
     path = Path(path)
-    kind = _checked_kind(path, frames, fps)
+    kind = checked_kind(path, frames, fps)
     sheet = Sheet3D.of(case_or_structure)
     places, displacement = frame_displacements(sheet, result, frames)
     moving = sheet.nodes + scale * displacement
@@ -115,7 +116,7 @@ def animate(
     writer = WRITERS[kind](fps=fps)
     moments = _times(places, writer.rate) if "time" in result.sizes else _factors(places, result)
     note = f", displacement times {scale:g}" if scale != 1.0 else ""
-    with writer.saving(figure, str(path), dpi=_DPI[kind]):
+    with writer.saving(figure, str(path), dpi=DPI[kind]):
         for index, (moment, points) in enumerate(zip(moments, moving, strict=True)):
             drawn.move(points)
             for dot, course in dots:
@@ -125,7 +126,7 @@ def animate(
     return path
 
 
-def _checked_kind(path: Path, frames: int, fps: int) -> str:
+def checked_kind(path: Path, frames: int, fps: int) -> str:
     """Return the end of the file's name, when all that an animation needs is there."""
     kind = path.suffix.lower()
     if kind not in WRITERS:

@@ -93,7 +93,8 @@ class Sheet3D:
             return np.zeros((0, 2), dtype=np.int64)
         edges = {tuple(edge) for edge in np.sort(self.edges, axis=1).tolist()}
         bars = np.sort(np.asarray(self.structure.bars, dtype=np.int64), axis=1).tolist()
-        return np.array([bar for bar in bars if tuple(bar) not in edges]).reshape(-1, 2)
+        inner = [bar for bar in bars if tuple(bar) not in edges]
+        return np.array(inner, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
     def actuated(self) -> NDArray[np.int64]:

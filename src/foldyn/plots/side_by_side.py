@@ -14,8 +14,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 
-_MOST_COLUMNS = 3
-_WIDTH, _MARGIN = 9.0, 0.15  # inches
+_MARGIN = 0.15  # inches
 _CAPTION, _LINE = 0.42, 0.16  # inches; the caption stands below its sheet, more lines take more
 _TALLEST = 3.2  # inches
 
@@ -44,6 +43,8 @@ def side_by_side(
     notes: Sequence[Line2D] = (),
     title: str = "",
     extent: NDArray[np.float64] | None = None,
+    width: float = 9.0,
+    most_columns: int = 3,
 ) -> SideBySide:
     """Draw a sheet in several positions, over where its nodes are in gray.
 
@@ -62,6 +63,10 @@ def side_by_side(
         Title of the figure.
     extent : ndarray, shape (p, 3), optional
         Points (m) that every view has room for, beside the gray nodes; by default the shapes.
+    width : float
+        Width of the figure (inches).
+    most_columns : int
+        Shapes in a row at most.
     """
     sight, count = view, len(shapes)
     room = np.vstack([sheet.nodes, shapes.reshape(-1, 3) if extent is None else extent])
@@ -70,19 +75,20 @@ def side_by_side(
     glow = len(sheet.actuated) < len(sheet.pattern.creases)
     keys = [*notes, *edge_keys(sheet, actuated=glow)]
 
-    columns = min(count, _MOST_COLUMNS)
+    columns = min(count, most_columns)
     columns = -(-count // -(-count // columns))  # rows as full as can be
     rows = -(-count // columns)
-    cell = _WIDTH / columns
+    cell = width / columns
     flat = sight.flat(room)
     low, size = flat.min(axis=0), np.ptp(flat, axis=0)
     inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # per meter
     aside = inches * (sight.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
     below = _CAPTION + _LINE * max(caption.count("\n") for caption in captions)
     top = 0.42 if title else 0.1
-    bottom = 0.12 + 0.19 * -(-len(keys) // 4)
+    entries = style.columns_that_fit([str(key.get_label()) for key in keys], width, 4)
+    bottom = 0.12 + 0.19 * -(-len(keys) // entries)
     step = size[1] * inches + below
-    figure = style.new_figure(_WIDTH, top + rows * step + bottom, constrained=False)
+    figure = style.new_figure(width, top + rows * step + bottom, constrained=False)
     height = figure.get_figheight()
     if title:
         figure.suptitle(
@@ -92,7 +98,7 @@ def side_by_side(
     for place, (caption, shape) in enumerate(zip(captions, shapes, strict=True)):
         row, column = divmod(place, columns)
         here = min(columns, count - row * columns)  # the last row stands in the middle
-        middle = _WIDTH / 2 + (column - 0.5 * (here - 1)) * cell
+        middle = width / 2 + (column - 0.5 * (here - 1)) * cell
         floor = height - top - (row + 1) * step + below
         center = middle + aside[0], floor + 0.5 * size[1] * inches + aside[1]
         axes = scene.add_view(figure, seen, center, inches)
@@ -100,7 +106,7 @@ def side_by_side(
         add_undeformed(axes, sheet)
         sheets.append(DrawnSheet(axes, sheet, shape, sight, actuated=glow))
         figure.text(
-            middle / _WIDTH,
+            middle / width,
             (floor - 0.08) / height,
             caption,
             ha="center",
@@ -108,5 +114,5 @@ def side_by_side(
             fontsize=style.LABEL,
             color=style.BLACK,
         )
-    style.legend_below(figure, keys, columns=4)
+    style.legend_below(figure, keys, entries)
     return SideBySide(style.finish(figure), sheets)

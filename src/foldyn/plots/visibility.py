@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from foldyn.plots.scene import View
 
 SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge
-_CHUNK = 4_000_000  # point-triangle pairs tested at a time (about 100 MB)
+_CHUNK = 1_000_000  # point-triangle pairs tested at a time (about 100 MB)
 
 
 def hidden_points(
@@ -33,15 +34,62 @@ def hidden_points(
     a, u, v, area = a[drawn], u[drawn], v[drawn], area[drawn]
     eyes = points @ view.basis.T
     hidden = np.zeros(len(points), dtype=bool)
-    step = max(1, _CHUNK // max(len(a), 1))
-    for start in range(0, len(points), step):
-        d = eyes[start : start + step, None, :] - a
-        s = (d[..., 0] * v[:, 1] - d[..., 1] * v[:, 0]) / area
-        t = (u[:, 0] * d[..., 1] - u[:, 1] * d[..., 0]) / area
+    for point, triangle in _near_pairs(eyes[:, :2], (a + np.stack([0 * u, u, v]))[..., :2]):
+        d = eyes[point] - a[triangle]
+        e, g = u[triangle], v[triangle]
+        s = (d[:, 0] * g[:, 1] - d[:, 1] * g[:, 0]) / area[triangle]
+        t = (e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]) / area[triangle]
         inside = (s > 1e-9) & (t > 1e-9) & (s + t < 1.0 - 1e-9)
-        before = s * u[:, 2] + t * v[:, 2] - d[..., 2] > 1e-3 * size
-        hidden[start : start + step] = (inside & before).any(axis=1)
+        before = s * e[:, 2] + t * g[:, 2] - d[:, 2] > 1e-3 * size
+        hidden[point[inside & before]] = True
     return hidden
+
+
+def _near_pairs(
+    points: NDArray[np.float64], corners: NDArray[np.float64]
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Give all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, some at a time.
+
+    The screen is cut into about as many cells as there are triangles: only a triangle whose
+    bounding box reaches into the cell of a point can hide it.
+    """
+    count = corners.shape[1]
+    if not count or not len(points):
+        return
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    corner, across = low.min(axis=0), np.ptp(corners.reshape(-1, 2), axis=0)
+    cells = max(1, round(np.sqrt(count)))
+    scale = cells / np.where(across > 0.0, across, 1.0)
+
+    def cell(places: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.clip(np.floor((places - corner) * scale), 0, cells - 1).astype(np.int64)
+
+    first, last = cell(low), cell(high)
+    width, height = (last - first + 1).T
+    owner = np.repeat(np.arange(count), width * height)
+    place = _ranks(width * height)
+    row = first[owner, 0] + place % width[owner]
+    column = first[owner, 1] + place // width[owner]
+    order = np.argsort(row * cells + column, kind="stable")
+    of_cell = owner[order]
+    ends = np.cumsum(np.bincount(row * cells + column, minlength=cells**2))
+    home = cell(points) @ np.array([cells, 1])
+    many = np.diff(ends, prepend=0)[home]
+    begin = ends[home] - many
+    start = 0
+    total = np.cumsum(many)
+    while start < len(points):
+        before = total[start - 1] if start else 0
+        stop = max(start + 1, int(np.searchsorted(total, before + _CHUNK, side="right")))
+        some = slice(start, stop)
+        point = np.repeat(np.arange(start, stop), many[some])
+        yield point, of_cell[begin[point] + _ranks(many[some])]
+        start = stop
+
+
+def _ranks(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return 0, 1, ..., count - 1 for each count, in a row."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def split_edges(

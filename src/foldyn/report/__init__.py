@@ -9,6 +9,8 @@ from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
 
 if TYPE_CHECKING:
+    from foldyn.report.frf import write_responses
+    from foldyn.report.modes import write_modes
     from foldyn.report.motion import write_motion
     from foldyn.report.path import write_path
 
@@ -18,12 +20,19 @@ __all__ = [
     "Section",
     "Table",
     "Text",
+    "write_modes",
     "write_motion",
     "write_path",
     "write_report",
+    "write_responses",
 ]
 
-_HOMES = {"write_motion": "motion", "write_path": "path"}
+_HOMES = {
+    "write_modes": "modes",
+    "write_motion": "motion",
+    "write_path": "path",
+    "write_responses": "frf",
+}
 """What needs the case file's schema and the plots, and is loaded when first used."""
 
 

@@ -32,15 +32,13 @@ class Album:
         draw().savefig(path, dpi=DPI)
         return Picture(path, caption)
 
-    def structure(self, case: Case) -> list[Section]:
+    def structure(
+        self, case: Case, caption: str = "The pattern with its nodes, supports and loads."
+    ) -> list[Section]:
         """Draw the structure and its laws."""
         return [
             Heading("The structure"),
-            self.figure(
-                "structure",
-                "The pattern with its nodes, supports and loads.",
-                lambda: plots.draw_structure(case),
-            ),
+            self.figure("structure", caption, lambda: plots.draw_structure(case)),
             self.figure(
                 "laws",
                 "Constitutive curves: moment of a fold and of a bend against the dihedral, stress "

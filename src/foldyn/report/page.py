@@ -27,7 +27,7 @@ figure { margin: 1.25rem 0; }
 img, video { display: block; max-width: 100%; height: auto; margin: 0 auto; }
 figcaption, caption { color: #444; font-size: 0.92rem; text-align: left; }
 figcaption { margin-top: 0.4rem; max-width: 46rem; }
-caption { padding-bottom: 0.4rem; }
+caption { padding-bottom: 0.4rem; max-width: min(46rem, 100vw - 2rem); }
 .table { overflow-x: auto; margin: 1.25rem 0; }
 table { border-collapse: collapse; font-size: 0.95rem; }
 th, td { padding: 0.35rem 0.8rem; text-align: left; vertical-align: top; }

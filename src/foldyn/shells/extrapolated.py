@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.shells.kernels import ShellModel
-from foldyn.shells.tangent import ShellPattern
+from foldyn.shells.sparsity import ShellPattern
 
 
 def add_extrapolated_strain(
@@ -24,16 +24,17 @@ def add_extrapolated_strain(
     # e(u) - e(u0) - (D0 . d) / L^2 = |d|^2 / (2 L^2)
     second = 0.5 * np.einsum("tki,tki->tk", new - old, new - old) * model.per_length2
     excess = -np.einsum("tkl,tl->tk", model.membrane, second) * model.per_length2
+    dof = pattern.triangle_dof[:, :3]
+    diagonal = pattern.indptr[dof + 1] - pattern.indptr[dof] + 1  # from (0, 0) to (1, 1) of a block
     slots, values = [], []
     for k in range(3):
-        ends = (3 * k, 3 * ((k + 1) % 3))
+        ends = (k, (k + 1) % 3)
         for one in ends:
             for other in ends:
                 for axis in range(3):
-                    slots.append(pattern.triangle[:, one + axis, other + axis])
+                    slots.append(pattern.triangle[:, one, other] + axis * diagonal[:, one])
                     values.append(excess[:, k] if one == other else -excess[:, k])
-    sums = np.bincount(np.concatenate(slots), np.concatenate(values), len(data) + 1)
-    data += sums[: len(data)]
+    data += np.bincount(np.concatenate(slots), np.concatenate(values), len(data))
 
 
 def _apart(model: ShellModel, u: NDArray) -> NDArray:

@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 from foldyn.materials.compiled import kernel
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.threads import Team, team
 
 
 class ShellModel(NamedTuple):
     """Arrays of a shell: n nodes, g fixed wings, nt triangles, nh hinges, c pieces of creases."""
 
+    nodes: int  # n
+    rotations: int  # r
     rest: NDArray  # (n + g, 3) from the mean of the nodes, m
     triangles: NDArray  # (nt, 3)
     side: NDArray  # (nt, 3, 3) rest vectors of the sides, m
@@ -39,6 +42,12 @@ class ShellModel(NamedTuple):
     addresses: NDArray  # (3,) of a law of the user's
 
 
+class Whole(NamedTuple):
+    """What a thread that is alone computes: all of it."""
+
+    own: NDArray  # (2,) first and last + 1 of the nodes
+
+
 class ShellWork(NamedTuple):
     """Memory of one evaluation."""
 
@@ -46,14 +55,18 @@ class ShellWork(NamedTuple):
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
     piece_turn: NDArray  # (c,) dihedral of each piece of a crease, rad
+    angle: NDArray  # (nh,) dihedrals, rad
+    strips: Whole
+    team: Team
 
 
 def shell_work(model: ShellModel) -> ShellWork:
     """Memory for `model`."""
     nh = len(model.hinges)
     return ShellWork(
-        np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh), np.zeros(len(model.piece_hinge))
-    )
+        np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh), np.zeros(len(model.piece_hinge)),
+        np.zeros(nh), Whole(np.array([0, model.nodes + -(-model.rotations // 3)])), team(1)[0],
+    )  # fmt: skip
 
 
 @kernel
@@ -69,6 +82,7 @@ def fold(model, u, x, work):
         found = dihedral_gradient(
             p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
         )
+        work.angle[e] = found[0]
         work.turn[e] = found[0] - model.hinge_rest[e]
         for c in range(12):
             work.gradient[e, c] = found[1 + c]

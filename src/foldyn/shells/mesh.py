@@ -13,6 +13,8 @@ from foldyn.patterns import Pattern
 
 Edge = tuple[int, int]
 
+EQUAL = 1e-6  # relative difference of diagonals that counts as none
+
 
 @dataclass(frozen=True, eq=False)
 class ShellMesh:
@@ -54,8 +56,8 @@ class _Points:
 def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
     """Cut every edge of a pattern into `divisions` pieces and its panels into triangles.
 
-    Quadrilaterals get a grid with alternating diagonals, triangles are divided evenly, and other
-    polygons are first cut into triangles about their centroid.
+    Quadrilaterals get a grid whose cells are cut in two, triangles are divided evenly, and other
+    polygons are first cut into triangles about the mean of their corners.
     """
     points = _Points(pattern.vertices)
     edges = {
@@ -101,12 +103,23 @@ def _grid(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]
         for j in range(1, n):
             x, y = i / n, j / n
             node[i, j] = points.add((1 - y) * ((1 - x) * p + x * q) + y * ((1 - x) * s + x * r))
-    out = []
-    for i in range(n):
-        for j in range(n):
-            a, b, c, d = node[i, j], node[i + 1, j], node[i + 1, j + 1], node[i, j + 1]
-            out += [(a, b, d), (b, c, d)] if (i + j) % 2 else [(a, b, c), (a, c, d)]
-    return out
+    return _halves(node, np.array([points.found[k] for k in node.ravel()]).reshape(n + 1, n + 1, 3))
+
+
+def _halves(node: NDArray, x: NDArray) -> list[tuple[int, int, int]]:
+    """Triangles of a grid of nodes (n + 1, n + 1) at x (n + 1, n + 1, 3).
+
+    Each cell is cut at its shorter diagonal, in a pattern that has the panel's own symmetries;
+    cells with diagonals of one length alternate.
+    """
+    a, b, c, d = node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]
+    ac = np.linalg.norm(x[1:, 1:] - x[:-1, :-1], axis=2)
+    bd = np.linalg.norm(x[:-1, 1:] - x[1:, :-1], axis=2)
+    odd = np.indices(a.shape).sum(axis=0) % 2 == 1
+    cut_bd = np.where(np.abs(ac - bd) <= EQUAL * ac, odd, bd < ac)[:, :, None]
+    one = np.where(cut_bd, np.stack([a, b, d], 2), np.stack([a, b, c], 2))
+    two = np.where(cut_bd, np.stack([b, c, d], 2), np.stack([a, c, d], 2))
+    return list(map(tuple, np.stack([one, two], axis=2).reshape(-1, 3).tolist()))
 
 
 def _divided(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]:

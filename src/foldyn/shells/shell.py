@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -20,7 +21,8 @@ from foldyn.shells.element import side_stiffness, without_free_sides
 from foldyn.shells.kernels import ShellModel, shell_energy, shell_force, shell_work
 from foldyn.shells.mesh import Edge, shell_mesh
 from foldyn.shells.sides import Sides, sides
-from foldyn.shells.tangent import ShellPattern, shell_pattern, shell_tangent
+from foldyn.shells.sparsity import ShellPattern, shell_pattern
+from foldyn.shells.tangent import shell_tangent
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import fold_stiffness
 from foldyn.structures.discretize import fold_rest as rest_of
@@ -152,6 +154,8 @@ class Shell:
         length = np.linalg.norm(along, axis=1)
         whole = np.bincount(found.piece_crease, length, len(self.fold_stiffness))
         return ShellModel(
+            nodes=len(self.nodes),
+            rotations=self.rotations,
             rest=rest,
             triangles=self.triangles,
             side=np.ascontiguousarray(side),
@@ -316,7 +320,7 @@ def shell(
         raise InputError(f"sheet: got {type(sheet).__name__}, give a Sheet")
     if isinstance(divisions, bool) or not isinstance(divisions, Integral) or divisions < 1:
         raise InputError(f"divisions = {divisions!r}: give a whole number of at least 1")
-    if mass not in MASSES:
+    if not isinstance(mass, str) or mass not in MASSES:
         raise InputError(f"mass = {mass!r}: choose one of {', '.join(MASSES)}")
     hinge_law(fold_law, "fold_law")
     edges = _clamped(clamped, pattern)
@@ -346,10 +350,13 @@ def shell(
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
     boundary = {tuple(edge) for edge in pattern.boundary.tolist()}
-    edges = []
-    for edge in given:
-        pair = tuple(sorted(int(k) for k in edge))
+    try:
+        pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
+    except TypeError:
+        raise InputError(
+            f"clamped = {given!r}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
+        ) from None
+    for pair in pairs:
         if pair not in boundary:
-            raise InputError(f"clamped: {tuple(edge)} is no boundary edge of the pattern")
-        edges.append((pair[0], pair[1]))
-    return tuple(edges)
+            raise InputError(f"clamped: {pair} is no boundary edge of the pattern")
+    return tuple((pair[0], pair[1]) for pair in pairs)

@@ -1,0 +1,206 @@
+"""The conserving method: midpoint rule with forces that do exactly the work of the strain energy.
+
+    (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
+    b = F + beta K0 (u1 - u0)/h - (p0 + p1)/2,
+
+with F the forces of `implicit.discrete_gradient`. Without damping and loads the energy of any
+structure and the momenta of a free one stay what they are, with any step, to the tolerance of the
+equations and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and
+Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.waveforms import evaluate
+from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.implicit.discrete_gradient import (
+    add_bar_forces,
+    add_bar_tangent,
+    add_hinge_forces,
+    add_hinge_tangent,
+)
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
+from foldyn.dynamics.implicit.tangent import expected_stress
+from foldyn.dynamics.inertia import kinetic_energy, times_mass
+from foldyn.dynamics.system import moving_energy
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics import strain_energies
+from foldyn.mechanics.borrow import borrowed
+from foldyn.mechanics.flat import flat
+from foldyn.statics.body import FLOOR
+
+ORDER = 2
+TOLERANCE = 1e-11  # of the residual: what is left of it is energy
+
+
+class EnergyMomentum:
+    """Steps of the method; see `implicit.scheme.Scheme`."""
+
+    symmetric = False
+    tolerance = TOLERANCE
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self._stress, self._start = np.zeros((2, len(bench.packed.model.bars)))
+        self._before = 0.0  # the last step, s
+
+    def begin(self, t: float) -> None:
+        """See `Scheme`."""
+        self.bench.begin(t)
+        self._before = 0.0
+
+    def accept(self, h: float) -> None:
+        """See `Scheme`."""
+        self.bench.accept(h)
+        self._before = h
+
+    def weights(self, h: float) -> Weights:
+        """See `Scheme`."""
+        return Weights(1.0, (2.0 / h + self.bench.packed.system.alpha) / h, 1.0 / h)
+
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """See `Scheme`."""
+        b, packed = self.bench, self.bench.packed
+        return residual(
+            packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.out, b.course.angle,
+            b.work.angle, b.scratch,
+        )  # fmt: skip
+
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """See `Scheme`."""
+        b, model, pattern = self.bench, self.bench.packed.model, matrix.pattern
+        u0, u1 = b.displacement(), b.moved()
+        expected_stress(model, u0, u0, False, self._start)
+        expected_stress(model, u1, before, again, self._stress)
+        stress = 0.5 * (self._start + self._stress)
+        matrix.stiffness[:] = 0.0
+        add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, matrix.stiffness)
+        slots = pattern.hinge_slots
+        add_hinge_tangent(model, u0, u1, b.course.angle, FLOOR, slots, matrix.stiffness)
+
+    def works(self, h: float) -> tuple[float, float]:
+        """See `Scheme`; exactly those of the step's forces."""
+        b, packed = self.bench, self.bench.packed
+        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.scratch)
+        if packed.system.turns:
+            u0, u1 = b.displacement(), b.moved()
+            done += _actuation(packed.model, packed.system, b.old, b.new, u0, u1, b.scratch)
+        return done, lost
+
+    def change(self, h: float) -> NDArray:
+        """See `Scheme`: accelerations belong to the middle of the steps."""
+        old, new = self.bench.old, self.bench.new
+        return h**3 / (6.0 * (h + self._before)) * (new.a - old.a)
+
+
+@kernel
+def residual(model, system, mass, h, t, old, new, out, angle0, angle1, s):
+    """Residual of a step into `out`; returns its norm and that of the forces at play, N.
+
+    The dihedrals angle0 (nh,) belong to the start; angle1 gets those of the end.
+    """
+    model, system, mass = borrowed(model), borrowed(system), borrowed(mass)
+    old, new, s = borrowed(old), borrowed(new), borrowed(s)
+    q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
+    x, left, bracket = flat(s.moving), flat(out), flat(new.force)
+    for i in range(q0.size):
+        w1[i] = 2.0 * (q1[i] - q0[i]) / h - w0[i]
+        a1[i] = (w1[i] - w0[i]) / h
+        x[i] = a1[i] + system.alpha * 0.5 * (w0[i] + w1[i])
+    for node in range(mass.diagonal.size):
+        if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
+            for i in range(3 * node, 3 * node + 3):
+                a1[i], w1[i] = 0.0, (q1[i] - q0[i]) / h
+    if system.varies and t != s.time[0]:
+        evaluate(system.waves, t, system.moves or system.turns, s.factor)
+        s.time[0] = t
+    new.factor[:] = s.factor
+    mean = 0.5 * (old.factor + new.factor)
+    if system.turns:
+        turn(model, system.actuators, mean)
+    _place(system.moved, old, s.displacement)
+    _place(system.moved, new, s.velocity)
+    new.force[:] = 0.0
+    add_bar_forces(model, s.displacement, s.velocity, new.force)
+    add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
+    u0, u1 = flat(s.displacement), flat(s.velocity)
+    for i in range(system.stiff_indptr.size - 1):
+        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
+            j = system.stiff_indices[k]
+            bracket[i] += system.stiff_data[k] * (u1[j] - u0[j]) / h
+    loads = system.loads
+    for k in range(loads.dof.size):
+        bracket[loads.dof[k]] -= loads.value[k] * mean[loads.row[k], 0]
+    times_mass(mass, s.moving, out)
+    inertia = 0.0
+    for i in range(q0.size):
+        inertia += left[i] * left[i]
+        left[i] += bracket[i]
+    reference = max(inertia, clear_supported(system, out), load_square(system, mean))
+    norm = 0.0
+    for i in range(q0.size):
+        norm += left[i] * left[i]
+    return math.sqrt(norm), math.sqrt(reference)
+
+
+@kernel
+def _place(moved, phase, out):
+    """Displacement (n, 3) of a phase with that of the supports."""
+    u, q = flat(out), flat(phase.q)
+    for i in range(u.size):
+        u[i] = q[i]
+    for k in range(moved.dof.size):
+        u[moved.dof[k]] += moved.value[k] * phase.factor[moved.row[k], 0]
+
+
+@kernel
+def _works(system, mass, h, old, new, s):
+    """Work put in and energy dissipated in a step."""
+    moved, loads, bracket = system.moved, system.loads, flat(new.force)
+    _place(moved, old, s.displacement)
+    _place(moved, new, s.velocity)
+    u0, u1, speed = flat(s.displacement), flat(s.velocity), flat(s.moving)
+    for i in range(u0.size):
+        u1[i] -= u0[i]
+        speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
+    done, lost = 0.0, 0.0
+    if system.alpha > 0.0:
+        jolts = moving_energy(system.moved_mass, old.factor)
+        jolts += moving_energy(system.moved_mass, new.factor)
+        done += system.alpha * h * jolts
+        lost += system.alpha * h * (2.0 * kinetic_energy(mass, s.moving, s.product) + jolts)
+    for k in range(moved.dof.size):
+        row = moved.row[k]
+        shift = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        done += bracket[moved.dof[k]] * shift
+    for k in range(loads.dof.size):
+        row = loads.row[k]
+        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
+        done += loads.value[k] * mean * u1[loads.dof[k]]
+    for i in range(system.stiff_indptr.size - 1):
+        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
+            lost += u1[i] * system.stiff_data[k] * u1[system.stiff_indices[k]] / h
+    return done, lost
+
+
+@kernel
+def _actuation(model, system, old, new, u0, u1, s):
+    """Work of the actuators in a step: what turning the rest angles at either end changes."""
+    done, mean = 0.0, 0.5 * (old.factor + new.factor)
+    turn(model, system.actuators, old.factor)
+    strain_energies(model, u0, s.energy)
+    done -= s.energy.sum()
+    turn(model, system.actuators, mean)
+    strain_energies(model, u0, s.energy)
+    done += s.energy.sum()
+    strain_energies(model, u1, s.energy)
+    done -= s.energy.sum()
+    turn(model, system.actuators, new.factor)
+    strain_energies(model, u1, s.energy)
+    return done + s.energy.sum()

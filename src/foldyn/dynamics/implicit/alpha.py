@@ -1,0 +1,180 @@
+"""Steps of Newmark's family and of the generalized-alpha method, which contains it.
+
+With accelerations a and h the step, displacements and velocities follow Newmark,
+
+    q1 = q0 + h w0 + h^2 ((1/2 - beta) a0 + beta a1),   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
+
+and the equation of motion holds between both ends,
+
+    M ((1 - am) a1 + am a0) + alpha M ((1 - af) w1 + af w0) + (1 - af) b1 + af b0 = 0,
+
+with b = F_int + beta K0 v - p at each end: the forces are averaged, not the displacements, so that
+b1 is what equilibrium at the end needs (Erlicher, Bonaventura and Bursi, Comput. Mech. 28, 2002).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics.actuation import actuator_power, turn
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
+from foldyn.dynamics.implicit.tangent import put_tangent
+from foldyn.dynamics.inertia import kinetic_energy, times_mass
+from foldyn.dynamics.system import acceleration, moving_energy
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics.borrow import borrowed
+from foldyn.mechanics.flat import flat
+
+TOLERANCE = 1e-7  # of the residual; see `Scheme`
+
+
+class Parameters(NamedTuple):
+    """Parameters of a method of the family."""
+
+    am: float
+    af: float
+    beta: float
+    gamma: float
+
+
+class Alpha:
+    """A method of the family; see `Scheme`."""
+
+    symmetric = True
+    tolerance = TOLERANCE
+
+    def __init__(self, bench: Bench, parameters: Parameters) -> None:
+        self.bench, self._p = bench, parameters
+
+    def begin(self, t: float) -> None:
+        """See `Scheme`."""
+        self.bench.begin(t)
+
+    def accept(self, h: float) -> None:
+        """See `Scheme`."""
+        self.bench.accept(h)
+
+    def weights(self, h: float) -> Weights:
+        """See `Scheme`; the mass carries what multiplies alpha M too."""
+        am, af, beta, gamma = self._p
+        rate = (1.0 - af) * gamma / (beta * h)
+        mass = (1.0 - am) / (beta * h * h) + rate * self.bench.packed.system.alpha
+        return Weights(1.0 - af, mass, rate)
+
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """See `Scheme`."""
+        b, packed = self.bench, self.bench.packed
+        return residual(
+            packed.model, packed.system, packed.mass, self._p, h, t, b.old, b.new, b.out, b.work,
+            b.scratch,
+        )  # fmt: skip
+
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """See `Scheme`."""
+        b = self.bench
+        model = b.packed.model
+        put_tangent(model, matrix.pattern, b.moved(), before, again, matrix.stiffness)
+
+    def works(self, h: float) -> tuple[float, float]:
+        """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
+        b, packed = self.bench, self.bench.packed
+        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.scratch)
+        if packed.system.turns:
+            angle = b.course.angle
+            done += _actuation(packed.model, packed.system, b.old, b.new, angle, b.work.angle)
+        return done, lost
+
+    def change(self, h: float) -> NDArray:
+        """See `Scheme`.
+
+        Since a stands for the acceleration at t + (am - af) h, the displacement's error is
+        (am/2 - af/2 + beta - 1/6) h^3 times its third derivative: 1/12 for the trapezoidal rule.
+        """
+        am, af, beta, _ = self._p
+        constant = 0.5 * (am - af) + beta - 1.0 / 6.0
+        return constant * h * h * (self.bench.new.a - self.bench.old.a)
+
+
+@kernel
+def residual(model, system, mass, p, h, t, old, new, out, work, s):
+    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
+    old, new, s = borrowed(old), borrowed(new), borrowed(s)
+    am, af, beta, gamma = p
+    q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
+    q1, w1, a1, b1 = flat(new.q), flat(new.w), flat(new.a), flat(new.force)
+    x, left = flat(s.moving), flat(out)
+    curvature = 1.0 / (beta * h * h)
+    for i in range(q0.size):
+        a1[i] = curvature * (q1[i] - q0[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
+        w1[i] = w0[i] + h * ((1.0 - gamma) * a0[i] + gamma * a1[i])
+    for node in range(mass.diagonal.size):
+        if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
+            for i in range(3 * node, 3 * node + 3):
+                a1[i], w1[i] = 0.0, (q1[i] - q0[i]) / h
+    acceleration(model, system, mass, new.q, new.w, t, out, work, s)
+    for i in range(q0.size):
+        b1[i] = flat(s.force)[i]
+        viscous = system.alpha * ((1.0 - af) * w1[i] + af * w0[i])
+        x[i] = (1.0 - am) * a1[i] + am * a0[i] + viscous
+    new.factor[:] = s.factor
+    times_mass(mass, s.moving, out)
+    inertia = 0.0
+    for i in range(q0.size):
+        inertia += left[i] * left[i]
+        left[i] += (1.0 - af) * b1[i] + af * b0[i]
+    reference = max(inertia, clear_supported(system, out), load_square(system, s.factor))
+    norm = 0.0
+    for i in range(q0.size):
+        norm += left[i] * left[i]
+    return np.sqrt(norm), np.sqrt(reference)
+
+
+@kernel
+def _works(system, mass, h, old, new, s):
+    """Work put in and energy dissipated in a step."""
+    q0, q1, du = flat(old.q), flat(new.q), flat(s.displacement)
+    v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
+    moved, loads = system.moved, system.loads
+    for i in range(q0.size):
+        du[i] = q1[i] - q0[i]
+        flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
+    done, lost = 0.0, 0.0
+    if system.alpha > 0.0:
+        lost += 2.0 * system.alpha * h * kinetic_energy(mass, s.velocity, s.product)
+        jolts = moving_energy(system.moved_mass, old.factor)
+        jolts += moving_energy(system.moved_mass, new.factor)
+        done += system.alpha * h * jolts
+        lost += system.alpha * h * jolts
+    for k in range(moved.dof.size):
+        dof, row = moved.dof[k], moved.row[k]
+        shift = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        du[dof] += shift
+        flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
+        done += 0.5 * (b0[dof] + b1[dof]) * shift
+    for k in range(loads.dof.size):
+        row = loads.row[k]
+        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
+        done += loads.value[k] * mean * du[loads.dof[k]]
+    speed = flat(s.velocity)
+    for i in range(system.stiff_indptr.size - 1):
+        viscous = 0.0
+        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
+            viscous += system.stiff_data[k] * speed[system.stiff_indices[k]]
+        lost += viscous * du[i]
+    return done, lost
+
+
+@kernel
+def _actuation(model, system, old, new, angle0, angle1):
+    """Work of the actuators in a step, from dihedrals angle0 to angle1 (nh,)."""
+    change = np.zeros_like(new.factor)
+    change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
+    turn(model, system.actuators, old.factor)
+    done = actuator_power(model, system.actuators, change, angle0)
+    turn(model, system.actuators, new.factor)
+    return done + actuator_power(model, system.actuators, change, angle1)

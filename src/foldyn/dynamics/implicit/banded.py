@@ -1,0 +1,63 @@
+"""Factorizations of banded matrices by LAPACK.
+
+With its nodes numbered along the sheet, a sheet's matrix is a band. Up to some ten thousand dofs
+the band is factorized faster than the sparse matrix, the more so the smaller it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from foldyn.statics.linear_solver import SingularTangentError
+
+
+class Cholesky:
+    """Factors of a symmetric positive definite band, which they replace in memory.
+
+    Parameters
+    ----------
+    band : ndarray, shape (width + 1, n)
+        Upper triangle in Fortran order: entry (i, j) at [width + i - j, j].
+
+    Raises
+    ------
+    SingularTangentError
+        The matrix is not positive definite.
+    """
+
+    def __init__(self, band: NDArray) -> None:
+        self._factors, failed = lapack.dpbtrf(band, lower=0, overwrite_ab=1)
+        if failed or not np.isfinite(self._factors[-1, -1]):
+            raise SingularTangentError("the matrix is not positive definite")
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        return lapack.dpbtrs(self._factors, b, lower=0)[0]
+
+
+class BandLU:
+    """Factors of a band with partial pivoting; they replace it in memory.
+
+    Parameters
+    ----------
+    band : ndarray, shape (3 width + 1, n)
+        In Fortran order: entry (i, j) at [2 width + i - j, j].
+
+    Raises
+    ------
+    SingularTangentError
+        The matrix is singular.
+    """
+
+    def __init__(self, band: NDArray) -> None:
+        self._width = (len(band) - 1) // 3
+        width = self._width
+        self._factors, self._pivots, failed = lapack.dgbtrf(band, width, width, overwrite_ab=1)
+        if failed or not np.isfinite(self._factors[2 * width, -1]):
+            raise SingularTangentError("the matrix is singular")
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        return lapack.dgbtrs(self._factors, self._width, self._width, b, self._pivots)[0]

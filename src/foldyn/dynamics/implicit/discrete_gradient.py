@@ -1,0 +1,275 @@
+"""Forces whose work from one state to another is the change of the strain energy, exactly.
+
+With the positions x0 and x1, their mean x and difference dx, a force f is sought for each bar and
+hinge with f . dx = W1 - W0, and without resultant and moment about x: then a body that flies freely
+keeps its energy and its momenta, whatever the step (Simo and Tarnow, Z. Angew. Math. Phys. 43,
+1992; Gonzalez, J. Nonlinear Sci. 6, 1996).
+
+Bars: E = (stretch^2 - 1)/2 is quadratic in the positions, so that f = (dW/dE) grad E(x) does it,
+dW/dE the quotient of the differences.
+
+Hinges: f = (dW/dtheta) g, g a gradient of the dihedral with g . dx = theta1 - theta0. Between two
+positions that differ by a rotation the mean is smaller than either, which would turn the dihedral.
+With w the Cayley vector of the rotation of the hinge's four points (least squares) and
+A = (1 - skew(w)^2/4)^(1/2), the positions A x are free of that, and A^-1 grad theta(A x) has no
+resultant and no moment about x; its work differs from the change of the angle only to third order
+in the deformation within the step. The rest of the difference is made up along the deformation,
+dx less its rigid part, which has no resultant and no moment either.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.materials.compiled import kernel, scalar
+from foldyn.materials.switch import (
+    bar_energy,
+    bar_slope,
+    bar_stress,
+    hinge_energy,
+    hinge_moment,
+    hinge_slope,
+)
+from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
+from foldyn.mechanics.energy import hinge_dihedral
+
+GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # the first of the two points of Gauss's rule
+NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
+ANGLE_NOISE = 4e-15  # the same of a dihedral, rad
+
+
+@scalar
+def _extension(x):
+    """Stretch less one where stretch^2 - 1 is x."""
+    return x / (1.0 + math.sqrt(1.0 + x))
+
+
+@kernel
+def mean_stress(code, address, x, change):
+    """Mean stress S / E_y of a bar whose stretch^2 - 1 goes from x to x + 2 change, and its slope.
+
+    The quotient of energy and strain: Gauss's rule with what it misses. The slope is that with
+    respect to the strain at the end.
+    """
+    stress, slope = 0.0, 0.0
+    for point in (GAUSS, 1.0 - GAUSS):
+        e = _extension(x + 2.0 * point * change)
+        stress += 0.5 * bar_stress(code, e, address[1])
+        slope += 0.5 * point * bar_slope(code, e, address[2])
+    before = bar_energy(code, _extension(x), address[0])
+    after = bar_energy(code, _extension(x + 2.0 * change), address[0])
+    missed = after - before - stress * change
+    if abs(missed) > NOISE * max(abs(before), abs(after)):
+        stress += missed / change
+    return stress, slope
+
+
+@kernel
+def mean_moment(code, address, p, rest, theta, change):
+    """Mean moment / k of a hinge that turns by `change` from theta, and its slope; see bars."""
+    moment, slope = 0.0, 0.0
+    for point in (GAUSS, 1.0 - GAUSS):
+        t = theta + point * change
+        moment += 0.5 * hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
+        slope += 0.5 * point * hinge_slope(code, t, rest, p[0], p[1], address[2])
+    before = hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
+    after = hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
+    missed = after - before - moment * change
+    if abs(missed) > NOISE * max(abs(before), abs(after)):
+        moment += missed / change
+    return moment, slope
+
+
+@kernel
+def add_bar_forces(model, u0, u1, force):
+    """Add the forces of the bars from u0 to u1, all (n, 3)."""
+    mean = np.empty(3)
+    for run in range(model.bar_runs.shape[0]):
+        code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
+        for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
+            a, b = model.bars[e, 0], model.bars[e, 1]
+            x, change = 0.0, 0.0
+            for c in range(3):
+                d0, d1 = u0[b, c] - u0[a, c], u1[b, c] - u1[a, c]
+                mean[c] = model.bar_vector[e, c] + 0.5 * (d0 + d1)
+                x += d0 * (2.0 * model.bar_vector[e, c] + d0)
+                change += mean[c] * (d1 - d0)
+            per = model.bar_per_length2[e]
+            stress = mean_stress(code, address, x * per, change * per)[0]
+            for c in range(3):
+                force[b, c] += model.bar_stiffness[e] * stress * mean[c]
+                force[a, c] -= model.bar_stiffness[e] * stress * mean[c]
+
+
+@kernel
+def discrete_gradient(x, dx, turn, points, plain, gradient):
+    """Gradient (4, 3) of a dihedral from the mean x of its points to the change dx, both (4, 3).
+
+    turn : change of the dihedral (rad).
+    points, plain : (4, 3), get the positions A x about their mean, and the gradient there.
+    """
+    deform = np.empty((4, 3))
+    for c in range(3):
+        middle, shift = 0.0, 0.0
+        for v in range(4):
+            middle += 0.25 * x[v, c]
+            shift += 0.25 * dx[v, c]
+        for v in range(4):
+            points[v, c], deform[v, c] = x[v, c] - middle, dx[v, c] - shift
+    w0, w1, w2 = _rotation(points, deform)
+    square = 0.25 * (w0 * w0 + w1 * w1 + w2 * w2)
+    stretch = math.sqrt(1.0 + square)
+    for v in range(4):
+        r0, r1, r2 = points[v, 0], points[v, 1], points[v, 2]
+        deform[v, 0] -= w1 * r2 - w2 * r1
+        deform[v, 1] -= w2 * r0 - w0 * r2
+        deform[v, 2] -= w0 * r1 - w1 * r0
+        along = 0.25 * (w0 * r0 + w1 * r1 + w2 * r2) / (1.0 + stretch)
+        points[v, 0] = stretch * r0 - along * w0
+        points[v, 1] = stretch * r1 - along * w1
+        points[v, 2] = stretch * r2 - along * w2
+    p, flat = points, plain.reshape(12)
+    found = dihedral_gradient(
+        p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
+        p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
+    )  # fmt: skip
+    for c in range(12):
+        flat[c] = found[1 + c]
+    missed, size = turn, 0.0
+    for v in range(4):
+        along = w0 * plain[v, 0] + w1 * plain[v, 1] + w2 * plain[v, 2]
+        along *= 0.25 / (stretch * (1.0 + stretch))
+        gradient[v, 0] = plain[v, 0] / stretch + along * w0
+        gradient[v, 1] = plain[v, 1] / stretch + along * w1
+        gradient[v, 2] = plain[v, 2] / stretch + along * w2
+        for c in range(3):
+            missed -= gradient[v, c] * deform[v, c]
+            size += deform[v, c] * deform[v, c]
+    if abs(missed) > ANGLE_NOISE:
+        for v in range(4):
+            for c in range(3):
+                gradient[v, c] += missed / size * deform[v, c]
+
+
+@scalar
+def _rotation(r, d):
+    """Vector w of the rotation w x r that is nearest to d, both (4, 3) about their means."""
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for v in range(4):
+        a, b, c = r[v, 0], r[v, 1], r[v, 2]
+        xx += b * b + c * c
+        yy += a * a + c * c
+        zz += a * a + b * b
+        xy -= a * b
+        xz -= a * c
+        yz -= b * c
+        t0 += b * d[v, 2] - c * d[v, 1]
+        t1 += c * d[v, 0] - a * d[v, 2]
+        t2 += a * d[v, 1] - b * d[v, 0]
+    axx, ayy, azz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    axy, axz, ayz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+    once = 1.0 / (xx * axx + xy * axy + xz * axz)
+    return (
+        once * (axx * t0 + axy * t1 + axz * t2),
+        once * (axy * t0 + ayy * t1 + ayz * t2),
+        once * (axz * t0 + ayz * t1 + azz * t2),
+    )
+
+
+@scalar
+def _gather(model, e, u0, u1, x, dx):
+    """Mean and difference (4, 3) of the positions of a hinge's points."""
+    for v in range(4):
+        node = model.hinges[e, v]
+        for c in range(3):
+            x[v, c] = model.rest[node, c] + 0.5 * (u0[node, c] + u1[node, c])
+            dx[v, c] = u1[node, c] - u0[node, c]
+
+
+@kernel
+def add_hinge_forces(model, u0, u1, angle0, angle1, force):
+    """Add the forces of the hinges; angle1 (nh,) gets the dihedrals at u1, angle0 those at u0."""
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for run in range(model.hinge_runs.shape[0]):
+        code, address = model.hinge_runs[run, 2], model.addresses[model.hinge_runs[run, 3]]
+        for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
+            angle1[e] = hinge_dihedral(model, u1, e)[0]
+            turn = angle1[e] - angle0[e]
+            _gather(model, e, u0, u1, x, dx)
+            discrete_gradient(x, dx, turn, points, plain, gradient)
+            parameters = model.hinge_parameters[e]
+            moment = mean_moment(code, address, parameters, model.hinge_rest[e], angle0[e], turn)[0]
+            moment *= model.hinge_stiffness[e]
+            for v in range(4):
+                for c in range(3):
+                    force[model.hinges[e, v], c] += moment * gradient[v, c]
+
+
+@kernel
+def add_bar_tangent(model, u0, u1, stress, slots, data):
+    """Add the derivative of the bars' forces with respect to u1 to blocks (nnz, 3, 3).
+
+    stress : (nb,) of the bars, for the part in which they stand by themselves.
+    """
+    mean, end = np.empty(3), np.empty(3)
+    for run in range(model.bar_runs.shape[0]):
+        code, address = model.bar_runs[run, 2], model.addresses[model.bar_runs[run, 3]]
+        for e in range(model.bar_runs[run, 0], model.bar_runs[run, 1]):
+            a, b = model.bars[e, 0], model.bars[e, 1]
+            x, change, per = 0.0, 0.0, model.bar_per_length2[e]
+            for c in range(3):
+                d0, d1 = u0[b, c] - u0[a, c], u1[b, c] - u1[a, c]
+                mean[c] = model.bar_vector[e, c] + 0.5 * (d0 + d1)
+                end[c] = model.bar_vector[e, c] + d1
+                x += d0 * (2.0 * model.bar_vector[e, c] + d0)
+                change += mean[c] * (d1 - d0)
+            slope = mean_stress(code, address, x * per, change * per)[1] * per
+            for p in range(3):
+                for q in range(3):
+                    value = slope * mean[p] * end[q]
+                    if p == q:
+                        value += 0.5 * stress[e]
+                    value *= model.bar_stiffness[e]
+                    data[slots[e, 0, 0], p, q] += value
+                    data[slots[e, 1, 1], p, q] += value
+                    data[slots[e, 0, 1], p, q] -= value
+                    data[slots[e, 1, 0], p, q] -= value
+
+
+@kernel
+def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
+    """Add the derivative of the hinges' forces, their gradients' to first order in the step.
+
+    floor : least slope of built-in laws per unit stiffness.
+    """
+    x, dx, points = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    plain, gradient, end = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    block = np.empty((4, 3, 4, 3))
+    for run in range(model.hinge_runs.shape[0]):
+        code, address = model.hinge_runs[run, 2], model.addresses[model.hinge_runs[run, 3]]
+        for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
+            found, k = hinge_dihedral(model, u1, e), model.hinge_stiffness[e]
+            flat = end.reshape(12)
+            for c in range(12):
+                flat[c] = found[1 + c]
+            turn = found[0] - angle0[e]
+            _gather(model, e, u0, u1, x, dx)
+            discrete_gradient(x, dx, turn, points, plain, gradient)
+            parameters, rest = model.hinge_parameters[e], model.hinge_rest[e]
+            moment, slope = mean_moment(code, address, parameters, rest, angle0[e], turn)
+            if code >= 0:
+                slope = max(slope, 0.5 * floor)
+            block[:] = 0.0
+            add_hessian(points, plain, 0.5 * k * moment, block)
+            for v in range(4):
+                for w in range(4):
+                    slot = slots[e, v, w]
+                    for a in range(3):
+                        for b in range(3):
+                            data[slot, a, b] += (
+                                block[v, a, w, b] + k * slope * gradient[v, a] * end[w, b]
+                            )

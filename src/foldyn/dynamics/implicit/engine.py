@@ -1,0 +1,242 @@
+"""An implicit method at work: steps solved one after the other, samples, error control.
+
+The loop over the steps is Python. A step's tangent and its factorization cost far more than the
+interpreter; the force, the residual and the tangent are compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from foldyn.dynamics import outcome
+from foldyn.dynamics.course import Course, Plan, Samples, sample
+from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
+from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.newton import Found, Newton
+from foldyn.dynamics.implicit.scheme import Bench, Scheme
+from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.system import Packed, acceleration
+from foldyn.materials.compiled import kernel
+
+TIME, NEXT, ERROR, SCALE, LAST, SMALLEST, LARGEST = range(7)  # places in `Course.clock`
+STEPS, SAMPLED, REFUSED, EVALUATIONS = range(4)  # places in `Course.count`
+SAME_TIME = 1e-9  # of a step: times as near as that are one
+LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
+LEAST_TIME = 1e-13  # step relative to the end of the motion
+FLOOR = 1e-6  # of the longest bar: the least displacement that errors are measured by
+TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
+
+
+class Implicit:
+    """An implicit scheme that advances a motion; see `foldyn.dynamics.engine.Engine`.
+
+    Parameters
+    ----------
+    make : callable
+        The scheme from a bench.
+    packed : Packed
+    jumps : sequence of float
+        Times (s) at which loads jump: steps end there, so that no step sees a jump.
+    """
+
+    threads = 1
+
+    def __init__(
+        self, make: Callable[[Bench], Scheme], packed: Packed, jumps: tuple[float, ...]
+    ) -> None:
+        self._make, self._packed, self._jumps = make, packed, sorted(set(jumps))
+        self._newton: Newton | None = None
+        self._halved = 0
+        self._size = FLOOR / math.sqrt(float(packed.model.bar_per_length2.min(initial=1.0)))
+
+    def facts(self) -> dict[str, object]:
+        """Statistics of the run."""
+        newton = self._newton
+        if newton is None:
+            return {}
+        return {
+            "iterations": newton.iterations,
+            "factorizations": newton.matrix.factorizations,
+            "linear_solver": newton.matrix.solver,
+            "halved_steps": self._halved,
+        }
+
+    def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
+        """See `Engine`."""
+        if self._newton is None:
+            found = self._begin(course, plan, out)
+            if found != outcome.DONE:
+                return found, -1
+        newton = self._newton
+        assert newton is not None
+        last = course.count[STEPS] + stretch
+        advance = self._fixed if plan.steps else self._adaptive
+        end = min(last, plan.steps) if plan.steps else last
+        while course.count[STEPS] < end and (plan.steps or course.clock[TIME] < plan.end):
+            if plan.every and not plan.steps and course.count[SAMPLED] == len(out.time):
+                return outcome.FULL, -1
+            found, hinge = advance(newton, course, plan, out)
+            course.count[EVALUATIONS] = newton.evaluations
+            if found != outcome.DONE:
+                return found, hinge
+        return outcome.DONE, -1
+
+    def _begin(self, course: Course, plan: Plan, out: Samples) -> int:
+        bench = Bench(self._packed, course)
+        scheme = self._make(bench)
+        newton = Newton(scheme, StepMatrix(self._packed, scheme.symmetric))
+        scheme.begin(plan.start)
+        course.clock[SCALE] = np.abs(bench.displacement()).max(initial=0.0)
+        newton.prepare(plan.dt, plan.start)
+        self._newton = newton
+        return self._note(newton, course, plan.start, out)
+
+    def _note(self, newton: Newton, course: Course, t: float, out: Samples) -> int:
+        """Write a sample."""
+        packed, bench = self._packed, newton.scheme.bench
+        return _write(
+            packed.model, packed.system, packed.mass, course, t, out, bench.work, bench.scratch,
+            bench.out,
+        )  # fmt: skip
+
+    def _fixed(self, newton: Newton, course: Course, plan: Plan, out: Samples) -> tuple[int, int]:
+        """One step of dt, in parts where a load jumps or Newton's method fails."""
+        step = int(course.count[STEPS]) + 1
+        t, end, h = float(course.clock[TIME]), plan.start + step * plan.dt, plan.dt
+        whole = True
+        while t < end - SAME_TIME * plan.dt:
+            goal, jump = self._next_stop(t, end, SAME_TIME * plan.dt)
+            parts = max(1, math.ceil((goal - t) / h * (1.0 - SAME_TIME)))
+            part = (goal - t) / parts
+            found, hinge = self._attempt(newton, part, t, goal if parts == 1 else t + part, jump)
+            if found == outcome.DONE:
+                t = goal if parts == 1 else t + part
+                self._accept(newton, course, part, t, jump and parts == 1)
+                continue
+            if self._hopeless(part, plan.dt):
+                course.clock[TIME] = t
+                return found, hinge
+            h, whole = 0.5 * part, False
+        self._halved += not whole
+        course.count[STEPS], course.clock[TIME] = step, end
+        if step % plan.every == 0:
+            return self._note(newton, course, end, out), -1
+        return outcome.DONE, -1
+
+    def _adaptive(
+        self, newton: Newton, course: Course, plan: Plan, out: Samples
+    ) -> tuple[int, int]:
+        """One step whose error is within the tolerance."""
+        clock, count = course.clock, course.count
+        t = float(clock[TIME])
+        due, waits = self._due(plan, course, out)
+        while True:
+            wanted = min(float(clock[NEXT]), plan.dt)
+            if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
+                return outcome.STUCK, -1
+            goal, jump = self._next_stop(t, due, SAME_TIME * wanted)
+            parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
+            h = (goal - t) / parts
+            end = goal if parts == 1 else t + h
+            found, hinge = self._attempt(newton, h, t, end, jump)
+            if found != outcome.DONE:
+                if self._hopeless(h, plan.dt):
+                    return found, hinge
+                clock[NEXT] = 0.5 * h
+                count[REFUSED] += 1
+                continue
+            error, scale = self._error(newton, h, float(clock[SCALE]))
+            error /= plan.tolerance
+            if error <= 1.0:
+                break
+            clock[NEXT] = smaller_step(h, error)
+            count[REFUSED] += 1
+        self._accept(newton, course, h, end, jump and parts == 1)
+        count[STEPS] += 1
+        clock[TIME], clock[SCALE] = end, scale
+        error = remembered(error, clock[ERROR], h, clock[LAST] or h)
+        clock[ERROR], clock[LAST] = error, h
+        clock[NEXT] = max(wanted if parts == 1 and error <= 1.0 else 0.0, next_step(h, error))
+        clock[SMALLEST], clock[LARGEST] = min(clock[SMALLEST], h), max(clock[LARGEST], h)
+        if count[STEPS] % plan.every == 0 if plan.every else waits and end == due:
+            return self._note(newton, course, end, out), -1
+        return outcome.DONE, -1
+
+    def _due(self, plan: Plan, course: Course, out: Samples) -> tuple[float, bool]:
+        """Time (s) by which the next steps end, and whether a sample waits there."""
+        number = int(course.count[SAMPLED])
+        if plan.every or number == len(out.time):
+            return plan.end, False
+        time = plan.start + number * plan.interval
+        if time < plan.end - SAME_TIME * plan.interval:
+            return time, True
+        return plan.end, time < plan.end + SAME_TIME * plan.interval
+
+    def _next_stop(self, t: float, end: float, near: float) -> tuple[float, bool]:
+        """Where a step from t has to end at the latest, and whether a load jumps there."""
+        for jump in self._jumps:
+            if jump > end + near:
+                break
+            if jump > t + near:
+                return (end, True) if abs(jump - end) <= near else (jump, True)
+        return end, False
+
+    def _attempt(
+        self, newton: Newton, h: float, t: float, end: float, jump: bool
+    ) -> tuple[int, int]:
+        """Solve a step; returns (outcome, hinge)."""
+        bench = newton.scheme.bench
+        bench.predict(h)
+        seen = end
+        if jump:
+            after = min(self._jumps, key=lambda time: abs(time - end))
+            seen = math.nextafter(min(end, after), -math.inf)
+        found = newton.solve(h, seen)
+        if self._packed.callbacks.error is not None:
+            return outcome.NOT_FINITE, -1
+        if found is Found.YES:
+            turned = np.abs(bench.work.angle - bench.course.angle)
+            if len(turned) and not turned.max() < TURN:
+                return outcome.PENETRATION, int(turned.argmax())
+            return outcome.DONE, -1
+        code = outcome.NOT_FINITE if found is Found.NOT_FINITE else outcome.NOT_CONVERGED
+        return code, -1
+
+    def _hopeless(self, h: float, wanted: float) -> bool:
+        """Whether a smaller step would not help either."""
+        return h < LEAST_STEP * wanted or self._packed.callbacks.error is not None
+
+    def _accept(self, newton: Newton, course: Course, h: float, t: float, jump: bool) -> None:
+        scheme = newton.scheme
+        bench = scheme.bench
+        done, lost = scheme.works(h)
+        course.tally[0] += done
+        course.tally[1] += lost
+        course.angle[:] = bench.work.angle
+        scheme.accept(h)
+        if jump:
+            after = min(self._jumps, key=lambda time: abs(time - t))
+            scheme.begin(max(t, after))
+
+    def _error(self, newton: Newton, h: float, scale: float) -> tuple[float, float]:
+        """Error of the worst node relative to the largest displacement so far, and the latter.
+
+        The change of the acceleration goes through the matrix of the step, which takes away what
+        stiff bars add to it and displacements do not feel.
+        """
+        scheme, bench = newton.scheme, newton.scheme.bench
+        scale = max(scale, float(np.abs(bench.moved()).max(initial=0.0)))
+        change = scheme.change(h)
+        times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
+        error = newton.matrix.solve(bench.out, bench.step)
+        return float(np.abs(error).max(initial=0.0)) / max(scale, self._size), scale
+
+
+@kernel
+def _write(model, system, mass, course, t, out, work, s, a):
+    """Write the next sample at time t."""
+    acceleration(model, system, mass, course.u, course.v, t, a, work, s)
+    return sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)

@@ -1,0 +1,215 @@
+"""The matrix of one iteration: stiffness, mass and damping with the weights of a step.
+
+All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
+puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
+along the sheet or, where that would be too wide, a sparse matrix for the backends of statics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.dynamics.implicit.banded import BandLU, Cholesky
+from foldyn.dynamics.system import Packed
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics import Sparsity, node_order, sparsity
+from foldyn.mechanics.flat import flat
+from foldyn.statics.backends import factorizer
+from foldyn.statics.linear_solver import SingularTangentError, SuperLU
+
+# products of a band's factorization (rows times width squared) above which a sparse one is quicker
+MOST_SYMMETRIC, MOST_UNSYMMETRIC = 2e9, 1e8
+
+
+class Weights(NamedTuple):
+    """Factors of the matrices in that of an iteration."""
+
+    stiffness: float
+    mass: float  # 1/s2
+    damping: float  # 1/s, of beta K0
+
+
+class Blocks(NamedTuple):
+    """The matrices, (nnz, 3, 3) each."""
+
+    stiffness: NDArray
+    mass: NDArray
+    damping: NDArray  # beta K0
+
+
+class StepMatrix:
+    """Matrix of the free dofs, made from blocks and factorized; alpha M is part of the mass.
+
+    Parameters
+    ----------
+    packed : Packed
+    symmetric : bool
+        Whether the blocks of the stiffness will be.
+
+    Attributes
+    ----------
+    pattern : Sparsity
+        Of the blocks.
+    stiffness : ndarray, shape (nnz, 3, 3)
+        Blocks that the caller fills.
+    free : ndarray of int
+        Free dofs, 3 place + axis, in the order in which they are solved for.
+    solver : str
+        What factorizes.
+    """
+
+    def __init__(self, packed: Packed, symmetric: bool) -> None:
+        model, mass, system = packed.model, packed.mass, packed.system
+        nodes = len(model.rest)
+        nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
+        self.pattern, where = _with_mass(sparsity(model), nodal)
+        shape = (len(self.pattern.indices), 3, 3)
+        self.stiffness = np.zeros(shape)
+        self._blocks = Blocks(self.stiffness, np.zeros(shape), np.zeros(shape))
+        self._blocks.mass[where] = nodal.data[:, None, None] * np.eye(3)
+        if system.stiff_data.size:
+            k0 = (system.stiff_data, system.stiff_indices, system.stiff_indptr)
+            blocks = sparse.csr_array(k0, (3 * nodes, 3 * nodes)).tobsr((3, 3))
+            blocks.sort_indices()
+            where = _slots(self.pattern, blocks.indptr, blocks.indices)
+            self._blocks.damping[where] = blocks.data
+        held = np.zeros(3 * nodes, bool)
+        held[system.supported] = True
+        along = (3 * node_order(model)[:, None] + np.arange(3)).ravel()
+        self.free = along[~held[along]]
+        self._symmetric = symmetric
+        self._prepare(_entries(self.pattern, self.free, 3 * nodes))
+        self._factors: Any = None
+        self.factorizations = 0
+
+    def _prepare(self, entries: tuple[NDArray, NDArray, NDArray]) -> None:
+        row, column, take = entries
+        size, width = len(self.free), int(np.abs(row - column).max(initial=0))
+        most = MOST_SYMMETRIC if self._symmetric else MOST_UNSYMMETRIC
+        self._sparse = _Sparse(row, column, take, size, self._symmetric)
+        self._band = None
+        if float(size) * (width + 1) ** 2 <= most:
+            self._band = _Band(row, column, take, size, width, self._symmetric)
+        self.solver = "banded" if self._band else self._sparse.solver
+
+    def factorize(self, weights: Weights) -> None:
+        """Make the matrix from the stiffness as it stands, and factorize it.
+
+        Raises
+        ------
+        SingularTangentError
+            It is singular or not finite.
+        """
+        self._factors = None
+        self.factorizations += 1
+        if self._band is not None:
+            try:
+                self._factors = self._band(weights, self._blocks)
+                return
+            except SingularTangentError:  # not definite: the motion leaves an unstable state
+                if not np.isfinite(self.stiffness).all():
+                    raise
+        self._factors = self._sparse(weights, self._blocks)
+
+    @property
+    def factorized(self) -> bool:
+        """Whether there is something to solve with."""
+        return self._factors is not None
+
+    def solve(self, residual: NDArray, out: NDArray) -> NDArray:
+        """Solution of A x = residual at the free dofs of `out`; the others stay; all (n, 3)."""
+        out.ravel()[self.free] = self._factors.solve(residual.ravel()[self.free])
+        return out
+
+
+class _Band:
+    """Puts entries into a band."""
+
+    def __init__(
+        self, row: NDArray, column: NDArray, take: NDArray, size: int, width: int, symmetric: bool
+    ) -> None:
+        self._make: Callable[[NDArray], Any] = Cholesky if symmetric else BandLU
+        kept = row <= column if symmetric else slice(None)
+        row, column, self._take = row[kept], column[kept], take[kept]
+        rows, diagonal = (width + 1, width) if symmetric else (3 * width + 1, 2 * width)
+        self._put = (diagonal + row - column) + rows * column
+        self._memory = np.zeros((size, rows)).T
+
+    def __call__(self, weights: Weights, blocks: Blocks) -> Any:
+        flat = self._memory.T.reshape(-1)
+        flat[:] = 0.0
+        _gather(weights, blocks, self._take, self._put, flat)
+        return self._make(self._memory)
+
+
+class _Sparse:
+    """Puts entries into a sparse matrix by columns."""
+
+    def __init__(
+        self, row: NDArray, column: NDArray, take: NDArray, size: int, symmetric: bool
+    ) -> None:
+        numbered = sparse.csc_array((np.arange(1, len(row) + 1), (row, column)), (size, size))
+        numbered.sort_indices()
+        self._take = take[numbered.data - 1]
+        self._indices, self._indptr, self._size = numbered.indices, numbered.indptr, size
+        self.solver, self._make = "superlu", SuperLU
+        if symmetric:
+            self.solver, self._make = factorizer("auto", size)
+
+    def __call__(self, weights: Weights, blocks: Blocks) -> Any:
+        data, put = np.empty(len(self._take)), np.arange(len(self._take))
+        _gather(weights, blocks, self._take, put, data)
+        shape = (self._size, self._size)
+        return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
+
+
+def _with_mass(pattern: Sparsity, nodal: sparse.csr_array) -> tuple[Sparsity, NDArray]:
+    """Pattern with the entries of a nodal matrix too, and where these stand."""
+    nodes = nodal.shape[0]
+    row = np.repeat(np.arange(nodes), np.diff(pattern.indptr))
+    own = row * nodes + pattern.indices.astype(np.int64)
+    other = np.repeat(np.arange(nodes), np.diff(nodal.indptr)) * nodes + nodal.indices
+    both = np.union1d(own, other)
+    moved = np.searchsorted(both, own)
+    return Sparsity(
+        np.searchsorted(both // nodes, np.arange(nodes + 1)).astype(np.int32),
+        (both % nodes).astype(np.int32),
+        moved[pattern.bar_slots],
+        moved[pattern.hinge_slots],
+    ), np.searchsorted(both, other)
+
+
+def _slots(pattern: Sparsity, indptr: NDArray, indices: NDArray) -> NDArray:
+    """Where the blocks of another matrix stand in a pattern that contains them."""
+    nodes = len(indptr) - 1
+    own = np.repeat(np.arange(nodes), np.diff(pattern.indptr)) * nodes + pattern.indices
+    other = np.repeat(np.arange(nodes), np.diff(indptr)) * nodes + indices
+    return np.searchsorted(own, other)
+
+
+def _entries(pattern: Sparsity, free: NDArray, dofs: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Row, column and place in the blocks of the entries between free dofs."""
+    number = np.full(dofs, -1)
+    number[free] = np.arange(len(free))
+    node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr)).astype(np.int64)
+    axis = np.arange(3)
+    row = 3 * node[:, None, None] + axis[:, None] + 0 * axis
+    column = 3 * pattern.indices.astype(np.int64)[:, None, None] + axis[:, None] * 0 + axis
+    row, column = number[row.ravel()], number[column.ravel()]
+    kept = np.flatnonzero((row >= 0) & (column >= 0))
+    return row[kept], column[kept], kept
+
+
+@kernel
+def _gather(weights, blocks, take, put, out):
+    """out[put] = the weighted sum of the matrices at `take`, all flat."""
+    stiffness, mass, damping = flat(blocks.stiffness), flat(blocks.mass), flat(blocks.damping)
+    for k in range(take.size):
+        e = take[k]
+        value = weights.stiffness * stiffness[e] + weights.mass * mass[e]
+        out[put[k]] = value + weights.damping * damping[e]

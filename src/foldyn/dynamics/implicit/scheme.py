@@ -1,0 +1,173 @@
+"""What an implicit scheme provides, and what its steps share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.dynamics.course import Course
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
+from foldyn.materials.compiled import kernel
+from foldyn.mechanics import BarsHinges, Workspace, internal_force, workspace
+from foldyn.mechanics.flat import flat
+
+EPS = float(np.finfo(float).eps)
+
+
+class Phase(NamedTuple):
+    """State at one time: arrays (n, 3), those of q and w without the motion of the supports."""
+
+    q: NDArray  # m
+    w: NDArray  # m/s
+    a: NDArray  # m/s2
+    force: NDArray  # F_int + beta K0 v - p, N
+    factor: NDArray  # (h, 3) of the histories
+
+
+class Scheme(Protocol):
+    """A step from `old` to `new`, whose unknown is new.q.
+
+    Attributes
+    ----------
+    symmetric : bool
+        Whether its tangent is.
+    tolerance : float
+        Residual, relative to the forces at play, with which a step is accepted.
+    bench : Bench
+    """
+
+    symmetric: bool
+    tolerance: float
+    bench: Bench
+
+    def begin(self, t: float) -> None:
+        """Make bench.old the beginning of a motion, or of its part after a jump, at t (s)."""
+        ...
+
+    def weights(self, h: float) -> Weights:
+        """Factors of the matrices for a step h (s)."""
+        ...
+
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """Out-of-balance force of the step to the time t (s), into bench.out.
+
+        Returns its norm on the free dofs and that of the forces at play, N.
+        """
+        ...
+
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """Fill the stiffness blocks at new.q; see `put_tangent` for `before` and `again`."""
+        ...
+
+    def works(self, h: float) -> tuple[float, float]:
+        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
+        ...
+
+    def change(self, h: float) -> NDArray:
+        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
+        ...
+
+    def accept(self, h: float) -> None:
+        """Make the end of the step the beginning of the next one."""
+        ...
+
+
+class Bench:
+    """Arrays and compiled parts that the steps of a motion work with.
+
+    Parameters
+    ----------
+    packed : Packed
+        The case.
+    course : Course
+        Where the motion stands: q, w and a of `old` are its arrays.
+    """
+
+    def __init__(self, packed: Packed, course: Course) -> None:
+        self.packed, self.course = packed, course
+        self.work: Workspace = workspace(packed.model)
+        self.scratch: Scratch = scratch(packed.system)
+        shape, histories = course.u.shape, self.scratch.factor.shape
+        self.out, self.step = np.zeros(shape), np.zeros(shape)
+        self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
+        q, w, a, force = (np.zeros(shape) for _ in range(4))
+        self.new = Phase(q, w, a, force, np.zeros(histories))
+        self.speed = course.v.copy()  # mean velocity of the last step
+        self.massless = packed.mass.diagonal <= 0.0
+        model = packed.model
+        self._hinges: BarsHinges = model._replace(bar_runs=model.bar_runs[:0])
+        self.rounding = EPS * _stiffness_of_bars(model)
+
+    def begin(self, t: float) -> None:
+        """Make forces and accelerations of `old` those at the time t (s)."""
+        old, s = self.old, self.scratch
+        packed = self.packed
+        acceleration(packed.model, packed.system, packed.mass, old.q, old.w, t, old.a, self.work, s)
+        old.a[self.massless] = 0.0
+        self.speed[:] = old.w
+        old.force[:], old.factor[:] = s.force, s.factor
+
+    def hinge_forces(self) -> float:
+        """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
+        internal_force(self._hinges, self.displacement(), self.out, self.work, False)
+        return float(np.linalg.norm(self.out))
+
+    def displacement(self) -> NDArray:
+        """Displacement (n, 3) of old.q with that of the supports."""
+        return self._carried(self.old)
+
+    def moved(self) -> NDArray:
+        """Displacement (n, 3) of new.q with that of the supports."""
+        return self._carried(self.new)
+
+    def _carried(self, phase: Phase) -> NDArray:
+        moved = self.packed.system.moved
+        if not len(moved.dof):
+            return phase.q
+        out = phase.q.copy()
+        np.add.at(out.reshape(-1), moved.dof, moved.value * phase.factor[moved.row, 0])
+        return out
+
+    def predict(self, h: float) -> None:
+        """Move new.q on with the mean velocity of the last step.
+
+        Velocities at the ends of steps that do not resolve a vibration ring; their means do not.
+        """
+        self.new.q[:] = self.old.q + h * self.speed
+
+    def accept(self, h: float) -> None:
+        """Make `new` the `old` one."""
+        self.speed[:] = (self.new.q - self.old.q) / h
+        for old, new in zip(self.old, self.new, strict=True):
+            old[:] = new
+
+
+def _stiffness_of_bars(model: BarsHinges) -> float:
+    """Norm of the nodes' sums of E A, N: rounding of the residual is a fraction EPS of it."""
+    nodal = np.zeros(len(model.rest))
+    np.add.at(nodal, model.bars, (model.bar_stiffness / np.sqrt(model.bar_per_length2))[:, None])
+    return float(np.sqrt(3.0) * np.linalg.norm(nodal))
+
+
+@kernel
+def clear_supported(system, force):
+    """Sum of squares of a force (n, 3) at the supports, N2, where it becomes zero."""
+    values, total = flat(force), 0.0
+    for k in range(system.supported.size):
+        dof = system.supported[k]
+        total += values[dof] * values[dof]
+        values[dof] = 0.0
+    return total
+
+
+@kernel
+def load_square(system, factor):
+    """Sum of squares of the loads for factors (h, 3), N2."""
+    loads, total = system.loads, 0.0
+    for k in range(loads.dof.size):
+        load = loads.value[k] * factor[loads.row[k], 0]
+        total += load * load
+    return total

@@ -1,0 +1,109 @@
+"""The kernels of a model, whatever its kind: force, energies and dihedrals in compiled loops.
+
+Arrays have a row of three numbers per node. A shell has rotations beside its displacements: they
+follow as further rows, three to each, the last one filled up with what is held.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from foldyn import mechanics
+from foldyn.mechanics import BarsHinges, internal_force, strain_energies
+from foldyn.mechanics.flat import flat
+from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
+
+
+def rows_of(model: BarsHinges | ShellModel) -> int:
+    """Rows of the arrays of a model."""
+    if isinstance(model, ShellModel):
+        return model.nodes + -(-model.rotations // 3)
+    return len(model.rest)
+
+
+def workspace_of(model: BarsHinges | ShellModel) -> Any:
+    """Memory for the kernels of a model."""
+    return shell_work(model) if isinstance(model, ShellModel) else mechanics.workspace(model)
+
+
+def angles_of(model: BarsHinges | ShellModel, u: NDArray) -> NDArray:
+    """Dihedrals (nh,), rad, at displacements u (rows, 3)."""
+    if isinstance(model, ShellModel):
+        x = model.rest.copy()
+        x[: model.nodes] += u[: model.nodes]
+        return mechanics.angles(x, model.hinges.astype(np.uint32))
+    return mechanics.angles(model.rest + u, model.hinges)
+
+
+def force_of(model: Any, u: Any, force: Any, work: Any) -> Any:
+    """Internal force (rows, 3) at u (rows, 3): `mechanics.internal_force` or its like."""
+    raise NotImplementedError  # compiled code has one of those below
+
+
+def folds_of(model: Any) -> Any:
+    """Rest angles, parameters and stiffness of what an actuator turns, arrays of the model."""
+    raise NotImplementedError
+
+
+def fold_angles(work: Any) -> Any:
+    """Angles (rad) of the same, after `force_of`."""
+    raise NotImplementedError
+
+
+def energies_of(model: Any, u: Any, work: Any, out: Any) -> Any:
+    """Strain energies (J) by group, to out (3,)."""
+    raise NotImplementedError
+
+
+@overload(force_of, inline="always")
+def _force(model, u, force, work):
+    if model.instance_class is ShellModel:
+
+        def shell(model, u, force, work):
+            n, r = model.nodes, model.rotations
+            moved, out = flat(u), flat(force)
+            out[3 * n + r :] = 0.0
+            shell_force(
+                model, u[:n], moved[3 * n : 3 * n + r], force[:n], out[3 * n : 3 * n + r], work
+            )
+
+        return shell
+
+    def bars_hinges(model, u, force, work):
+        internal_force(model, u, force, work)
+
+    return bars_hinges
+
+
+@overload(energies_of, inline="always")
+def _energies(model, u, work, out):
+    if model.instance_class is ShellModel:
+
+        def shell(model, u, work, out):
+            n, r = model.nodes, model.rotations
+            shell_energy(model, u[:n], flat(u)[3 * n : 3 * n + r], work, out)
+
+        return shell
+
+    def bars_hinges(model, u, work, out):
+        strain_energies(model, u, out)
+
+    return bars_hinges
+
+
+@overload(folds_of, inline="always")
+def _folds(model):
+    if model.instance_class is ShellModel:
+        return lambda model: (model.piece_rest, model.piece_parameters, model.piece_stiffness)
+    return lambda model: (model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
+
+
+@overload(fold_angles, inline="always")
+def _fold_angles(work):
+    if work.instance_class is ShellWork:
+        return lambda work: work.piece_turn
+    return lambda work: work.angle

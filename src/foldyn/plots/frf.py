@@ -1,0 +1,188 @@
+"""Frequency responses: magnitude with its peaks, phase, and coherence where there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.plots import style
+from foldyn.plots.modes import hertz
+from foldyn.plots.responses import Curve, curves_of, unit_of
+from foldyn.signals import find_peaks
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PROMINENCE = 0.05
+"""Least prominence of a peak that is marked, as a part of the curve's maximum."""
+_APART = 0.07  # of the frequency axis: peaks nearer than that share one label
+_FEW = 60  # frequencies that are drawn as dots, too
+_DECADES = 5.0  # below the highest value that the magnitude shows at least
+
+
+def plot_frf(
+    responses: Mapping[str, xr.Dataset],
+    nodes: Sequence[int],
+    axes: str | Sequence[str] | None = None,
+    quantity: str | None = None,
+    prominence: float = PROMINENCE,
+    title: str = "",
+) -> Figure:
+    """Draw frequency responses of chosen nodes: magnitude, phase, and coherence if there is one.
+
+    Parameters
+    ----------
+    responses : mapping of str to xarray.Dataset
+        Label and response of `foldyn.frf`, for example one per mass rule or amplitude.
+    nodes : sequence of int
+        Nodes to show, a curve each.
+    axes : str, sequence of str, or None
+        Direction shown: one of "x", "y", "z" for all nodes, or one for each node. None: the
+        direction in which each node responds most.
+    quantity : {"receptance", "mobility", "accelerance"}, optional
+        What is drawn of a response to forces; by default the receptance. A response to a moving
+        base is drawn as transmissibility.
+    prominence : float
+        Least prominence of the peaks that are marked, as a part of the curve's maximum.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The magnitude on a logarithmic axis, its peaks marked and the higher of neighbors labelled
+        with their frequency; below it the phase in degrees, from -180 to 180, and the coherence.
+
+    Raises
+    ------
+    InputError
+        No response or node, a node, direction or quantity that a response does not have.
+    """
+    curves, shown = curves_of(responses, nodes, axes, quantity)
+    if not 0.0 <= prominence < 1.0:
+        raise InputError(f"prominence: {prominence!r}; give a part of the maximum, 0 to below 1")
+    coherent = any(curve.coherence is not None for curve in curves)
+    heights = [2.6, 1.3, 1.0][: 3 if coherent else 2]
+    figure = style.new_figure(8.0, 1.2 + sum(heights))
+    style.title_above(figure, title)
+    rows = figure.subplots(
+        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+    )[:, 0]
+    along = {curve.axis for curve in curves}
+    of = f" along {curves[0].axis}" if len(along) == 1 else ""
+    frames = [f"{shown}{of}{unit_of(shown)}", "phase (degrees)", "coherence"]
+    for row, ylabel in zip(rows, frames, strict=False):
+        style.frame(row, "frequency (Hz)" if row is rows[-1] else "", ylabel)
+    several = len(responses) > 1, len({curve.node for curve in curves}) > 1, len(along) > 1
+    handles, found = [], []
+    for index, curve in enumerate(curves):
+        look = style.line_style(index) | {"label": _label(curve, *several)}
+        dots = {"marker": ".", "markersize": 4.0} if len(curve.frequency) <= _FEW else {}
+        size = np.where(curve.values == 0.0, np.nan, np.abs(curve.values))
+        (line,) = rows[0].plot(curve.frequency, size, **look, **dots)
+        rows[1].plot(*phase_line(curve.frequency, curve.values), **look, **dots)
+        if curve.coherence is not None:
+            rows[2].plot(curve.frequency, curve.coherence, **look, **dots)
+        handles.append(line)
+        peaks = _peaks(curve, shown, prominence)
+        rows[0].plot(
+            *peaks.T,
+            linestyle="none",
+            marker="o",
+            markersize=4.5,
+            markerfacecolor="white",
+            markeredgecolor=look["color"],
+            label=f"_peaks of {look['label']}",
+            zorder=4.0,
+        )
+        found.append(peaks)
+    _set_axes(rows, curves)
+    _label_peaks(rows[0], np.concatenate(found))
+    keys = handles if any(several) else []
+    if keys and any(len(peaks) for peaks in found):
+        look = {"marker": "o", "markersize": 4.5, "markerfacecolor": "white"}
+        keys = [*keys, Line2D([], [], color=style.GRAY, linestyle="none", label="peak", **look)]
+    if keys:
+        style.legend_below(
+            figure, keys, style.columns_that_fit([str(k.get_label()) for k in keys], 7.6, 5)
+        )
+    figure.align_ylabels(list(rows))
+    return style.finish(figure)
+
+
+def phase_line(
+    frequency: NDArray[np.float64], values: NDArray[np.complex128]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequencies and phases (degrees, -180 to 180), broken by NaN where they jump around."""
+    degrees = np.degrees(np.angle(np.where(values == 0.0, np.nan, values)))
+    # Without damping the phase is -180 or 180 by rounding: one of them.
+    degrees = np.where(degrees > 180.0 - 1e-6, -180.0, degrees)
+    jumps = np.flatnonzero(np.abs(np.diff(degrees)) > 180.0) + 1
+    return np.insert(frequency, jumps, frequency[jumps]), np.insert(degrees, jumps, np.nan)
+
+
+def _label(curve: Curve, models: bool, nodes: bool, axes: bool) -> str:
+    """Legend entry: what tells a curve from the others."""
+    node = f"node {curve.node}" + (f" along {curve.axis}" if axes else "")
+    parts = [*([curve.label] if models else []), *([node] if nodes or axes else [])]
+    return ", ".join(parts) or "response"
+
+
+def _peaks(curve: Curve, quantity: str, prominence: float) -> NDArray[np.float64]:
+    """Frequency and height of the peaks of a curve, shape (p, 2)."""
+    usable = np.isfinite(curve.values)
+    if usable.sum() < 3 or not curve.values[usable].any():
+        return np.zeros((0, 2))
+    kind = "receptance" if quantity == "transmissibility" else quantity
+    peaks = find_peaks(curve.frequency[usable], curve.values[usable], prominence, quantity=kind)
+    return np.column_stack([peaks.frequency, peaks.height])
+
+
+def _set_axes(rows: NDArray, curves: list[Curve]) -> None:
+    """Set limits and ticks of all axes."""
+    magnitude, phase = rows[0], rows[1]
+    magnitude.set_yscale("log")
+    largest = max(float(np.abs(np.nan_to_num(curve.values)).max()) for curve in curves)
+    low, high = magnitude.get_ylim()
+    magnitude.set_ylim(max(low, largest * 10.0**-_DECADES), high * 1.6)  # room for labels
+    magnitude.yaxis.set_major_locator(LogLocator(numticks=8))
+    magnitude.yaxis.set_minor_formatter(NullFormatter())
+    magnitude.tick_params(which="minor", color=style.LIGHT)
+    first = min(float(curve.frequency[0]) for curve in curves)
+    last = max(float(curve.frequency[-1]) for curve in curves)
+    if last > first:
+        phase.set_xlim(first, last)
+    phase.set_ylim(-195.0, 195.0)
+    phase.set_yticks([-180.0, -90.0, 0.0, 90.0, 180.0])
+    if len(rows) > 2:
+        rows[2].set_ylim(-0.05, 1.08)
+        rows[2].set_yticks([0.0, 0.5, 1.0])
+
+
+def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:
+    """Write frequencies above the peaks, the highest first, where none is written nearby."""
+    low, high = axes.get_xlim()
+    written: list[float] = []
+    for frequency, height in peaks[np.argsort(-peaks[:, 1], kind="stable")].tolist():
+        if any(abs(frequency - other) < _APART * (high - low) for other in written):
+            continue
+        written.append(frequency)
+        part = (frequency - low) / (high - low)
+        axes.annotate(
+            f"{hertz(frequency)} Hz",
+            (frequency, height),
+            xytext=(0.0, 5.0),
+            textcoords="offset points",
+            ha="left" if part < 0.04 else "right" if part > 0.96 else "center",
+            fontsize=style.NOTE,
+            color=style.BLACK,
+            zorder=5.0,
+        )

@@ -1,0 +1,227 @@
+"""Mode shapes side by side, over the state about which the structure vibrates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.plots import style
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from foldyn.cases import Case
+    from foldyn.structures import Structure
+
+MOST_MODES = 12
+"""Modes that one figure shows at most."""
+_AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
+_STRETCH = 0.4  # largest displacement of a bar's ends against each other, as a part of its length
+_AWAY = 0.2  # distance of the supports' center from the sheet's, as a part of its extent
+_NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
+
+
+def draw_modes(
+    case_or_structure: Case | Structure,
+    modes: xr.Dataset,
+    which: Sequence[int] | None = None,
+    amplitude: float | None = None,
+    names: Mapping[int, str] | xr.Dataset | None = None,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw mode shapes, each over the state about which it swings in gray.
+
+    All are drawn at the same scale; below each stand its number, its frequency, its damping ratio
+    and what it does.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What vibrates.
+    modes : xarray.Dataset
+        Modes of `foldyn.modes`.
+    which : sequence of int, optional
+        Their numbers, from 1 on; by default all that are not rigid, at most 12.
+    amplitude : float, optional
+        Largest displacement (m) in each picture; by default such that the shape can be read: 12 %
+        of the sheet's size, or less where neighbors would part too far.
+    names : xarray.Dataset or mapping of int to str, optional
+        What modes do: a result of `foldyn.linear.character`, or words by the modes' numbers; by
+        default the character along the axis that leads away from the supports, or the longest.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One orthographic view for each mode.
+
+    Raises
+    ------
+    InputError
+        Modes of another structure, or no such mode.
+    """
+    drawn = ShownModes.of(case_or_structure, modes, which, amplitude, names)
+    positions = drawn.sheet.nodes + drawn.swings
+    return side_by_side(
+        drawn.sheet, positions, drawn.captions, View(*view), drawn.notes, title
+    ).figure
+
+
+@dataclass(frozen=True)
+class ShownModes:
+    """What figures and films of modes show.
+
+    Attributes
+    ----------
+    sheet : Sheet3D
+        The sheet in the state about which it swings.
+    swings : ndarray, shape (k, n, 3)
+        Displacements from there (m) at the largest swing.
+    captions : list of str
+    notes : list of Line2D
+        Legend entries.
+    """
+
+    sheet: Sheet3D
+    swings: NDArray[np.float64]
+    captions: list[str]
+    notes: list[Line2D]
+
+    @classmethod
+    def of(
+        cls,
+        case_or_structure: Case | Structure,
+        modes: xr.Dataset,
+        which: Sequence[int] | None,
+        amplitude: float | None,
+        names: Mapping[int, str] | xr.Dataset | None,
+    ) -> ShownModes:
+        """Choose modes and scale them."""
+        sheet = Sheet3D.of(case_or_structure)
+        numbers = chosen_modes(modes, which)
+        if amplitude is not None and not (np.isfinite(amplitude) and amplitude > 0.0):
+            raise InputError(f"amplitude: {amplitude!r}; give a positive length in m")
+        moved = modes["displacement"].transpose("node", "axis").values
+        if moved.shape != sheet.nodes.shape:
+            raise InputError(
+                f"modes: they have {len(moved)} nodes, the structure {len(sheet.nodes)}; give the "
+                "case that was computed"
+            )
+        state = "undeformed" if not moved.any() else "equilibrium"
+        sheet = replace(sheet, nodes=sheet.nodes + moved)
+        shapes = modes["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
+        swings = np.array([_readable(sheet, shape, amplitude) for shape in shapes])
+        named = mode_names(sheet, modes, names)
+        captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
+        notes = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label=state)]
+        return cls(sheet, swings, captions, notes)
+
+
+def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
+    """Numbers of the modes to show: those asked for, else the first that are not rigid."""
+    missing = [key for key in _NEEDED if key not in modes]
+    if missing:
+        raise InputError(f"modes: are no modes (they have no {missing[0]}); give those of fd.modes")
+    stored = modes["mode"].values.tolist()
+    if which is None:
+        rigid = modes["rigid"].values.astype(bool)
+        elastic = [number for number, is_rigid in zip(stored, rigid, strict=True) if not is_rigid]
+        return (elastic or stored)[:MOST_MODES]
+    numbers = [int(number) for number in which]
+    if not numbers:
+        raise InputError("which: empty; give the number of at least one mode")
+    if len(numbers) > MOST_MODES:
+        raise InputError(f"which: {len(numbers)} modes; one figure shows at most {MOST_MODES}")
+    for number in numbers:
+        if number not in stored:
+            raise InputError(f"which: {number}; there are modes {stored[0]} to {stored[-1]}")
+    return numbers
+
+
+def mode_names(
+    sheet: Sheet3D, modes: xr.Dataset, names: Mapping[int, str] | xr.Dataset | None
+) -> Mapping[int, str]:
+    """What modes that are not rigid do, with its share of the motion, by their numbers."""
+    if names is None:
+        from foldyn.linear import character
+
+        try:
+            names = character(modes, main_axis(sheet), case=sheet.case)
+        except InputError:  # of a structure alone, with laws that the result does not hold
+            return {}
+    if not hasattr(names, "data_vars"):
+        return cast("Mapping[int, str]", names)
+    words = cast("xr.Dataset", names)
+    told = zip(
+        modes["mode"].values.tolist(),
+        words["name"].values.tolist(),
+        words["share"].max("kind").values.tolist(),
+        modes["rigid"].values.tolist(),
+        strict=True,
+    )
+    return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in told if not rigid}
+
+
+def main_axis(sheet: Sheet3D) -> str:
+    """Axis along which a structure leads away from its supports, or else its longest one."""
+    extent = np.ptp(sheet.nodes, axis=0)
+    if sheet.case is not None and sheet.case.fixed.any():
+        held = np.asarray(sheet.case.fixed).sum(axis=1)
+        away = np.abs(sheet.nodes.mean(axis=0) - held @ sheet.nodes / held.sum())
+        if away.max() > _AWAY * extent.max():
+            return "xyz"[int(away.argmax())]
+    return "xyz"[int(extent.argmax())]
+
+
+def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:
+    """Text for a mode: number, frequency and damping, and below them what it does."""
+    mode = modes.sel(mode=number)
+    eigenvalue = float(mode["eigenvalue"])
+    if bool(mode["rigid"]):
+        said = "rigid motion"
+    elif eigenvalue < 0.0:
+        said = f"unstable, grows e-fold in {1.0 / np.sqrt(-eigenvalue):.3g} s"
+    elif eigenvalue == 0.0:
+        said = "0 Hz, nothing resists it"
+    else:
+        said = f"{hertz(float(mode['frequency']))} Hz"
+        ratio = float(mode["damping_ratio"]) if "damping_ratio" in mode else 0.0
+        if np.isfinite(ratio) and ratio > 0.0:
+            said += f", damping {100.0 * ratio:.3g} %"
+    return f"mode {number}: {said}" + (f"\n{name}" if name else "")
+
+
+def hertz(frequency: float) -> str:
+    """Write a frequency (Hz) with four digits."""
+    if frequency >= 1e4 or 0.0 < frequency < 1e-2:
+        return f"{frequency:.4g}"
+    return f"{frequency:#.4g}".rstrip(".") if frequency else "0"
+
+
+def _readable(
+    sheet: Sheet3D, shape: NDArray[np.float64], amplitude: float | None
+) -> NDArray[np.float64]:
+    """Scale a shape to an amplitude (m), or to one at which it can be read."""
+    largest = float(np.linalg.norm(shape, axis=1).max())
+    if largest == 0.0:
+        return shape
+    if amplitude is not None:
+        return shape * (amplitude / largest)
+    first, second = np.concatenate([sheet.edges, sheet.inner_bars]).T
+    length = np.linalg.norm(sheet.nodes[second] - sheet.nodes[first], axis=1)
+    parting = np.linalg.norm(shape[second] - shape[first], axis=1)
+    limit = float((_STRETCH * length / np.maximum(parting, 1e-30)).min())
+    return shape * min(_AMPLITUDE * sheet.size / largest, limit)

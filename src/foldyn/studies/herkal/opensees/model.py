@@ -1,0 +1,264 @@
+"""A pattern in OpenSees: corotational shells of three nodes, joined by springs along creases.
+
+Each panel has nodes of its own. Two nodes at one place of a crease are tied by stiff springs, and
+turn against each other about the crease with their share of its stiffness. Nothing of Foldyn's
+mechanics is used: geometry, supports, loads and damping come from the case, all else is here.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, Fix, Force
+from foldyn.errors import ComputationError, InputError
+from foldyn.materials import EnhancedLinear
+from foldyn.materials.linear import LinearHinge
+from foldyn.studies.herkal.opensees.mesh import Crease, PanelMesh, panel_mesh
+
+TIE = 10.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
+TOLERANCE = 1e-7  # m and rad: norm of the last correction of a step
+ITERATIONS = 60
+SECTION, TIE_MATERIAL = 1, 1  # their numbers
+MOVES, TURN = (1, 2, 3), 4  # directions of a spring: along its three axes, about the first
+FREE = (-np.inf, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A path or a motion.
+
+    Attributes
+    ----------
+    at : (m,)
+        Load factors, or times (s).
+    displacement : (m, v, 3)
+        Of the pattern's vertices, m.
+    iterations : int
+        Corrections in all steps.
+    seconds : float
+        Processor time of the steps.
+    """
+
+    at: NDArray
+    displacement: NDArray
+    iterations: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class PanelShells:
+    """A case as shells of OpenSees.
+
+    Parameters
+    ----------
+    case : Case
+        Of its structure, the pattern, the sheet and the law of the folds are taken. Supports are
+        `Fix` and loads `Force`, both on vertices of the pattern.
+    divisions : int
+        Pieces of each edge of a panel.
+    tie : float
+        Stiffness of the springs that tie nodes, in units of E t.
+    tolerance : float
+        Norm (m and rad) of the last correction of a step.
+
+    Raises
+    ------
+    InputError
+        The case has what this model does not know.
+    """
+
+    case: Case
+    divisions: int
+    tie: float = TIE
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        case, options = self.case, self.case.structure.options
+        if not all(isinstance(one, Fix) for one in case.supports):
+            raise InputError("supports: this model takes `Fix` alone")
+        if not all(isinstance(one, Force) for one in case.loads):
+            raise InputError("loads: this model takes `Force` alone")
+        if case.damping.beta:
+            raise InputError(f"damping: beta = {case.damping.beta}: this model takes alpha alone")
+        if options.crease_stiffness is not None or options.crease_rest is not None:
+            raise InputError("crease_stiffness, crease_rest: this model has those of the sheet")
+        inner = slice(len(case.structure.pattern.vertices), None)
+        if case.fixed[inner].any() or any(force[inner].any() for force, _ in case.load_terms):
+            raise InputError("supports and loads: this model takes vertices of the pattern alone")
+        _ = self.linear_range
+
+    @cached_property
+    def mesh(self) -> PanelMesh:
+        """Triangles and creases."""
+        return panel_mesh(self.case.structure.pattern, self.divisions)
+
+    @cached_property
+    def linear_range(self) -> NDArray:
+        """Least and largest change of each dihedral (nc, 2), rad, up to which folds are linear."""
+        structure = self.case.structure
+        law, rest = structure.fold_law, structure.pattern.dihedrals
+        if isinstance(law, LinearHinge):
+            return np.tile(FREE, (len(rest), 1))
+        if isinstance(law, EnhancedLinear):
+            bounds = np.radians([law.theta1, law.theta2])
+            found = bounds - rest[:, None]
+            if (found[:, 0] < 0.0).all() and (found[:, 1] > 0.0).all():
+                return found
+        raise InputError(f"fold_law = {law}: this model takes folds that are linear at rest")
+
+    def path(self, steps: int = 10) -> Answer:
+        """Equilibria under load factors 0, 1/steps, ..., 1."""
+        domain = self._domain()
+        for number, (force, _) in enumerate(self.case.load_terms, 1):
+            domain.timeSeries("Linear", number)
+            self._load(domain, number, force)
+        self._prepare(domain, "Newton")
+        domain.integrator("LoadControl", 1.0 / steps)
+        domain.analysis("Static")
+        return self._run(domain, np.arange(steps + 1) / steps, 1, ())
+
+    def frequencies(self, count: int = 5) -> NDArray:
+        """Lowest natural frequencies (Hz) at rest."""
+        domain = self._domain()
+        self._prepare(domain, "Newton")
+        return np.sqrt(np.array(domain.eigen("-genBandArpack", count))) / (2.0 * np.pi)
+
+    def motion(self, duration: float, dt: float, every: int = 1) -> Answer:
+        """Motion from rest with Newmark's average acceleration, sampled at each `every`-th step.
+
+        Histories act with their values at the ends of the steps.
+        """
+        domain, steps = self._domain(), round(duration / dt)
+        times = dt * np.arange(steps + 1)
+        for number, (force, history) in enumerate(self.case.load_terms, 1):
+            factors = [float(history(t)) for t in (*times, times[-1] + dt)]
+            domain.timeSeries("Path", number, "-dt", dt, "-values", *factors)
+            self._load(domain, number, force)
+        self._prepare(
+            domain, "ModifiedNewton"
+        )  # a tangent a step: the same result in half the time
+        domain.rayleigh(self.case.damping.alpha, 0.0, 0.0, 0.0)
+        domain.integrator("Newmark", 0.5, 0.25)
+        domain.analysis("Transient")
+        return self._run(domain, times, every, (dt,))
+
+    def _domain(self) -> Any:
+        """Nodes, elements and supports; node k of the mesh has number k + 1."""
+        mesh, sheet = self.mesh, self.case.structure.sheet
+        domain = _opensees()(ndm=3, ndf=6)
+        for number, point in enumerate(mesh.points.tolist(), 1):
+            domain.node(number, *point)
+        domain.section(
+            "ElasticMembranePlateSection", SECTION, sheet.youngs_modulus, sheet.poissons_ratio,
+            sheet.thickness, sheet.density or 0.0,
+        )  # fmt: skip
+        for number, nodes in enumerate((mesh.triangles + 1).tolist(), 1):
+            domain.element("ASDShellT3", number, *nodes, SECTION, "-corotational")
+        tie = self.tie * sheet.youngs_modulus * sheet.thickness
+        domain.uniaxialMaterial("Elastic", TIE_MATERIAL, tie)
+        for number, crease in enumerate(mesh.creases):
+            self._join(domain, number, crease)
+        for nodes, held in zip(mesh.corners, self.case.fixed.astype(int).tolist(), strict=False):
+            if any(held):
+                for node in nodes:
+                    domain.fix(node + 1, *held, 0, 0, 0)
+        return domain
+
+    def _join(self, domain: Any, number: int, crease: Crease) -> None:
+        """Springs along a crease, with the share of its stiffness that belongs to each place."""
+        pieces = len(crease.nodes) - 1
+        stiffness = crease_stiffness(crease.length, self.case.structure.sheet) / pieces
+        whole, half = 2 * number + 2, 2 * number + 3
+        domain.uniaxialMaterial("Elastic", whole, stiffness)
+        domain.uniaxialMaterial("Elastic", half, 0.5 * stiffness)
+        across = np.cross(np.eye(3)[np.abs(crease.axis).argmin()], crease.axis)
+        for place, nodes in enumerate((crease.nodes + 1).tolist()):
+            domain.element(
+                "zeroLength", self._spring(number, place), *nodes,
+                "-mat", half if place in (0, pieces) else whole, *[TIE_MATERIAL] * len(MOVES),
+                "-dir", TURN, *MOVES, "-orient", *crease.axis.tolist(), *across.tolist(),
+            )  # fmt: skip
+
+    def _spring(self, crease: int, place: int) -> int:
+        return len(self.mesh.triangles) + crease * (self.divisions + 1) + place + 1
+
+    def _load(self, domain: Any, number: int, force: NDArray) -> None:
+        """Forces on vertices, shared evenly by the nodes there."""
+        domain.pattern("Plain", number, number)
+        for nodes, vector in zip(self.mesh.corners, force, strict=False):
+            if vector.any():
+                for node in nodes:
+                    domain.load(node + 1, *(vector / len(nodes)).tolist(), 0.0, 0.0, 0.0)
+
+    def _prepare(self, domain: Any, algorithm: str) -> None:
+        """Constraints that are plain, and an unsymmetric solver: the tangent is not symmetric."""
+        domain.constraints("Plain")
+        domain.numberer("RCM")
+        domain.system("UmfPack")
+        domain.test("NormDispIncr", self.tolerance, ITERATIONS, 0)
+        domain.algorithm(algorithm)
+
+    def _run(self, domain: Any, at: NDArray, every: int, step: tuple[float, ...]) -> Answer:
+        moved, iterations, start = [self._moved(domain)], 0, time.process_time()
+        for number in range(1, len(at)):
+            if domain.analyze(1, *step):
+                raise ComputationError(f"OpenSees found no balance at {at[number]:g}")
+            iterations += domain.testIter()
+            if number % every == 0:
+                moved.append(self._moved(domain))
+                self._check_folds(domain, at[number])
+        spent = time.process_time() - start
+        return Answer(at[::every], np.array(moved), iterations, spent)
+
+    def _moved(self, domain: Any) -> NDArray:
+        """Displacements (v, 3) of the vertices, the means of their nodes."""
+        return np.array(
+            [
+                np.mean([domain.nodeDisp(node + 1)[:3] for node in nodes], axis=0)
+                for nodes in self.mesh.corners
+            ]
+        )
+
+    def _check_folds(self, domain: Any, at: float) -> None:
+        """Refuse a state in which a fold has left the range of its linear law."""
+        for number, (low, high) in enumerate(self.linear_range):
+            for place in range(self.divisions + 1):
+                turn = domain.eleResponse(self._spring(number, place), "deformation")[0]
+                if not low <= turn <= high:
+                    raise ComputationError(
+                        f"crease {number} turned by {np.degrees(turn):.1f} degrees at {at:g}: "
+                        "beyond the range in which its fold is linear"
+                    )
+
+
+def crease_stiffness(length: float, sheet: Any) -> float:
+    """Stiffness (N m/rad) of a whole crease: 1/k = Ls/G + 1/(0.55 G (L/t)^(1/3)).
+
+    With G = E t^3 / 12 (1 - nu^2) and Ls the length-scale ratio; computed here anew, so that the
+    check is independent.
+    """
+    E, nu, t = sheet.youngs_modulus, sheet.poissons_ratio, sheet.thickness
+    bending = E * t**3 / (12.0 * (1.0 - nu**2))
+    softness = sheet.length_scale_ratio + 1.0 / (0.55 * (length / t) ** (1.0 / 3.0))
+    return bending / softness
+
+
+def _opensees() -> Callable[..., Any]:
+    """The class of models of OpenSees."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    try:
+        return import_module("opensees.openseespy").Model
+    except ImportError:
+        raise InputError(
+            "opensees is not installed: install the extra with pip install foldyn[opensees]"
+        ) from None

@@ -1,0 +1,109 @@
+"""What the pages of modes and frequency responses say about the numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foldyn.cases import read_case
+from foldyn.linear import frf, modes, peaks_of
+from foldyn.report import write_modes, write_responses
+from foldyn.report.frf import driven_axis
+from foldyn.report.modes import shown_modes
+
+SHEET = """
+[pattern]
+kind = "miura"
+cells = [2, 1]
+dihedral = 90
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[damping]
+alpha = 0.5
+[[supports]]
+nodes = "xmin"
+"""
+PUSH = '[[drive]]\nnodes = "xmax"\nforce = [0, 0, 1e-4]\n'
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Function that computes a case file and writes its page without a film."""
+    monkeypatch.setattr("foldyn.report.modes.FRAMES", 2)
+
+    def write_page(text: str):
+        file = tmp_path / "case.toml"
+        file.write_text(SHEET + text, "utf-8")
+        case_file = read_case(file)
+        pages = {"modes": (modes, write_modes), "frf": (frf, write_responses)}
+        compute, draw = pages[case_file.analysis.kind]
+        arguments = case_file.analysis.arguments
+        results = {rule: compute(case_file.case(rule), **arguments) for rule in case_file.masses}
+        page = draw(case_file, results, tmp_path).read_text("utf-8")
+        return next(iter(results.values())), page
+
+    return write_page
+
+
+def test_modes_about_an_equilibrium(write):
+    text = '[[loads]]\ngravity = [0, 0, -1e-3]\n[analysis]\nkind = "modes"\ncount = 2\n'
+    found, page = write(text + 'state = "equilibrium"\nsecant = 0.5\n[output]\nnodes = "xmax"\n')
+    assert found.attrs["state"] == "equilibrium"
+    assert "over the equilibrium under the loads in gray" in page
+    assert "of nodes 12, 13, 14, seen along x" in page
+    assert "equivalent to an oscillation by 0.5 degrees" in page
+    assert "alpha 0.5 1/s and beta 0 s" in page
+    assert "no equilibrium" not in page
+
+
+def test_which_modes_are_shown(write):
+    found, _ = write('[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n')
+    assert shown_modes(found, 3) == [1, 2, 3]
+    assert shown_modes(found, (4, 2)) == [4, 2]
+    found["rigid"][:2] = True
+    assert shown_modes(found, 2) == [3, 4]
+
+
+def test_a_film_of_a_large_sheet_shows_fewer_modes(write, monkeypatch):
+    monkeypatch.setattr("foldyn.report.modes.MOST_TRIANGLES", 70)  # 32 in a mode
+    _, page = write('[analysis]\nkind = "modes"\ncount = 3\nsecant = 1\n')
+    assert "The same modes (the first 2) in motion" in page
+
+
+def test_the_direction_is_that_of_the_drive_and_nodes_are_told(write):
+    grid = "frequencies = { first = 0, last = 2, count = 21 }\n"
+    output = f"[output]\nnodes = {list(range(3, 15))}\n"
+    found, page = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n{output}')
+    assert driven_axis(found) == "z"
+    assert "of nodes 3, 4, 5, 6, 7, 8, 9, 10 (the first 8 of 12) along z" in page
+    assert "displacement per newton of driving force, on all driven nodes together" in page
+    assert "Computed with Foldyn" in page and "alpha 0.5 1/s, beta 0 s" in page
+
+
+def test_numbers_that_are_missing_are_explained(write):
+    """A curve that ends above the half-power points tells no damping."""
+    only, _ = write('[analysis]\nkind = "modes"\ncount = 1\nsecant = 1\n')
+    f0 = float(only["frequency"][0])
+    lines = [round(share * f0, 6) for share in (0.87, 0.96, 1.05)]
+    text = f'[analysis]\nkind = "frf"\nfrequencies = {lines}\nsecant = 1\n[output]\nnodes = 13\n'
+    response, page = write(PUSH + text)
+    (peak,) = peaks_of(response, 13, "z")
+    assert np.isnan(peak.damping_ratio) and "circle_fit" in peak.note
+    assert "Why numbers are missing from the table:" in page
+    assert f"Peak at {peak.frequency:.4g} Hz of node 13" in page
+    assert "circle_fit" not in page  # what a programmer would do about it
+
+
+def test_a_response_that_depends_on_its_amplitude(write):
+    grid = "frequencies = { first = 0.1, last = 1, count = 10 }\n"
+    found, page = write(
+        PUSH + f'[analysis]\nkind = "frf"\nmethod = "harmonic"\n{grid}amplitude = 2.0\n'
+    )
+    largest = float(np.nanmax(found["swing"]))
+    assert f"the largest is {largest:.3g} degrees" in page
+    assert '<th scope="col" class="number">amplitude</th>' in page
+    _, linear = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n')
+    assert ">amplitude</th>" not in linear

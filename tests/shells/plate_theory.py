@@ -1,0 +1,67 @@
+"""Thin plates by other means: Ritz's method, Navier's series; published values with sources."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+# Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd edition, 1959: deflection of
+# the middle of square plates over q a^4 / D (tables 8 and 35) and over P a^2 / D (tables 23 and 37)
+DEFLECTION = {
+    ("clamped", "uniform"): 0.00126,
+    ("clamped", "center"): 0.00560,
+    ("supported", "uniform"): 0.00406,
+    ("supported", "center"): 0.01160,
+}
+
+# A. W. Leissa, The free vibration of rectangular plates, J. Sound Vib. 31, 257-293, 1973, square,
+# nu = 0.3: omega a^2 sqrt(rho t / D), by Ritz's method with 36 beam functions, so a little high
+LEISSA = {
+    "free": np.array([13.489, 19.789, 24.432, 35.024, 35.024, 61.526]),
+    "cantilevered": np.array([3.4917, 8.5246, 21.429, 27.331, 31.111, 54.443]),
+}
+
+
+@cache
+def ritz_frequencies(nu: float, clamped: bool, terms: int = 14) -> NDArray:
+    """omega a^2 sqrt(rho t / D) of a square plate, free or clamped on one edge, ascending.
+
+    Legendre polynomials, times x^2 for the clamped edge: exact to four digits from 12 terms on.
+    """
+    point, weight = legendre.leggauss(terms + 8)
+    x, weight = 0.5 * (point + 1.0), 0.5 * weight
+
+    def functions(held: bool) -> NDArray:
+        """Functions, slopes and curvatures (3, terms, points)."""
+        rows = []
+        for k in range(terms):
+            p = legendre.Legendre.basis(k, [0, 1])
+            f = [p(x), p.deriv()(x), p.deriv(2)(x)]
+            if held:
+                f = [x**2 * f[0], 2 * x * f[0] + x**2 * f[1], 2 * f[0] + 4 * x * f[1] + x**2 * f[2]]
+            rows.append(f)
+        return np.array(rows).transpose(1, 0, 2)
+
+    along, across = functions(clamped), functions(False)
+
+    def both(i: int, j: int, k: int, m: int) -> NDArray:
+        return np.kron((along[i] * weight) @ along[j].T, (across[k] * weight) @ across[m].T)
+
+    stiffness = both(2, 2, 0, 0) + both(0, 0, 2, 2) + 2.0 * (1.0 - nu) * both(1, 1, 1, 1)
+    stiffness += nu * (both(2, 0, 0, 2) + both(0, 2, 2, 0))
+    found = np.sqrt(np.abs(eigh(stiffness, both(0, 0, 0, 0), eigvals_only=True)))
+    return found if clamped else found[3:]  # without the rigid motions
+
+
+def navier_deflection(load: str) -> float:
+    """Deflection of the middle of a simply supported square plate, as in `DEFLECTION`."""
+    m = np.arange(1.0, 400.0, 2.0)
+    square = (m[:, None] ** 2 + m**2) ** 2
+    if load == "center":
+        return float(4.0 / np.pi**4 * (1.0 / square).sum())
+    signs = (-1.0) ** ((m - 1.0) / 2.0)
+    return float(16.0 / np.pi**6 * (signs[:, None] * signs / (m[:, None] * m * square)).sum())

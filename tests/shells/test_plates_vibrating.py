@@ -1,0 +1,92 @@
+"""Frequencies of square plates against published ones, with the observed order of convergence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plate_theory import LEISSA, ritz_frequencies
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+from shell_lab import SQUARE, WEST, at_rest, dofs, factor, tangent
+
+import foldyn as fd
+from foldyn.checks import observed_order
+from foldyn.shells import shell
+
+SHEET = fd.Sheet(1e6, 0.3, 0.01, density=2.0)
+DIVISIONS = np.array([8, 16, 32])
+
+
+def angular_frequencies(s, fixed, count, shift):
+    """Lowest angular frequencies (rad/s): K with its rotations, M without; shift in rad/s."""
+    stiffness = tangent(s, at_rest(s)).tocsr()
+    rotations = sparse.csr_array((s.rotations, s.rotations))
+    mass = sparse.csr_array(sparse.block_diag([sparse.kron(s.mass, np.eye(3)), rotations]))
+    free = np.setdiff1d(np.arange(stiffness.shape[0]), fixed)
+    stiffness, mass = stiffness[free][:, free], mass[free][:, free]
+    solve = LinearOperator(stiffness.shape, matvec=factor(stiffness + shift**2 * mass))
+    start = mass @ np.random.default_rng(0).standard_normal(len(free))
+    square, shape = eigsh(stiffness, count, mass, sigma=-(shift**2), OPinv=solve, v0=start)
+    order = np.argsort(square)
+    whole = np.zeros((at_rest(s).size, count))
+    whole[free] = shape[:, order]
+    return np.sqrt(np.maximum(square[order], 0.0)), whole
+
+
+def frequencies(edges, divisions, mass, count=6):
+    """omega a^2 sqrt(rho t / D), of all rigid and elastic modes."""
+    clamped = [WEST] if edges == "cantilevered" else []
+    s = shell(SQUARE, SHEET, divisions=int(divisions), clamped=clamped, mass=mass)
+    held = dofs(np.flatnonzero(s.nodes[:, 0] < 1e-12)) if clamped else []
+    unit = np.sqrt(SHEET.bending_modulus / (SHEET.density * SHEET.thickness))
+    rigid = 0 if clamped else 6
+    return angular_frequencies(s, held, rigid + count, shift=unit)[0] / unit
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+@pytest.mark.parametrize("edges", ["free", "cantilevered"])
+def test_first_six_frequencies(edges, mass):
+    exact = ritz_frequencies(SHEET.poissons_ratio, clamped=edges == "cantilevered")[:6]
+    found = np.array([frequencies(edges, n, mass)[-6:] for n in DIVISIONS])
+    limit = found[-1] + (found[-1] - found[-2]) / 3.0
+    assert limit == pytest.approx(LEISSA[edges], rel=1.1e-2)  # his are upper bounds
+    assert limit == pytest.approx(exact, rel=1.5e-3)
+    assert (found < exact).all()  # softer than the plate, and lumping adds to it
+    assert found[-1] == pytest.approx(exact, rel=1.4e-2 if mass == "lumped" else 5e-3)
+    for mode in range(6):
+        order = observed_order(1.0 / DIVISIONS, found[:, mode] / exact[mode] - 1.0)
+        assert 1.75 < order < 2.05
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_a_free_plate_has_six_rigid_modes(mass):
+    found = frequencies("free", 8, mass)
+    assert found[5] < 1e-3 * found[6]
+    assert found[6] > 13.0
+
+
+def test_leissas_table_is_for_a_poissons_ratio_of_three_tenths():
+    for edges, table in LEISSA.items():
+        ours = ritz_frequencies(0.3, edges == "cantilevered")[:6]
+        assert (table > ours).all()
+        assert table == pytest.approx(ours, rel=1.1e-2)
+        others = ritz_frequencies(0.225, edges == "cantilevered")[:6]
+        assert np.abs(table / others - 1.0).max() > 0.02
+
+
+def test_ritz_has_converged():
+    for clamped in (False, True):
+        fine, coarse = (ritz_frequencies(0.3, clamped, terms)[:6] for terms in (14, 11))
+        assert coarse == pytest.approx(fine, rel=2e-4)
+
+
+def test_frequencies_go_with_thickness_and_density():
+    """omega ~ t sqrt(E / rho): membrane stiffness has no part in bending modes."""
+    thin = fd.Sheet(3e6, 0.3, 0.001, density=5.0)
+    found = []
+    for sheet in (SHEET, thin):
+        s = shell(SQUARE, sheet, divisions=6, clamped=[WEST])
+        held = dofs(np.flatnonzero(s.nodes[:, 0] < 1e-12))
+        unit = np.sqrt(sheet.bending_modulus / (sheet.density * sheet.thickness))
+        found.append(angular_frequencies(s, held, 4, unit)[0] / unit)
+    assert found[1] == pytest.approx(found[0], rel=1e-8)

@@ -1,0 +1,219 @@
+"""Large rotations: a strip rolled up by an end moment, bent by a force; a slit ring lifted.
+
+The last two are problems 3.1 and 3.3 of K. Y. Sze, X. H. Liu and S. H. Lo, Popular benchmark
+problems for geometric nonlinear analysis of shells, Finite Elem. Anal. Des. 40, 1551-1569, 2004,
+which keep strains small. Their other ones need shells that are curved at rest, or layers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from shell_lab import (
+    WEST,
+    at_rest,
+    dofs,
+    equilibrium,
+    grid,
+    plane,
+    sheet_of,
+    split,
+    with_rotations_on,
+)
+
+import foldyn as fd
+from foldyn.checks import observed_order
+
+STRIP = fd.Sheet(1.2e6, 0.0, 0.1)
+EI = STRIP.youngs_modulus * STRIP.thickness**3 / 12.0  # of a width of one
+
+
+def strip(nx, ny, length):
+    """A strip of width one, clamped at x = 0; with rotations on the sides of its free end."""
+    mesh, number = grid(nx, ny, lambda x, y: plane(length * x, y))
+    s, rows = with_rotations_on(sheet_of(mesh, STRIP, [WEST]), number[-1])
+    return s, number, rows
+
+
+# ------------------------------------------------------------------ rolled up
+
+
+def end_moment(s, rows, moment):
+    """A moment per length about sides: on the rotation there and, as a couple, on the triangle.
+
+    It lifts the third corners. The derivative is taken by differences, for few dofs.
+    """
+    corners = np.array([s.triangles[t, [k, (k + 1) % 3, (k + 2) % 3]] for t, k, _ in rows])
+    rotations = s.nodes.size + np.array([r for *_, r in rows])
+    edge = np.linalg.norm(s.nodes[corners[:, 1]] - s.nodes[corners[:, 0]], axis=1)
+
+    def forces(q):
+        out = np.zeros(q.size)
+        out[rotations] = moment * edge
+        a, b, c = ((s.nodes + split(s, q)[0])[corners[:, k]] for k in range(3))
+        along, arm = b - a, c - a
+        foot = np.einsum("ij,ij->i", arm, along) / np.einsum("ij,ij->i", along, along)
+        height = arm - foot[:, None] * along
+        normal = np.cross(along, height)
+        normal *= (moment * edge / np.linalg.norm(height, axis=1))[:, None] / np.linalg.norm(
+            normal, axis=1, keepdims=True
+        )
+        for k, share in enumerate((foot - 1.0, -foot, np.ones_like(foot))):
+            np.add.at(out[: s.nodes.size].reshape(-1, 3), corners[:, k], share[:, None] * normal)
+        return out
+
+    def with_slope(q):
+        slope, step = sparse.lil_array((q.size, q.size)), 1e-6
+        for d in dofs(np.unique(corners)):
+            shift = np.zeros(q.size)
+            shift[d] = step
+            column = (forces(q + shift) - forces(q - shift)) / (2.0 * step)
+            rows = np.flatnonzero(column)
+            slope[rows, [d] * len(rows)] = column[rows]
+        return forces(q), slope.tocsr()
+
+    return with_slope
+
+
+def roll(nx, ny, length, angles):
+    """States at end angles M L / (E I), and the strip."""
+    s, number, rows = strip(nx, ny, length)
+    q, found, steps = at_rest(s), [], round(angles[-1] / (np.pi / 20))
+    for k in range(1, steps + 1):
+        angle = angles[-1] * k / steps
+        moment = end_moment(s, rows, -angle * EI / length)
+        q = equilibrium(s, q, 0 * q, dofs(number[0]), moment)
+        if np.isclose(angle, angles).any():
+            found.append(q)
+    return s, number, found
+
+
+@pytest.mark.parametrize("mesh", [(12, 1), (8, 3)])
+def test_an_end_moment_rolls_a_strip_into_a_full_circle(mesh):
+    """M = E I / R, exactly on any mesh: n sides that turn by angle / n each."""
+    length, angles = 12.0, np.array([0.5, 1.0, 2.0]) * np.pi
+    s, number, states = roll(*mesh, length, angles)
+    for angle, q in zip(angles, states, strict=True):
+        u, x = split(s, q)
+        tip = (s.nodes + u)[number[-1]]
+        part = angle / mesh[0]
+        radius = 0.5 * length / mesh[0] / np.sin(0.5 * part)
+        aim = np.tile([radius * np.sin(angle), radius * (1 - np.cos(angle))], (len(tip), 1))
+        assert np.abs(tip[:, [0, 2]]) == pytest.approx(np.abs(aim), abs=1e-7)
+        assert u[:, 1] == pytest.approx(0 * u[:, 1], abs=1e-8)  # plane strain, nu = 0
+        energies = s.energies(u, x)
+        assert energies["strain_bending"] == pytest.approx(0.5 * EI * angle**2 / length, rel=1e-10)
+        assert energies["strain_membrane"] < 1e-10 * energies["strain_bending"]
+
+
+def test_the_tip_of_a_rolled_strip_converges_to_the_circle():
+    """x = R sin(L / R), z = R (1 - cos(L / R)), of second order."""
+    length, angle, errors, cells = 12.0, np.pi, [], np.array([6, 12, 24])
+    exact = length / angle * np.array([np.sin(angle), 1.0 - np.cos(angle)])
+    for nx in cells:
+        s, number, (q,) = roll(int(nx), 1, length, [angle])
+        tip = (s.nodes + split(s, q)[0])[number[-1]].mean(axis=0)
+        errors.append(np.linalg.norm([tip[0] - exact[0], abs(tip[2]) - exact[1]]))
+    assert observed_order(1.0 / cells, errors) == pytest.approx(2.0, abs=0.05)
+    assert errors[-1] < 1e-3 * length
+
+
+# ------------------------------------------------------------------ bent by a force
+
+# load over 4: shortening and lift of the tip, L = 10 (Sze et al., table 1)
+END_SHEAR = {
+    0.1: (0.103, 1.309), 0.2: (0.381, 2.493), 0.4: (1.184, 4.292), 0.6: (2.002, 5.444),
+    0.8: (2.705, 6.190), 1.0: (3.286, 6.698),
+}  # fmt: skip
+
+
+def elastica(load, length):
+    """Shortening and lift of the tip of an inextensible cantilever under a vertical dead load."""
+
+    def curve(start):
+        def slope(_, y):
+            return [y[1], -load / EI * np.cos(y[0]), 1.0 - np.cos(y[0]), np.sin(y[0])]
+
+        return solve_ivp(slope, [0, length], [0, start, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
+
+    start = brentq(lambda k: curve(k)[1], 0.0, load * length / EI, xtol=1e-14)
+    return curve(start)[2:]
+
+
+def test_the_published_table_is_the_elastica():
+    for part, table in END_SHEAR.items():
+        assert table == pytest.approx(elastica(4.0 * part, 10.0), abs=4e-3)
+
+
+def test_cantilever_under_end_shear():
+    errors, cells = [], np.array([8, 16, 32])
+    for nx in cells:
+        s, number, _ = strip(int(nx), max(1, nx // 10), 10.0)
+        share = np.full(number.shape[1], 1.0 / (number.shape[1] - 1))
+        share[[0, -1]] *= 0.5
+        q, found = at_rest(s), []
+        for part, table in END_SHEAR.items():
+            load = at_rest(s)
+            load[dofs(number[-1], "z")] = 4.0 * part * share
+            q = equilibrium(s, q, load, dofs(number[0]))
+            tip = split(s, q)[0][number[-1]].mean(axis=0)
+            found.append([-tip[0], tip[2]])
+            if nx == 32:
+                assert found[-1] == pytest.approx(table, rel=4e-3, abs=1e-3)
+        exact = np.array([elastica(4.0 * part, 10.0) for part in END_SHEAR])
+        errors.append(np.linalg.norm(np.array(found) - exact))
+    assert observed_order(1.0 / cells, errors) == pytest.approx(2.0, abs=0.15)
+
+
+# ------------------------------------------------------------------ slit ring
+
+# force per length over 0.8: lift of the loaded edge's inner and outer end (Sze et al., table 5)
+SLIT_RING = {
+    0.025: (1.305, 1.789), 0.1: (4.277, 5.876), 0.2: (6.725, 9.160), 0.5: (10.468, 13.768),
+    1.0: (13.891, 17.528),
+}  # fmt: skip
+
+
+def lifted_ring(across, around):
+    """Lifts of the ends of the loaded edge at the loads of the table."""
+
+    def place(x, y):
+        return plane((6 + 4 * y) * np.cos(2 * np.pi * x), (6 + 4 * y) * np.sin(2 * np.pi * x))
+
+    mesh, number = grid(around, across, place)
+    mesh = replace(mesh, triangles=mesh.triangles[:, ::-1])  # counter-clockwise
+    s = sheet_of(mesh, fd.Sheet(21e6, 0.0, 0.03), [WEST])
+    share = np.full(across + 1, 4.0 / across)
+    share[[0, -1]] *= 0.5
+    load = at_rest(s)
+    load[dofs(number[-1], "z")] = 0.8 * share
+    q, part, step, found = at_rest(s), 0.0, 0.0125, []
+    while part < 1.0:
+        aim = min([part + step, *(k for k in SLIT_RING if k > part)])
+        try:
+            q = equilibrium(s, q, aim * load, dofs(number[0]), tolerance=1e-6)
+        except AssertionError:
+            step *= 0.5
+            continue
+        part, step = aim, 1.3 * step
+        if part in SLIT_RING:
+            found.append(split(s, q)[0][number[-1, [0, -1]], 2])
+    return np.array(found)
+
+
+@pytest.mark.slow
+def test_slit_ring_lifted():
+    table = np.array(list(SLIT_RING.values()))
+    cells = np.array([4, 8, 12])
+    errors = np.array([lifted_ring(int(n), 8 * int(n)) / table - 1.0 for n in cells])
+    print(errors)
+    assert (errors < 0.0).all()  # stiff, as flat triangles are where rulings cross their sides
+    assert np.abs(errors[-1]).max() < 0.017
+    assert np.abs(errors[:, 0]).max() < 0.02
+    for case in np.abs(errors).reshape(3, -1).T:
+        assert observed_order(1.0 / cells, case) > 1.1
