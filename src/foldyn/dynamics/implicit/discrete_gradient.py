@@ -12,9 +12,9 @@ Hinges: f = (dW/dtheta) g, g a gradient of the dihedral with g . dx = theta1 - t
 positions that differ by a rotation the mean is smaller than either, which would turn the dihedral.
 With w the Cayley vector of the rotation of the hinge's four points (least squares) and
 A = (1 - skew(w)^2/4)^(1/2), the positions A x are free of that, and A^-1 grad theta(A x) has no
-resultant and no moment about x; its work differs from the change of the angle only to third order
-in the deformation within the step. The rest of the difference is made up along the deformation,
-dx less its rigid part, which has no resultant and no moment either.
+resultant and no moment about x. Its work differs from the change of the angle to the second order
+in the deformation within the step, to the third without a rotation. The rest of the difference is
+made up along the deformation, dx less its rigid part, which has no resultant and no moment either.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from foldyn.mechanics.energy import hinge_dihedral
 
 GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # the first of the two points of Gauss's rule
 NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
+LEAST = 1e-9  # strain or rad: over less than that Gauss's rule misses nothing
 ANGLE_NOISE = 4e-15  # the same of a dihedral, rad
 
 
@@ -61,7 +62,7 @@ def mean_stress(code, address, x, change):
     before = bar_energy(code, _extension(x), address[0])
     after = bar_energy(code, _extension(x + 2.0 * change), address[0])
     missed = after - before - stress * change
-    if abs(missed) > NOISE * max(abs(before), abs(after)):
+    if abs(change) > LEAST and abs(missed) > NOISE * max(abs(before), abs(after)):
         stress += missed / change
     return stress, slope
 
@@ -77,7 +78,9 @@ def mean_moment(code, address, p, rest, theta, change):
     before = hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
     after = hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
     missed = after - before - moment * change
-    if abs(missed) > NOISE * max(abs(before), abs(after)):
+    # what stress-free laws subtract cancels digits
+    size = abs(p[3]) + abs(p[2]) * (abs(theta - rest) + abs(change))
+    if abs(change) > LEAST and abs(missed) > NOISE * (max(abs(before), abs(after)) + size):
         moment += missed / change
     return moment, slope
 

@@ -95,7 +95,8 @@ class Bench:
         self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
         q, w, a, force = (np.zeros(shape) for _ in range(4))
         self.new = Phase(q, w, a, force, np.zeros(histories))
-        self.speed = course.v.copy()  # mean velocity of the last step
+        # mean velocity of the last step, and its change per time from the middle of one to another
+        self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         model = packed.model
         self._hinges: BarsHinges = model._replace(bar_runs=model.bar_runs[:0])
@@ -107,7 +108,8 @@ class Bench:
         packed = self.packed
         acceleration(packed.model, packed.system, packed.mass, old.q, old.w, t, old.a, self.work, s)
         old.a[self.massless] = 0.0
-        self.speed[:] = old.w
+        self._speed[:], self._last = old.w, 0.0
+        self._growth[:] = 0.0
         old.force[:], old.factor[:] = s.force, s.factor
 
     def hinge_forces(self) -> float:
@@ -132,15 +134,18 @@ class Bench:
         return out
 
     def predict(self, h: float) -> None:
-        """Move new.q on with the mean velocity of the last step.
+        """Move new.q on as the mean velocities of the last steps go on.
 
-        Velocities at the ends of steps that do not resolve a vibration ring; their means do not.
+        The velocities at the ends of steps that do not resolve a vibration ring; means do not.
         """
-        self.new.q[:] = self.old.q + h * self.speed
+        ahead = 0.5 * (h + self._last)
+        self.new.q[:] = self.old.q + h * (self._speed + ahead * self._growth)
 
     def accept(self, h: float) -> None:
         """Make `new` the `old` one."""
-        self.speed[:] = (self.new.q - self.old.q) / h
+        speed = (self.new.q - self.old.q) / h
+        self._growth[:] = (speed - self._speed) / (0.5 * (h + self._last))
+        self._speed[:], self._last = speed, h
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
 

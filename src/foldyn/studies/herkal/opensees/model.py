@@ -24,7 +24,7 @@ from foldyn.materials import EnhancedLinear
 from foldyn.materials.linear import LinearHinge
 from foldyn.studies.herkal.opensees.mesh import Crease, PanelMesh, panel_mesh
 
-TIE = 10.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
+TIE = 100.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
 TOLERANCE = 1e-7  # m and rad: norm of the last correction of a step
 ITERATIONS = 60
 SECTION, TIE_MATERIAL = 1, 1  # their numbers

@@ -1,0 +1,101 @@
+"""Run cases with OpenSees and store what comes out.
+
+    python -m foldyn.studies.herkal.opensees.run case1 case2 --divisions 16 --motion --dt 0.005
+
+writes statics and frequencies, and with `--motion` the motion instead, to `--out`, by default the
+folder of stored results.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from foldyn.cases import CaseFile, read_case
+from foldyn.errors import FoldynError
+from foldyn.studies import find_case
+from foldyn.studies.herkal.opensees.model import PanelShells
+from foldyn.studies.herkal.opensees.stored import (
+    CASES,
+    RESULTS,
+    Moved,
+    Still,
+    write_motion,
+    write_still,
+)
+
+DT = 0.005  # s
+SAMPLES = 0.01  # s, between those that are stored
+
+
+def still(name: str, divisions: int) -> Still:
+    """Statics under the loads of a case, and its frequencies at rest."""
+    case_file, shells = _shells(name, divisions)
+    path, node = shells.path(), case_file.output.nodes
+    return Still(
+        node=node,
+        load_factor=path.at,
+        displacement=path.displacement[:, node],
+        frequency=shells.frequencies(),
+        about=_about(name, shells) | {"iterations": path.iterations, "seconds": path.seconds},
+    )
+
+
+def motion(name: str, divisions: int, dt: float) -> Moved:
+    """Motion of a case for as long as its file says."""
+    case_file, shells = _shells(name, divisions)
+    duration, node = case_file.analysis.arguments["duration"], case_file.output.nodes
+    found = shells.motion(duration, dt, every=max(1, round(SAMPLES / dt)))
+    about = {"dt": dt, "iterations": found.iterations, "seconds": found.seconds}
+    return Moved(
+        node=node,
+        time=found.at,
+        displacement=found.displacement[:, node],
+        about=_about(name, shells) | about,
+    )
+
+
+def _shells(name: str, divisions: int) -> tuple[CaseFile, PanelShells]:
+    case_file = read_case(find_case(f"herkal/{name}"))
+    return case_file, PanelShells(case_file.case(), divisions)
+
+
+def _about(name: str, shells: PanelShells) -> dict[str, Any]:
+    return {
+        "case": name,
+        "divisions": shells.divisions,
+        "triangles": len(shells.mesh.triangles),
+        "nodes": len(shells.mesh.points),
+        "opensees": version("opensees"),
+    }
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run what the command line says."""
+    parser = argparse.ArgumentParser(description="Run cases with OpenSees.")
+    parser.add_argument("cases", nargs="+", choices=CASES)
+    parser.add_argument("--divisions", type=int, nargs="+", default=[16])
+    parser.add_argument("--motion", action="store_true", help="the motion, not statics")
+    parser.add_argument("--dt", type=float, default=DT, help="time step of the motion, s")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results")
+    chosen = parser.parse_args(arguments)
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    for divisions in chosen.divisions:
+        for name in chosen.cases:
+            try:
+                if chosen.motion:
+                    path = write_motion(chosen.out, motion(name, divisions, chosen.dt))
+                else:
+                    path = write_still(chosen.out, still(name, divisions))
+            except FoldynError as error:
+                print(error, file=sys.stderr)
+                return 1
+            print(path.name, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
