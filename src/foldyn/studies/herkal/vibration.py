@@ -1,0 +1,150 @@
+"""The vibration of the paper specimen, computed from the shipped cases beside the paper's values.
+
+`python -m foldyn.studies.herkal.vibration` prints the table (about a minute).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from foldyn.cases import Case, Rayleigh, read_case
+from foldyn.dynamics import simulate
+from foldyn.linear import character, frf, modes, peaks_of
+from foldyn.signals import LogDecrement, log_decrement, matrix_pencil
+from foldyn.studies import find_case
+from foldyn.studies.targets import Verdict, read_targets, verdicts
+
+if TYPE_CHECKING:
+    import xarray
+
+TARGETS = Path(__file__).with_name("targets.toml")
+CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
+WATCHED = 8  # the paper's node 9, next to the top
+RELEASED = 2.0  # s, when the weight is taken away,
+SETTLED = 0.05  # and how long after it the first minimum is
+PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
+ORDINALS = ("first", "second", "third")
+
+
+@dataclass(frozen=True)
+class Response:
+    """Peaks of a frequency response at a corner of the top, along the axis.
+
+    Attributes
+    ----------
+    frequencies : tuple of float
+        Hz.
+    damping : tuple of float
+        From the half-power points, textbook formula; nan where there are none.
+    """
+
+    frequencies: tuple[float, ...]
+    damping: tuple[float, ...]
+
+
+def specimen(name: str, mass: str = "circumcenter", damping: Rayleigh | None = None) -> Case:
+    """A shipped case of the specimen ("modes", "frf-published", ...) with another damping."""
+    case = read_case(find_case(f"herkal/specimen-{name}")).case(mass)
+    return case if damping is None else replace(case, damping=damping)
+
+
+def analysis(name: str) -> dict[str, Any]:
+    """Arguments of the analysis of a shipped case."""
+    return dict(read_case(find_case(f"herkal/specimen-{name}")).analysis.arguments)
+
+
+def response(
+    published: bool = False, mass: str = "circumcenter", damping: Rayleigh = PAIR,
+    **changes: Any,
+) -> Response:  # fmt: skip
+    """Peaks of the specimen's response to a sine of 0.001 N on each top node.
+
+    Parameters
+    ----------
+    published : bool
+        Whether the folds have a moment at rest, as published.
+    mass : str
+    damping : Rayleigh
+    **changes
+        Other arguments of `frf`.
+    """
+    name = "frf-published" if published else "frf"
+    damping = replace(damping, state="start" if published else "rest")
+    found = frf(specimen(name, mass, damping), **{**analysis(name), **changes})
+    peaks = [p for p in peaks_of(found, CORNER, "x", prominence=0.02) if p.frequency < 22.0]
+    return Response(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
+
+
+@dataclass(frozen=True, eq=False)
+class Release:
+    """Free vibration of node 8 along x after the weight is taken away.
+
+    Attributes
+    ----------
+    decrement : LogDecrement
+        From the maxima, as the paper has it; few of them are left above a tenth of the first.
+    frequency, damping_ratio : float
+        Of the strongest decaying cosine between 7 and 12 Hz (Hz): the motion has several modes,
+        which maxima mix.
+    motion : xarray.Dataset
+    """
+
+    decrement: LogDecrement
+    frequency: float
+    damping_ratio: float
+    motion: xarray.Dataset
+
+
+def released(damping: Rayleigh = ALONE, **changes: Any) -> Release:
+    """Free vibration of the specimen after its weight is taken away.
+
+    Parameters
+    ----------
+    damping : Rayleigh
+    **changes
+        Other arguments of `simulate`.
+    """
+    motion = simulate(specimen("release", damping=damping), **{**analysis("release"), **changes})
+    late = motion.sel(time=slice(RELEASED + SETTLED, None))
+    x = late["displacement"].sel(node=WATCHED, axis="x").values
+    step = float(late["time"][1] - late["time"][0])
+    found = matrix_pencil(x, step)
+    near = (found.damped_frequency > 7.0) & (found.damped_frequency < 12.0)
+    best = int(np.argmax(np.where(near, found.amplitude, 0.0)))
+    frequency, ratio = float(found.damped_frequency[best]), float(found.damping_ratio[best])
+    return Release(log_decrement(x, step, frequency=frequency), frequency, ratio, motion)
+
+
+def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Dataset:
+    """Modes of the specimen, with what they do: variables `name` and `share_of_name`."""
+    name = "modes-published" if published else "modes"
+    found = modes(specimen(name, mass), **analysis(name))
+    what = character(found, "x")
+    return found.assign(name=what["name"], share_of_name=what["share"].max("kind"))
+
+
+def vibration() -> list[Verdict]:
+    """The paper's values beside ours: stress-free folds, circumcenter mass."""
+    pair = response()
+    computed = {
+        f"frf_{which}_peak": f for which, f in zip(ORDINALS, pair.frequencies, strict=False)
+    }
+    computed |= {
+        f"half_power_{which}": 100.0 * ratio
+        for which, ratio in zip(ORDINALS, pair.damping, strict=False)
+    }
+    decrement = released().decrement
+    computed |= {
+        "release_frequency": decrement.damped_frequency,
+        "release_damping": 100.0 * decrement.damping_ratio,
+    }
+    return verdicts(read_targets(TARGETS), computed)
+
+
+if __name__ == "__main__":
+    for verdict in vibration():
+        print(verdict.line())
