@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 import foldyn as fd
 from foldyn.shells import Shell, ShellOptions
@@ -135,6 +135,21 @@ def equilibrium(
         if np.abs(step).max() < tolerance:
             return q
     raise AssertionError(f"no equilibrium: last step {np.abs(step).max():.1e}")
+
+
+def angular_frequencies(s: Shell, fixed, count: int, shift: float) -> NDArray:
+    """Lowest angular frequencies (rad/s): K with its rotations, M without; shift in rad/s."""
+    stiffness = tangent(s, at_rest(s)).tocsr()
+    rotations = sparse.csr_array((s.rotations, s.rotations))
+    mass = sparse.csr_array(sparse.block_diag([sparse.kron(s.mass, np.eye(3)), rotations]))
+    free = np.setdiff1d(np.arange(stiffness.shape[0]), fixed)
+    stiffness, mass = stiffness[free][:, free], mass[free][:, free]
+    solve = LinearOperator(stiffness.shape, matvec=factor(stiffness + shift**2 * mass))
+    start = mass @ np.random.default_rng(0).standard_normal(len(free))
+    square = eigsh(
+        stiffness, count, mass, sigma=-(shift**2), OPinv=solve, v0=start, return_eigenvectors=False
+    )
+    return np.sqrt(np.maximum(np.sort(square), 0.0))
 
 
 def rotation_matrix(seed: int) -> NDArray:

@@ -211,7 +211,7 @@ def test_slit_ring_lifted():
     table = np.array(list(SLIT_RING.values()))
     cells = np.array([4, 8, 12])
     errors = np.array([lifted_ring(int(n), 8 * int(n)) / table - 1.0 for n in cells])
-    assert (errors < 0.0).all()  # stiff, as flat triangles are where rulings cross their sides
+    assert (errors < 0.0).all()  # stiff: strains in the plane are constant in each triangle
     assert np.abs(errors[-1]).max() < 0.017
     assert np.abs(errors[:, 0]).max() < 0.02
     for case in np.abs(errors).reshape(3, -1).T:
