@@ -46,7 +46,7 @@ def energy(motion) -> np.ndarray:
 def test_free_flight_over_1e4_steps(mass):
     """Energy and angular momentum to 1e-8 (found: 1e-12), linear momentum to rounding.
 
-    The step is fifty times RK4's critical one, the folds turn by degrees back and forth.
+    The step is five times RK4's critical one, the folds turn by degrees back and forth.
     """
     case = free_sheet(mass=mass)
     dt = 1e-4
@@ -59,7 +59,7 @@ def test_free_flight_over_1e4_steps(mass):
     p, h = momenta(case, motion)
     assert drift(energy(motion)) < 1e-9
     assert drift(h) < 1e-9
-    assert drift(p) < 1e-11
+    assert drift(p) < 1e-13
 
 
 def test_steps_that_follow_their_error_conserve_too():
@@ -79,6 +79,7 @@ def test_large_steps_stay_robust():
     assert motion.attrs["halved_steps"] < 100
 
 
+@pytest.mark.filterwarnings("ignore:the energy balance")  # of the other method
 @pytest.mark.parametrize("bend_law", ["linear", "superlinear"])
 def test_snap_through_keeps_its_energy(bend_law):
     """A sheet pushed far from rest and let go: energies change hands, their sum stays."""
@@ -100,9 +101,8 @@ def test_other_methods_drift_with_the_square_of_the_step():
     for method in ("newmark", "generalized_alpha"):
         steps, lost = np.array([100, 200, 400]), []
         for n in steps:
-            motion = fd.simulate(
-                case, 0.02, method, dt=0.02 / n, every=int(n), initial=thrown(case)
-            )
+            dt = 0.02 / n
+            motion = fd.simulate(case, 0.02, method, dt=dt, every=int(n), initial=thrown(case))
             lost.append(np.linalg.norm(np.diff(momenta(case, motion)[1], axis=0)))
         assert observed_order(0.02 / steps, lost) == pytest.approx(2.0, abs=0.3)
 

@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 AUDITED = ("strain_bars", "strain_folds", "strain_bends", "kinetic", "dissipated", "work")
 
 
+def audited(groups: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the columns for a structure with these groups of strain energy."""
+    return (*groups, *AUDITED[3:])
+
+
 def energy_error(energy: NDArray) -> NDArray:
     """Kinetic + strain + dissipated - work minus its first value (J), per sample."""
     balance = energy[:, :5].sum(axis=1) - energy[:, 5]

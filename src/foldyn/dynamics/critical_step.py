@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from foldyn.cases import Case
-from foldyn.dynamics.methods import method_of
+from foldyn.dynamics.methods import suited
 from foldyn.dynamics.stability import stability_limit
 from foldyn.errors import ComputationError
 
@@ -85,7 +85,7 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     with which no vibration grows, for all frequencies w up to the highest of the structure: for
     RK4 ``|R(s dt)| <= 1``.
     """
-    growth = method_of(method).growth
+    growth = suited(method, case.structure).growth
     if growth is None:
         return np.inf
     alpha, beta = case.damping.alpha, case.damping.beta

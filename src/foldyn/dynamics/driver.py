@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import generalized_alpha
+from foldyn.dynamics.choice import AUTO, choose
 from foldyn.dynamics.course import Plan
 from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import check_mass, is_lumped
-from foldyn.dynamics.methods import Method, method_of
+from foldyn.dynamics.methods import Method, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
     check_memory,
+    counted_in_seconds,
     expected_samples,
     fixed_steps,
     positive,
@@ -51,8 +53,8 @@ def simulate(
     force: bool = False,
     tolerance: float | None = None,
     start: float = 0.0,
-    spectral_radius: float | None = None,
     progress: bool | Reporter | None = None,
+    spectral_radius: float | None = None,
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
 
@@ -134,7 +136,7 @@ def prepare(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
-    integrator = method_of(method)
+    integrator = method_of("rk4") if method == AUTO else suited(method, case.structure)
     positive("duration", duration)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
@@ -145,6 +147,13 @@ def prepare(
     if isinstance(start, bool) or not isinstance(start, Real) or not math.isfinite(start):
         raise InputError(f"start = {start!r}: give a finite time (s)")
     u, v = check_start(case, initial)
+    reason = ""
+    if method == AUTO:
+        counted_in_seconds(duration, every)
+        method, reason = choose(
+            case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE
+        )
+        integrator = method_of(method)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.structure.mass):
         check_mass(case.structure.mass, case.fixed)
@@ -170,7 +179,7 @@ def prepare(
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u)
     beginning = partial(begin, case, u, v, plan, packed)
-    return Motion(case, integrator, plan, critical, force, beginning, packed)
+    return Motion(case, integrator, plan, critical, force, beginning, packed, reason)
 
 
 def _with_radius(method: Method, spectral_radius: float | None) -> Method:

@@ -12,6 +12,7 @@ Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not r
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ class EnergyMomentum:
 
     symmetric = False
     tolerance = TOLERANCE
+    facts: Mapping[str, float] = {}
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
@@ -68,8 +70,8 @@ class EnergyMomentum:
         """See `Scheme`."""
         b, packed = self.bench, self.bench.packed
         return residual(
-            packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.out, b.course.angle,
-            b.work.angle, b.scratch,
+            packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.shift, b.out,
+            b.course.angle, b.work.angle, b.scratch,
         )  # fmt: skip
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
@@ -87,7 +89,7 @@ class EnergyMomentum:
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
         b, packed = self.bench, self.bench.packed
-        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.scratch)
+        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
         if packed.system.turns:
             u0, u1 = b.displacement(), b.moved()
             done += _actuation(packed.model, packed.system, b.old, b.new, u0, u1, b.scratch)
@@ -100,7 +102,7 @@ class EnergyMomentum:
 
 
 @kernel
-def residual(model, system, mass, h, t, old, new, out, angle0, angle1, s):
+def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N.
 
     The dihedrals angle0 (nh,) belong to the start; angle1 gets those of the end.
@@ -108,15 +110,16 @@ def residual(model, system, mass, h, t, old, new, out, angle0, angle1, s):
     model, system, mass = borrowed(model), borrowed(system), borrowed(mass)
     old, new, s = borrowed(old), borrowed(new), borrowed(s)
     q0, w0, q1, w1, a1 = flat(old.q), flat(old.w), flat(new.q), flat(new.w), flat(new.a)
-    x, left, bracket = flat(s.moving), flat(out), flat(new.force)
+    d, x, left, bracket = flat(shift), flat(s.moving), flat(out), flat(new.force)
     for i in range(q0.size):
-        w1[i] = 2.0 * (q1[i] - q0[i]) / h - w0[i]
+        q1[i] = q0[i] + d[i]
+        w1[i] = 2.0 * d[i] / h - w0[i]
         a1[i] = (w1[i] - w0[i]) / h
         x[i] = a1[i] + system.alpha * 0.5 * (w0[i] + w1[i])
     for node in range(mass.diagonal.size):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
-                a1[i], w1[i] = 0.0, (q1[i] - q0[i]) / h
+                a1[i], w1[i] = 0.0, d[i] / h
     if system.varies and t != s.time[0]:
         evaluate(system.waves, t, system.moves or system.turns, s.factor)
         s.time[0] = t
@@ -160,14 +163,12 @@ def _place(moved, phase, out):
 
 
 @kernel
-def _works(system, mass, h, old, new, s):
+def _works(system, mass, h, old, new, shift, s):
     """Work put in and energy dissipated in a step."""
     moved, loads, bracket = system.moved, system.loads, flat(new.force)
-    _place(moved, old, s.displacement)
-    _place(moved, new, s.velocity)
-    u0, u1, speed = flat(s.displacement), flat(s.velocity), flat(s.moving)
-    for i in range(u0.size):
-        u1[i] -= u0[i]
+    du, speed = flat(s.displacement), flat(s.moving)
+    for i in range(du.size):
+        du[i] = flat(shift)[i]
         speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
     done, lost = 0.0, 0.0
     if system.alpha > 0.0:
@@ -176,16 +177,17 @@ def _works(system, mass, h, old, new, s):
         done += system.alpha * h * jolts
         lost += system.alpha * h * (2.0 * kinetic_energy(mass, s.moving, s.product) + jolts)
     for k in range(moved.dof.size):
-        row = moved.row[k]
-        shift = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
-        done += bracket[moved.dof[k]] * shift
+        dof, row = moved.dof[k], moved.row[k]
+        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        du[dof] += along
+        done += bracket[dof] * along
     for k in range(loads.dof.size):
         row = loads.row[k]
         mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
-        done += loads.value[k] * mean * u1[loads.dof[k]]
+        done += loads.value[k] * mean * du[loads.dof[k]]
     for i in range(system.stiff_indptr.size - 1):
         for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-            lost += u1[i] * system.stiff_data[k] * u1[system.stiff_indices[k]] / h
+            lost += du[i] * system.stiff_data[k] * du[system.stiff_indices[k]] / h
     return done, lost
 
 

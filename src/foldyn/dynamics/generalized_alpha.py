@@ -28,6 +28,6 @@ def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Bench], Alpha]
     """Make the steps of the method for a spectral radius."""
 
     def make(bench: Bench) -> Alpha:
-        return Alpha(bench, parameters(spectral_radius))
+        return Alpha(bench, parameters(spectral_radius), {"spectral_radius": spectral_radius})
 
     return make

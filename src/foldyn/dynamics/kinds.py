@@ -39,6 +39,51 @@ def angles_of(model: BarsHinges | ShellModel, u: NDArray) -> NDArray:
     return mechanics.angles(model.rest + u, model.hinges)
 
 
+def hinges_alone(model: Any) -> Any:
+    """The model without what stretches: what remains are forces at play where all is at rest."""
+    if isinstance(model, ShellModel):
+        return model._replace(membrane=np.zeros_like(model.membrane))
+    return model._replace(bar_runs=model.bar_runs[:0])
+
+
+def put_force(model: Any, u: NDArray, force: NDArray, work: Any) -> None:
+    """Internal force (rows, 3) at u (rows, 3), outside of compiled loops."""
+    if isinstance(model, ShellModel):
+        n, end = model.nodes, 3 * model.nodes + model.rotations
+        moved, out = u.reshape(-1), force.reshape(-1)
+        out[end:] = 0.0
+        shell_force(model, u[:n], moved[3 * n : end], force[:n], out[3 * n : end], work)
+    else:
+        internal_force(model, u, force, work, False)
+
+
+def stretching_forces(model: Any) -> float:
+    """Norm (N) of the nodes' forces under a strain of one: what rounding is a fraction of."""
+    if isinstance(model, ShellModel):
+        nodal = np.zeros(model.nodes)
+        stiff = np.abs(model.membrane).sum(axis=2) * np.sqrt(model.per_length2)
+        for end in (0, -1):
+            np.add.at(nodal, np.roll(model.triangles, end, axis=1), stiff)
+    else:
+        nodal = np.zeros(len(model.rest))
+        stiff = model.bar_stiffness / np.sqrt(model.bar_per_length2)
+        np.add.at(nodal, model.bars, stiff[:, None])
+    return float(np.sqrt(3.0) * np.linalg.norm(nodal))
+
+
+def longest(model: Any) -> float:
+    """Length (m) of the longest bar or side."""
+    per_length2 = model.per_length2 if isinstance(model, ShellModel) else model.bar_per_length2
+    return float(1.0 / np.sqrt(per_length2.min(initial=1.0)))
+
+
+def fold_rest(model: Any) -> tuple[NDArray, NDArray]:
+    """Rest angles (rad) of what actuators turn, and the hinges (rows of `model.hinges`) there."""
+    if isinstance(model, ShellModel):
+        return model.piece_rest, model.piece_hinge
+    return model.hinge_rest, np.arange(len(model.hinge_rest))
+
+
 def force_of(model: Any, u: Any, force: Any, work: Any) -> Any:
     """Internal force (rows, 3) at u (rows, 3): `mechanics.internal_force` or its like."""
     raise NotImplementedError  # compiled code has one of those below

@@ -22,6 +22,7 @@ from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.stability import Growth
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
+from foldyn.shells import Shell
 
 
 class Method(NamedTuple):
@@ -42,6 +43,8 @@ class Method(NamedTuple):
         Whether it always chooses its steps by their error.
     scheme : callable, optional
         Of an implicit method: its steps from a `Bench`.
+    massless : bool
+        Whether it takes dofs without mass beside the displacements, those of a shell.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Method(NamedTuple):
     growth: Growth | None = None
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
+    massless: bool = False
 
     @property
     def implicit(self) -> bool:
@@ -81,12 +85,13 @@ METHODS: Mapping[str, Method] = {
             dormand_prince.growth,
             adaptive=True,
         ),
-        Method("newmark", newmark.ORDER, residual, scheme=newmark.scheme),
+        Method("newmark", newmark.ORDER, residual, scheme=newmark.scheme, massless=True),
         Method(
             "generalized_alpha",
             generalized_alpha.ORDER,
             residual,
             scheme=generalized_alpha.scheme(),
+            massless=True,
         ),
         Method(
             "energy_momentum",
@@ -101,8 +106,20 @@ METHODS: Mapping[str, Method] = {
 def method_of(name: str) -> Method:
     """Integrator by its name."""
     if not isinstance(name, str) or name not in METHODS:
-        raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
+        raise InputError(f"method = {name!r}: choose auto or one of {', '.join(METHODS)}")
     return METHODS[name]
+
+
+def suited(name: str, structure: Any) -> Method:
+    """Integrator by its name, for a structure."""
+    method = method_of(name)
+    if isinstance(structure, Shell) and not method.massless:
+        fit = ", ".join(other.name for other in METHODS.values() if other.massless)
+        raise InputError(
+            f"method = {name!r}: the rotations of a shell have no mass, which this method needs; "
+            f"choose one of {fit}"
+        )
+    return method
 
 
 def compiled(name: str) -> bool:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics import outcome
-from foldyn.dynamics.audit import AUDITED, energy_error, energy_scale
+from foldyn.dynamics.audit import AUDITED, audited, energy_error, energy_scale
 from foldyn.dynamics.course import Course, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
+from foldyn.dynamics.kinds import fold_rest, longest, stretching_forces
 from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.stability import is_stable, stability_limit
@@ -122,8 +123,8 @@ class Motion:
         """Relative energy error so far; raises where the energy has exploded."""
         energy = self._out.energy[: self.stored]
         error, scale = energy_error(energy), energy_scale(energy)
-        stiffness = self.case.structure.model.bar_stiffness
-        negligible = 1e-24 * float((stiffness * self.case.structure.bar_length.max() ** 2).sum())
+        model = self._packed.model
+        negligible = 1e-24 * stretching_forces(model) * longest(model)
         if scale <= negligible:
             return 0.0
         relative = np.abs(error) / scale
@@ -165,7 +166,8 @@ class Motion:
         plan, course, order = self.plan, self._course, self._packed.numbering.order
         model = self._packed.model
         moment = f"t = {course.clock[0]:.6g} s (step {course.count[0]})"
-        turned = np.flatnonzero(np.isnan(model.hinge_rest))
+        rest, rows = fold_rest(model)
+        turned = rows[np.isnan(rest)]
         if len(turned):
             j, k = order[model.hinges[turned[0], :2]].tolist()
             raise InstabilityError(
@@ -208,7 +210,9 @@ class Motion:
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
         plan, n, out = self.plan, self.stored, self._out
-        energies: dict[str, NDArray] = dict(zip(AUDITED, out.energy[:n].T, strict=True))
+        energies: dict[str, NDArray] = dict(
+            zip(audited(self.case.structure.energy_groups), out.energy[:n].T, strict=True)
+        )
         return trajectory_dataset(
             self.case, out.time[:n], out.displacement[:n], out.velocity[:n], out.reaction[:n],
             energies, self._statistics(plan),

@@ -32,7 +32,7 @@ def fixed_steps(
     half the critical one, shortened so that it divides the sampling interval and the duration.
     """
     duration = positive("duration", duration)
-    in_seconds = _in_seconds(duration, every)
+    in_seconds = counted_in_seconds(duration, every)
     if dt is None:
         target = DEFAULT_FRACTION * critical
         if not math.isfinite(target):
@@ -66,7 +66,7 @@ def variable_steps(
     Without `dt` it is `largest`, at most a tenth of the motion.
     """
     duration = positive("duration", duration)
-    in_seconds = _in_seconds(duration, every)
+    in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
     interval = float(every) if in_seconds else 0.0
@@ -84,7 +84,7 @@ def expected_samples(plan: Plan) -> int:
     return math.floor((plan.end - plan.start) / plan.interval * (1.0 + 1e-12) + 1e-9) + 1
 
 
-def _in_seconds(duration: float, every: int | float) -> bool:
+def counted_in_seconds(duration: float, every: int | float) -> bool:
     """Whether a sampling interval is in seconds; refuses one that fits no motion."""
     if isinstance(every, bool) or not isinstance(every, Real):
         raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")

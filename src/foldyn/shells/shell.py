@@ -11,12 +11,12 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.patterns import Pattern
+from foldyn.shells.balance import balanced_rotations
 from foldyn.shells.element import side_stiffness, without_free_sides
 from foldyn.shells.kernels import ShellModel, shell_energy, shell_force, shell_work
 from foldyn.shells.mesh import Edge, shell_mesh
@@ -30,9 +30,6 @@ from foldyn.structures.discretize import per_crease
 from foldyn.structures.mass import MASS_RULES, Surface
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
-ITERATIONS = 50  # of the balance of rotations
-BALANCED = 1e-13  # rad, of the last step
-FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
 GROUPS = ("strain_membrane", "strain_bending", "strain_folds")
 
 
@@ -157,7 +154,7 @@ class Shell:
             nodes=len(self.nodes),
             rotations=self.rotations,
             rest=rest,
-            triangles=self.triangles,
+            triangles=self.triangles.copy(),
             side=np.ascontiguousarray(side),
             per_length2=1.0 / np.einsum("tki,tki->tk", side, side),
             membrane=np.ascontiguousarray(membrane),
@@ -171,7 +168,7 @@ class Shell:
             piece_hinge=found.piece_hinge,
             piece_rotations=found.piece_rotations,
             piece_stiffness=(self.fold_stiffness / whole)[found.piece_crease] * length,
-            piece_rest=self.piece_rest,
+            piece_rest=self.piece_rest.copy(),
             piece_parameters=law.parameters(self.piece_rest).reshape(-1, 4),
             code=int(law.code),
             addresses=np.array(law.addresses or (0, 0, 0), np.int64),
@@ -240,16 +237,8 @@ class Shell:
 
     def balanced(self, u: ArrayLike) -> NDArray:
         """Rotations (r,) about which there is no moment at displacement u (n, 3)."""
-        u, x = self._state(u, np.zeros(self.rotations))
-        first = u.size
-        for _ in range(ITERATIONS):
-            couple = self.forces(u, x)[1]
-            stiffness = self.tangent(u, x, FLOOR)[first:][:, first:]
-            step = splu(sparse.csc_array(stiffness)).solve(-couple)
-            x = x + step
-            if np.abs(step).max(initial=0.0) <= BALANCED:
-                return x
-        raise ComputationError("the rotations of the shell find no balance at this displacement")
+        u, _ = self._state(u, np.zeros(self.rotations))
+        return balanced_rotations(self.model, self.sparsity, u)
 
     def _state(self, u: ArrayLike, rotation: ArrayLike | None) -> tuple[NDArray, NDArray]:
         array = np.ascontiguousarray(u, float)

@@ -17,6 +17,7 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.mechanics import BarsHinges
 from foldyn.shells import Shell
+from foldyn.shells.balance import balanced_rotations
 from foldyn.shells.extrapolated import add_extrapolated_strain
 from foldyn.shells.kernels import ShellModel, shell_energy, shell_force, shell_work
 from foldyn.shells.shell import GROUPS as SHELL_GROUPS
@@ -224,10 +225,9 @@ class ShellBody:
 
     def dofs(self, displacement: NDArray) -> NDArray:
         """See `Body`."""
-        u = np.asarray(displacement, float)
-        if not u.any():
-            return np.zeros(self.size)
-        return np.concatenate([u.ravel(), self.structure.balanced(u)])
+        u = np.ascontiguousarray(displacement, float).reshape(-1, 3)
+        rotation = balanced_rotations(self.model, self.structure.sparsity, u)
+        return np.concatenate([u.ravel(), rotation])
 
     def internal(self, q: NDArray) -> NDArray:
         """See `Body`."""

@@ -14,6 +14,7 @@ b1 is what equilibrium at the end needs (Erlicher, Bonaventura and Bursi, Comput
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -22,13 +23,13 @@ from numpy.typing import NDArray
 from foldyn.dynamics.actuation import actuator_power, turn
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
-from foldyn.dynamics.implicit.tangent import put_tangent
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import acceleration, moving_energy
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 
+NONE: Mapping[str, float] = {}
 TOLERANCE = 1e-7  # of the residual; see `Scheme`
 
 
@@ -47,8 +48,10 @@ class Alpha:
     symmetric = True
     tolerance = TOLERANCE
 
-    def __init__(self, bench: Bench, parameters: Parameters) -> None:
-        self.bench, self._p = bench, parameters
+    def __init__(
+        self, bench: Bench, parameters: Parameters, facts: Mapping[str, float] = NONE
+    ) -> None:
+        self.bench, self._p, self.facts = bench, parameters, facts
 
     def begin(self, t: float) -> None:
         """See `Scheme`."""
@@ -69,20 +72,20 @@ class Alpha:
         """See `Scheme`."""
         b, packed = self.bench, self.bench.packed
         return residual(
-            packed.model, packed.system, packed.mass, self._p, h, t, b.old, b.new, b.out, b.work,
-            b.scratch,
+            packed.model, packed.system, packed.mass, self._p, h, t, b.old, b.new, b.shift, b.out,
+            b.work, b.scratch,
         )  # fmt: skip
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
         b = self.bench
         model = b.packed.model
-        put_tangent(model, matrix.pattern, b.moved(), before, again, matrix.stiffness)
+        matrix.blocks.put(model, matrix.pattern, b.moved(), before, again, matrix.stiffness)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         b, packed = self.bench, self.bench.packed
-        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.scratch)
+        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
         if packed.system.turns:
             angle = b.course.angle
             done += _actuation(packed.model, packed.system, b.old, b.new, angle, b.work.angle)
@@ -100,22 +103,23 @@ class Alpha:
 
 
 @kernel
-def residual(model, system, mass, p, h, t, old, new, out, work, s):
+def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     old, new, s = borrowed(old), borrowed(new), borrowed(s)
     am, af, beta, gamma = p
     q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
     q1, w1, a1, b1 = flat(new.q), flat(new.w), flat(new.a), flat(new.force)
-    x, left = flat(s.moving), flat(out)
+    d, x, left = flat(shift), flat(s.moving), flat(out)
     curvature = 1.0 / (beta * h * h)
     for i in range(q0.size):
-        a1[i] = curvature * (q1[i] - q0[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
+        q1[i] = q0[i] + d[i]
+        a1[i] = curvature * (d[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
         w1[i] = w0[i] + h * ((1.0 - gamma) * a0[i] + gamma * a1[i])
     for node in range(mass.diagonal.size):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
-                a1[i], w1[i] = 0.0, (q1[i] - q0[i]) / h
+                a1[i], w1[i] = 0.0, d[i] / h
     acceleration(model, system, mass, new.q, new.w, t, out, work, s)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
@@ -135,13 +139,13 @@ def residual(model, system, mass, p, h, t, old, new, out, work, s):
 
 
 @kernel
-def _works(system, mass, h, old, new, s):
+def _works(system, mass, h, old, new, shift, s):
     """Work put in and energy dissipated in a step."""
-    q0, q1, du = flat(old.q), flat(new.q), flat(s.displacement)
+    du = flat(s.displacement)
     v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
     moved, loads = system.moved, system.loads
-    for i in range(q0.size):
-        du[i] = q1[i] - q0[i]
+    for i in range(du.size):
+        du[i] = flat(shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
     done, lost = 0.0, 0.0
     if system.alpha > 0.0:
@@ -152,10 +156,10 @@ def _works(system, mass, h, old, new, s):
         lost += system.alpha * h * jolts
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]
-        shift = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
-        du[dof] += shift
+        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        du[dof] += along
         flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
-        done += 0.5 * (b0[dof] + b1[dof]) * shift
+        done += 0.5 * (b0[dof] + b1[dof]) * along
     for k in range(loads.dof.size):
         row = loads.row[k]
         mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])

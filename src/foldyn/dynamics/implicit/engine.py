@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Found, Newton
 from foldyn.dynamics.implicit.scheme import Bench, Scheme
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.kinds import longest
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.materials.compiled import kernel
 
@@ -50,14 +52,14 @@ class Implicit:
         self._make, self._packed, self._jumps = make, packed, sorted(set(jumps))
         self._newton: Newton | None = None
         self._halved = 0
-        self._size = FLOOR / math.sqrt(float(packed.model.bar_per_length2.min(initial=1.0)))
+        self._size = FLOOR * longest(packed.model)
 
-    def facts(self) -> dict[str, object]:
+    def facts(self) -> dict[str, Any]:
         """Statistics of the run."""
         newton = self._newton
         if newton is None:
             return {}
-        return {
+        return dict(newton.scheme.facts) | {
             "iterations": newton.iterations,
             "factorizations": newton.matrix.factorizations,
             "linear_solver": newton.matrix.solver,
@@ -109,12 +111,11 @@ class Implicit:
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_stop(t, end, SAME_TIME * plan.dt)
-            parts = max(1, math.ceil((goal - t) / h * (1.0 - SAME_TIME)))
-            part = (goal - t) / parts
-            found, hinge = self._attempt(newton, part, t, goal if parts == 1 else t + part, jump)
+            part, stop, jump = _divide(t, goal, h, jump)
+            found, hinge = self._attempt(newton, part, stop, jump)
             if found == outcome.DONE:
-                t = goal if parts == 1 else t + part
-                self._accept(newton, course, part, t, jump and parts == 1)
+                self._accept(newton, course, part, stop, jump)
+                t = stop
                 continue
             if self._hopeless(part, plan.dt):
                 course.clock[TIME] = t
@@ -138,10 +139,8 @@ class Implicit:
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
                 return outcome.STUCK, -1
             goal, jump = self._next_stop(t, due, SAME_TIME * wanted)
-            parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
-            h = (goal - t) / parts
-            end = goal if parts == 1 else t + h
-            found, hinge = self._attempt(newton, h, t, end, jump)
+            h, end, jump = _divide(t, goal, wanted, jump)
+            found, hinge = self._attempt(newton, h, end, jump)
             if found != outcome.DONE:
                 if self._hopeless(h, plan.dt):
                     return found, hinge
@@ -154,12 +153,12 @@ class Implicit:
                 break
             clock[NEXT] = smaller_step(h, error)
             count[REFUSED] += 1
-        self._accept(newton, course, h, end, jump and parts == 1)
+        self._accept(newton, course, h, end, jump)
         count[STEPS] += 1
         clock[TIME], clock[SCALE] = end, scale
         error = remembered(error, clock[ERROR], h, clock[LAST] or h)
         clock[ERROR], clock[LAST] = error, h
-        clock[NEXT] = max(wanted if parts == 1 and error <= 1.0 else 0.0, next_step(h, error))
+        clock[NEXT] = max(wanted if end == goal else 0.0, next_step(h, error))
         clock[SMALLEST], clock[LARGEST] = min(clock[SMALLEST], h), max(clock[LARGEST], h)
         if count[STEPS] % plan.every == 0 if plan.every else waits and end == due:
             return self._note(newton, course, end, out), -1
@@ -175,32 +174,26 @@ class Implicit:
             return time, True
         return plan.end, time < plan.end + SAME_TIME * plan.interval
 
-    def _next_stop(self, t: float, end: float, near: float) -> tuple[float, bool]:
-        """Where a step from t has to end at the latest, and whether a load jumps there."""
+    def _next_stop(self, t: float, end: float, near: float) -> tuple[float, float | None]:
+        """Where a step from t has to end at the latest, and the jump of a load there."""
         for jump in self._jumps:
             if jump > end + near:
                 break
             if jump > t + near:
-                return (end, True) if abs(jump - end) <= near else (jump, True)
-        return end, False
+                return (end if abs(jump - end) <= near else jump), jump
+        return end, None
 
-    def _attempt(
-        self, newton: Newton, h: float, t: float, end: float, jump: bool
-    ) -> tuple[int, int]:
-        """Solve a step; returns (outcome, hinge)."""
+    def _attempt(self, newton: Newton, h: float, end: float, jump: float | None) -> tuple[int, int]:
+        """Solve a step that ends before the jump, if there is one; returns (outcome, hinge)."""
         bench = newton.scheme.bench
         bench.predict(h)
-        seen = end
-        if jump:
-            after = min(self._jumps, key=lambda time: abs(time - end))
-            seen = math.nextafter(min(end, after), -math.inf)
-        found = newton.solve(h, seen)
+        found = newton.solve(h, end if jump is None else math.nextafter(min(end, jump), -math.inf))
         if self._packed.callbacks.error is not None:
             return outcome.NOT_FINITE, -1
+        turned = np.abs(bench.work.angle - bench.course.angle)
+        if turned.max(initial=0.0) > TURN:
+            return outcome.PENETRATION, int(turned.argmax())
         if found is Found.YES:
-            turned = np.abs(bench.work.angle - bench.course.angle)
-            if len(turned) and not turned.max() < TURN:
-                return outcome.PENETRATION, int(turned.argmax())
             return outcome.DONE, -1
         code = outcome.NOT_FINITE if found is Found.NOT_FINITE else outcome.NOT_CONVERGED
         return code, -1
@@ -209,17 +202,17 @@ class Implicit:
         """Whether a smaller step would not help either."""
         return h < LEAST_STEP * wanted or self._packed.callbacks.error is not None
 
-    def _accept(self, newton: Newton, course: Course, h: float, t: float, jump: bool) -> None:
+    def _accept(
+        self, newton: Newton, course: Course, h: float, end: float, jump: float | None
+    ) -> None:
         scheme = newton.scheme
-        bench = scheme.bench
         done, lost = scheme.works(h)
         course.tally[0] += done
         course.tally[1] += lost
-        course.angle[:] = bench.work.angle
+        course.angle[:] = scheme.bench.work.angle
         scheme.accept(h)
-        if jump:
-            after = min(self._jumps, key=lambda time: abs(time - t))
-            scheme.begin(max(t, after))
+        if jump is not None:
+            scheme.begin(max(end, jump))
 
     def _error(self, newton: Newton, h: float, scale: float) -> tuple[float, float]:
         """Error of the worst node relative to the largest displacement so far, and the latter.
@@ -230,9 +223,20 @@ class Implicit:
         scheme, bench = newton.scheme, newton.scheme.bench
         scale = max(scale, float(np.abs(bench.moved()).max(initial=0.0)))
         change = scheme.change(h)
+        if not change.any() or not newton.matrix.factorized:
+            return 0.0, scale  # nothing has happened yet
         times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
         error = newton.matrix.solve(bench.out, bench.step)
         return float(np.abs(error).max(initial=0.0)) / max(scale, self._size), scale
+
+
+def _divide(
+    t: float, goal: float, wanted: float, jump: float | None
+) -> tuple[float, float, float | None]:
+    """Step from t, the first of equal ones to the goal, its end, and the jump if it is there."""
+    parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
+    h = (goal - t) / parts
+    return (h, goal, jump) if parts == 1 else (h, t + h, None)
 
 
 @kernel

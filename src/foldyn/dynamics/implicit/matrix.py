@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.implicit.banded import BandLU, Cholesky
+from foldyn.dynamics.implicit.blocks import blocks_of
 from foldyn.dynamics.system import Packed
 from foldyn.materials.compiled import kernel
-from foldyn.mechanics import Sparsity, node_order, sparsity
+from foldyn.mechanics import Sparsity
 from foldyn.mechanics.flat import flat
 from foldyn.statics.backends import factorizer
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
@@ -65,9 +66,10 @@ class StepMatrix:
 
     def __init__(self, packed: Packed, symmetric: bool) -> None:
         model, mass, system = packed.model, packed.mass, packed.system
-        nodes = len(model.rest)
+        self.blocks = blocks_of(model)
+        nodes = system.rows
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
-        self.pattern, where = _with_mass(sparsity(model), nodal)
+        self.pattern, where = _with_mass(self.blocks.pattern, nodal)
         shape = (len(self.pattern.indices), 3, 3)
         self.stiffness = np.zeros(shape)
         self._blocks = Blocks(self.stiffness, np.zeros(shape), np.zeros(shape))
@@ -80,7 +82,8 @@ class StepMatrix:
             self._blocks.damping[where] = blocks.data
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
-        along = (3 * node_order(model)[:, None] + np.arange(3)).ravel()
+        held[self.blocks.unused] = True
+        along = self.blocks.order
         self.free = along[~held[along]]
         self._symmetric = symmetric
         self._prepare(_entries(self.pattern, self.free, 3 * nodes))

@@ -47,13 +47,13 @@ class Newton:
     def prepare(self, h: float, t: float) -> None:
         """Have everything compiled that a step needs."""
         scheme, bench = self.scheme, self.scheme.bench
-        bench.new.q[:] = bench.old.q
+        bench.shift[:] = 0.0
         scheme.residual(h, t)
         scheme.tangent(self.matrix, bench.displacement(), False)
         scheme.works(h)
 
     def solve(self, h: float, t: float) -> Found:
-        """Move bench.new.q from its prediction to equilibrium at the end t of a step h (s)."""
+        """Move bench.shift from its prediction to equilibrium at the end t of a step h (s)."""
         scheme, bench = self.scheme, self.scheme.bench
         u0 = bench.displacement()
         least_force = bench.hinge_forces()
@@ -83,6 +83,6 @@ class Newton:
                     return Found.NOT_CONVERGED
                 self._h, kept = h, True
             before, fresh, last = bench.moved().copy(), True, norm
-            bench.new.q[:] -= self.matrix.solve(bench.out, bench.step)
+            bench.shift -= self.matrix.solve(bench.out, bench.step)
             self.iterations += 1
         return Found.NOT_CONVERGED

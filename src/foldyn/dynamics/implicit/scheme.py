@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.kinds import hinges_alone, put_force, stretching_forces, workspace_of
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.materials.compiled import kernel
-from foldyn.mechanics import BarsHinges, Workspace, internal_force, workspace
 from foldyn.mechanics.flat import flat
 
 EPS = float(np.finfo(float).eps)
@@ -28,7 +29,7 @@ class Phase(NamedTuple):
 
 
 class Scheme(Protocol):
-    """A step from `old` to `new`, whose unknown is new.q.
+    """A step from `old` to `new`, whose unknown is the displacement in it, bench.shift.
 
     Attributes
     ----------
@@ -37,11 +38,14 @@ class Scheme(Protocol):
     tolerance : float
         Residual, relative to the forces at play, with which a step is accepted.
     bench : Bench
+    facts : mapping
+        Its parameters, for the result's attributes.
     """
 
     symmetric: bool
     tolerance: float
     bench: Bench
+    facts: Mapping[str, float]
 
     def begin(self, t: float) -> None:
         """Make bench.old the beginning of a motion, or of its part after a jump, at t (s)."""
@@ -54,7 +58,8 @@ class Scheme(Protocol):
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """Out-of-balance force of the step to the time t (s), into bench.out.
 
-        Returns its norm on the free dofs and that of the forces at play, N.
+        Makes `new` what belongs to bench.shift. Returns the norm of the force on the free dofs
+        and that of the forces at play, N.
         """
         ...
 
@@ -88,10 +93,11 @@ class Bench:
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
-        self.work: Workspace = workspace(packed.model)
+        self.work: Any = workspace_of(packed.model)
         self.scratch: Scratch = scratch(packed.system)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
+        self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
         q, w, a, force = (np.zeros(shape) for _ in range(4))
         self.new = Phase(q, w, a, force, np.zeros(histories))
@@ -99,8 +105,8 @@ class Bench:
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
         model = packed.model
-        self._hinges: BarsHinges = model._replace(bar_runs=model.bar_runs[:0])
-        self.rounding = EPS * _stiffness_of_bars(model)
+        self._hinges = hinges_alone(model)
+        self.rounding = EPS * stretching_forces(model)
 
     def begin(self, t: float) -> None:
         """Make forces and accelerations of `old` those at the time t (s)."""
@@ -114,7 +120,7 @@ class Bench:
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
-        internal_force(self._hinges, self.displacement(), self.out, self.work, False)
+        put_force(self._hinges, self.displacement(), self.out, self.work)
         return float(np.linalg.norm(self.out))
 
     def displacement(self) -> NDArray:
@@ -134,27 +140,20 @@ class Bench:
         return out
 
     def predict(self, h: float) -> None:
-        """Move new.q on as the mean velocities of the last steps go on.
+        """Move on as the mean velocities of the last steps go on.
 
         The velocities at the ends of steps that do not resolve a vibration ring; means do not.
         """
         ahead = 0.5 * (h + self._last)
-        self.new.q[:] = self.old.q + h * (self._speed + ahead * self._growth)
+        self.shift[:] = h * (self._speed + ahead * self._growth)
 
     def accept(self, h: float) -> None:
         """Make `new` the `old` one."""
-        speed = (self.new.q - self.old.q) / h
+        speed = self.shift / h
         self._growth[:] = (speed - self._speed) / (0.5 * (h + self._last))
         self._speed[:], self._last = speed, h
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
-
-
-def _stiffness_of_bars(model: BarsHinges) -> float:
-    """Norm of the nodes' sums of E A, N: rounding of the residual is a fraction EPS of it."""
-    nodal = np.zeros(len(model.rest))
-    np.add.at(nodal, model.bars, (model.bar_stiffness / np.sqrt(model.bar_per_length2))[:, None])
-    return float(np.sqrt(3.0) * np.linalg.norm(nodal))
 
 
 @kernel

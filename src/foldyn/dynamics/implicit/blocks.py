@@ -1,0 +1,109 @@
+"""The tangent of a model as 3x3 blocks, whatever the kind of the model."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from foldyn.dynamics.implicit.tangent import put_tangent
+from foldyn.dynamics.kinds import rows_of
+from foldyn.mechanics import Sparsity, node_order, sparsity
+from foldyn.shells.extrapolated import add_extrapolated_strain
+from foldyn.shells.kernels import ShellModel, shell_work
+from foldyn.shells.sparsity import shell_pattern
+from foldyn.shells.tangent import shell_tangent
+from foldyn.statics.body import FLOOR
+
+
+class Blocks(Protocol):
+    """Blocks of a model's tangent.
+
+    Attributes
+    ----------
+    pattern : Sparsity
+        Where they stand.
+    order : ndarray of int
+        All dofs, 3 row + axis, in an order that keeps a factorization narrow.
+    unused : ndarray of int
+        Dofs that only fill up the last row.
+    """
+
+    pattern: Sparsity
+    order: NDArray
+    unused: NDArray
+
+    def put(
+        self, model: Any, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+    ) -> None:
+        """Fill `out` (nnz, 3, 3) of a pattern that contains this one; see `put_tangent`."""
+        ...
+
+
+class BarsHingesBlocks:
+    """Blocks of bars and hinges; see `Blocks`."""
+
+    def __init__(self, model: Any) -> None:
+        self.pattern = sparsity(model)
+        self.order = (3 * node_order(model)[:, None] + np.arange(3)).ravel()
+        self.unused = np.zeros(0, np.int64)
+
+    def put(
+        self, model: Any, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+    ) -> None:
+        """See `Blocks`."""
+        put_tangent(model, pattern, u, before, again, out)
+
+
+class ShellBlocks:
+    """Blocks of a shell, whose rotations follow the nodes, three to a row; see `Blocks`."""
+
+    def __init__(self, model: ShellModel) -> None:
+        self._own, self._work, rows = shell_pattern(model), shell_work(model), rows_of(model)
+        own = self._own
+        row = np.repeat(np.arange(own.size), np.diff(own.indptr))
+        ones = sparse.csr_array((np.ones(len(row), np.int8), own.indices, own.indptr))
+        ones.resize((3 * rows, 3 * rows))
+        blocks = ones.tobsr((3, 3))
+        blocks.sort_indices()
+        empty = np.zeros(0, np.int64)
+        self.pattern = Sparsity(
+            blocks.indptr.astype(np.int32), blocks.indices.astype(np.int32),
+            empty.reshape(0, 2, 2), empty.reshape(0, 4, 4),
+        )  # fmt: skip
+        self._row, self._column = row, own.indices.astype(np.int64)
+        self._place: tuple[Sparsity, NDArray] | None = None
+        self.order = reverse_cuthill_mckee(ones.tocsr(), symmetric_mode=True).astype(np.int64)
+        self.unused = np.arange(own.size, 3 * rows)
+
+    def put(
+        self, model: ShellModel, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
+        out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        n, end = model.nodes, 3 * model.nodes + model.rotations
+        rotation = u.reshape(-1)[3 * n : end]
+        floor = -np.inf if model.code < 0 else FLOOR
+        matrix = shell_tangent(model, self._own, u[:n], rotation, self._work, floor)
+        if again:
+            add_extrapolated_strain(model, self._own, u[:n], before[:n], matrix.data)
+        out[:] = 0.0
+        out.reshape(-1)[self._places(pattern)] = matrix.data
+
+    def _places(self, pattern: Sparsity) -> NDArray:
+        """Where the entries stand among those of a pattern's blocks."""
+        if self._place is None or self._place[0] is not pattern:
+            rows = len(pattern.indptr) - 1
+            node = np.repeat(np.arange(rows), np.diff(pattern.indptr))
+            keys = node * rows + pattern.indices
+            block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
+            self._place = pattern, 9 * block + 3 * (self._row % 3) + self._column % 3
+        return self._place[1]
+
+
+def blocks_of(model: Any) -> Blocks:
+    """Blocks of a model."""
+    return ShellBlocks(model) if isinstance(model, ShellModel) else BarsHingesBlocks(model)

@@ -1,0 +1,102 @@
+"""The paper's metric: how far the frequency content of a motion is from that of the shell.
+
+Per node the norm of the difference of the amplitude spectra up to a frequency, over the norm of the
+shell's spectrum; then the mean over the nodes that the case reports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.signals import sampling_interval, spectrum
+
+if TYPE_CHECKING:
+    import xarray
+
+UP_TO = 5.0  # Hz
+AXES = ("x", "y", "z")
+
+
+def content(
+    motion: xarray.Dataset, nodes: Sequence[int], axis: str, up_to: float = UP_TO
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequency content of one displacement component of some nodes.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        With `displacement` (m) at evenly spaced times.
+    nodes : sequence of int
+    axis : {"x", "y", "z"}
+    up_to : float
+        Highest frequency (Hz) that is kept.
+
+    Returns
+    -------
+    frequency : ndarray, shape (m,)
+        Hz.
+    amplitude : ndarray, shape (m, nodes)
+        m.
+    """
+    record = motion["displacement"].sel(node=list(nodes), axis=axis).transpose("time", "node")
+    frequency, amplitude = spectrum(record.values, sampling_interval(motion["time"].values))
+    kept = frequency <= up_to * (1.0 + 1e-9)
+    return frequency[kept], amplitude[kept]
+
+
+def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
+    """Norm of the difference of two spectra over the norm of the second, per node.
+
+    Parameters
+    ----------
+    amplitude, reference : array_like, shape (m, nodes)
+        Spectra at the same frequencies.
+
+    Returns
+    -------
+    ndarray, shape (nodes,)
+
+    Raises
+    ------
+    InputError
+        The spectra have different shapes, or the reference does not move a node.
+    """
+    ours, theirs = np.asarray(amplitude, float), np.asarray(reference, float)
+    if ours.shape != theirs.shape or ours.ndim != 2:
+        raise InputError(
+            f"amplitude: shape {ours.shape} beside {theirs.shape} of the reference: give spectra "
+            "(frequencies, nodes) of motions of the same length and sampling interval"
+        )
+    size = np.linalg.norm(theirs, axis=0)
+    if (size == 0.0).any():
+        raise InputError(
+            f"reference: node column {int(np.argmin(size))} does not move; leave it out"
+        )
+    return np.linalg.norm(ours - theirs, axis=0) / size
+
+
+def errors(
+    motion: xarray.Dataset,
+    reference: xarray.Dataset,
+    nodes: Sequence[int],
+    axis: str,
+    up_to: float = UP_TO,
+) -> NDArray[np.float64]:
+    """Deviation of the frequency content of a motion from that of a reference, per node.
+
+    The paper's metric is the mean of these.
+    """
+    return deviation(
+        content(motion, nodes, axis, up_to)[1], content(reference, nodes, axis, up_to)[1]
+    )
+
+
+def ranks(values: Mapping[str, float]) -> dict[str, int]:
+    """Rank of each model by its error: 1 for the smallest; models without an error have none."""
+    known = {name: value for name, value in values.items() if np.isfinite(value)}
+    return {name: 1 + sum(v < value for v in known.values()) for name, value in known.items()}

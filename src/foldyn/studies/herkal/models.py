@@ -1,0 +1,181 @@
+"""Models of the case studies: the rows of every table. A further model is one entry of `MODELS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any
+
+from foldyn.cases import Case, CaseFile, Force, HalfSine
+from foldyn.errors import InputError
+from foldyn.shells import shell
+from foldyn.structures import discretize
+
+REFERENCE = "shell"
+LOADS = ("file", "edge")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What differs from the case file; by default nothing.
+
+    Attributes
+    ----------
+    pulse : float or None
+        Duration (s) of the half-sine pulse.
+    loads : {"file", "edge"}
+        "edge": the file's force on each of the nodes that the case reports, the whole edge.
+    bend_law : {"linear", "superlinear"} or None
+    calibration : {"standard", "merlin2"} or None
+    """
+
+    pulse: float | None = None
+    loads: str = "file"
+    bend_law: str | None = None
+    calibration: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check what can be checked without a case."""
+        if self.loads not in LOADS:
+            raise InputError(f"loads = {self.loads!r}: choose one of {', '.join(LOADS)}")
+
+    @property
+    def name(self) -> str:
+        """Of its files; empty for the case file as it is."""
+        pulse = "" if self.pulse is None else f"pulse{self.pulse:g}"
+        loads = "" if self.loads == "file" else self.loads
+        return "-".join(filter(None, (pulse, loads, self.bend_law, self.calibration)))
+
+    @property
+    def options(self) -> dict[str, str]:
+        """Arguments of `discretize` that it changes."""
+        given = {"bend_law": self.bend_law, "calibration": self.calibration}
+        return {key: value for key, value in given.items() if value is not None}
+
+    @property
+    def of_shell(self) -> Variant:
+        """What of it the shell knows: it has neither bends nor a calibration of them."""
+        return replace(self, bend_law=None, calibration=None)
+
+
+AS_FILED = Variant()
+"""The case file as it is."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model of the sheet.
+
+    Attributes
+    ----------
+    name, label : str
+        In file names and in tables.
+    structure : callable
+        Makes the structure of a case file: ``structure(case_file, options, divisions)``; options
+        are changed arguments of `discretize`.
+    statics : str
+        Models with the same name here differ in mass only and share their equilibria.
+    paper : bool
+        Whether it is one of the paper's.
+    """
+
+    name: str
+    label: str
+    structure: Callable[[CaseFile, Mapping[str, Any], int], Any]
+    statics: str = "bars and hinges"
+    paper: bool = False
+
+
+def _bars_and_hinges(
+    mass: str, case_file: CaseFile, options: Mapping[str, Any], divisions: int
+) -> Any:
+    """Structure of the case file with a mass rule; `divisions` mean nothing to it."""
+    given = case_file.case().structure.options
+    arguments = {item.name: getattr(given, item.name) for item in fields(given)}
+    arguments |= {"mass": mass, **options}
+    return discretize(case_file.pattern, case_file.sheet, **arguments)
+
+
+def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> Any:
+    """Shell with the creases of the case file."""
+    given = case_file.case().structure.options
+    return shell(
+        case_file.pattern,
+        case_file.sheet,
+        divisions,
+        fold_law=given.fold_law,
+        crease_stiffness=given.crease_stiffness,
+        crease_rest=given.crease_rest,
+    )
+
+
+def _rule(name: str, label: str, paper: bool = False) -> Model:
+    return Model(name, label, partial(_bars_and_hinges, name), paper=paper)
+
+
+MODELS: Mapping[str, Model] = {
+    model.name: model
+    for model in (
+        Model(REFERENCE, "shell", _shell, statics="shell"),
+        _rule("equi_inertial", "equi-inertial", paper=True),
+        _rule("panel", "panel", paper=True),
+        _rule("centroid", "centroid", paper=True),
+        _rule("circumcenter", "circumcenter", paper=True),
+        _rule("consistent", "consistent", paper=True),
+        _rule("mixed_voronoi", "mixed Voronoi"),
+        _rule("inertia_exact", "inertia-exact"),
+    )
+}
+"""The reference and what is compared with it, in the order of the tables."""
+
+OTHERS: Mapping[str, Model] = {
+    "equi_inertial_acute": _rule("equi_inertial_acute", "equi-inertial, other corners"),
+}
+"""Models of the sensitivity alone."""
+
+
+def model_of(name: str) -> Model:
+    """Model by its name."""
+    known = {**MODELS, **OTHERS}
+    if name not in known:
+        raise InputError(f"model = {name!r}: choose one of {', '.join(known)}")
+    return known[name]
+
+
+def rules() -> tuple[str, ...]:
+    """Names of the models that are compared with the reference."""
+    return tuple(name for name in MODELS if name != REFERENCE)
+
+
+def paper_rules() -> tuple[str, ...]:
+    """Names of the paper's models."""
+    return tuple(name for name, model in MODELS.items() if model.paper)
+
+
+def case_with(
+    case_file: CaseFile, model: str, variant: Variant = AS_FILED, divisions: int = 16
+) -> Case:
+    """Case of a file with one of the models: same supports, loads and damping.
+
+    Raises
+    ------
+    InputError
+        No such model; the variant changes a pulse that the file does not have.
+    """
+    structure = model_of(model).structure(case_file, variant.options, divisions)
+    given = case_file.case()
+    loads = [_varied(load, case_file, variant) for load in given.loads]
+    return Case(structure, given.supports, loads, given.damping)
+
+
+def _varied(load: Any, case_file: CaseFile, variant: Variant) -> Any:
+    if not isinstance(load, Force):
+        return load
+    if variant.pulse is not None:
+        if not isinstance(load.history, HalfSine):
+            raise InputError(f"pulse = {variant.pulse}: {case_file.path.name} has no half-sine")
+        load = replace(load, history=HalfSine(variant.pulse))
+    if variant.loads == "edge":
+        load = replace(load, nodes=case_file.output.nodes.tolist())
+    return load

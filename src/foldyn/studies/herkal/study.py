@@ -1,0 +1,215 @@
+"""The four case studies: what is computed, and the tables that come of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import CaseFile, read_case
+from foldyn.linear import mac, pair_modes
+from foldyn.studies import find_case
+from foldyn.studies.herkal.metric import UP_TO, errors, ranks
+from foldyn.studies.herkal.models import AS_FILED, MODELS, REFERENCE, Variant, model_of, rules
+from foldyn.studies.herkal.runs import Done, Job, Numerics, run, stored
+
+if TYPE_CHECKING:
+    import xarray
+
+CASES = ("case1", "case2", "case3", "case4")
+RESULTS = "runs"  # folder of the results in that of the study
+LINEAR = Variant(bend_law="linear")
+LEAST_MAC = 0.5  # below which modes are no partners
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study computes.
+
+    Attributes
+    ----------
+    numerics : Numerics
+    cases : tuple of str
+    models : tuple of str
+        Without the reference, which is always there.
+    """
+
+    numerics: Numerics = field(default_factory=Numerics)
+    cases: tuple[str, ...] = CASES
+    models: tuple[str, ...] = field(default_factory=rules)
+
+    def jobs(self) -> list[Job]:
+        """All computations, the longest first."""
+        every = (REFERENCE, *self.models)
+        found = [Job(c, m, "motion", self.numerics) for m in every for c in self.cases]
+        found += [Job(c, m, "modes", self.numerics) for m in every for c in self.cases]
+        for case in self.cases:
+            found += [Job(case, m, "path", self.numerics) for m in self.statics().values()]
+            found += [
+                Job(case, m, "path", self.numerics, LINEAR)
+                for m in self.statics().values()
+                if m != REFERENCE
+            ]
+        return found
+
+    def statics(self) -> dict[str, str]:
+        """The model that is computed for each stiffness: mass plays no part in statics."""
+        first: dict[str, str] = {}
+        for name in (REFERENCE, *self.models):
+            first.setdefault(model_of(name).statics, name)
+        return first
+
+
+FULL = Plan()
+QUICK = Plan(Numerics(divisions=6, dt=0.01, duration=4.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Results of a plan in a folder.
+
+    Attributes
+    ----------
+    plan : Plan
+    folder : Path
+        Of the study; results are in its folder `runs`.
+    """
+
+    plan: Plan
+    folder: Path
+
+    def compute(
+        self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
+    ) -> list[Done]:
+        """Compute what is not there yet; see `foldyn.studies.herkal.runs.run`."""
+        results = self.folder / RESULTS
+        results.mkdir(parents=True, exist_ok=True)
+        return run(self.plan.jobs(), results, tell, processes)
+
+    @cached_property
+    def _read(self) -> dict[Job, xarray.Dataset | None]:
+        return {}
+
+    def result(
+        self, case: str, model: str, kind: str, variant: Variant = AS_FILED
+    ) -> xarray.Dataset | None:
+        """Result of a computation, or None where there is none."""
+        job = Job(case, model, kind, self.plan.numerics, variant)  # type: ignore[arg-type]
+        if self._read.get(job) is None:
+            self._read[job] = stored(self.folder / RESULTS, job)
+        return self._read[job]
+
+    def case_file(self, case: str) -> CaseFile:
+        """Shipped case file of a case study."""
+        return read_case(find_case(f"herkal/{case}"))
+
+    def reported(self, case: str) -> tuple[list[int], str]:
+        """Nodes and axis that a case study reports."""
+        output = self.case_file(case).output
+        return output.nodes.tolist(), output.axis or "x"
+
+    # ------------------------------------------------------------------ tables
+    def node_errors(self, case: str, model: str, variant: Variant = AS_FILED) -> NDArray | None:
+        """Deviation of the frequency content from the shell's, per node."""
+        nodes, axis = self.reported(case)
+        reference = self.result(case, REFERENCE, "motion", variant.of_shell)
+        motion = self.result(case, model, "motion", variant)
+        if reference is None or motion is None:
+            return None
+        up_to = self.case_file(case).output.max_frequency or UP_TO
+        return errors(motion, reference, nodes, axis, up_to)
+
+    def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
+        """The paper's metric, nan where a motion is missing."""
+        found = self.node_errors(case, model, variant)
+        return float("nan") if found is None else float(found.mean())
+
+    def table(
+        self, variant: Variant = AS_FILED, models: Iterable[str] | None = None
+    ) -> dict[str, dict[str, float]]:
+        """The paper's Table 1: its metric by case and model."""
+        names = self.plan.models if models is None else tuple(models)
+        return {c: {m: self.error(c, m, variant) for m in names} for c in self.plan.cases}
+
+    def displacements(self, case: str) -> dict[str, NDArray]:
+        """Static displacement (m) of the reported nodes at full load, by path."""
+        nodes, axis = self.reported(case)
+        found = {}
+        for label, path in self.paths(case).items():
+            found[label] = path["displacement"].sel(node=nodes, axis=axis).values[-1]
+        return found
+
+    def paths(self, case: str) -> dict[str, xarray.Dataset]:
+        """Equilibrium paths by stiffness; bars and hinges also with linear bends."""
+        found = {}
+        for label, model in self.plan.statics().items():
+            found[label] = self.result(case, model, "path")
+            if model != REFERENCE:
+                found[f"{label}, linear bends"] = self.result(case, model, "path", LINEAR)
+        return {label: path for label, path in found.items() if path is not None}
+
+    def frequencies(self, case: str, model: str) -> Partners | None:
+        """Modes of a model that belong to the shell's."""
+        reference = self.result(case, REFERENCE, "modes")
+        ours = self.result(case, model, "modes")
+        if reference is None or ours is None:
+            return None
+        vertices = list(range(len(self.case_file(case).pattern.vertices)))
+        alike = mac(reference, ours, nodes=vertices)
+        pairs = pair_modes(alike, LEAST_MAC)
+        theirs = reference["frequency"].values
+        frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
+        frequency[pairs.first] = ours["frequency"].values[pairs.second]
+        likeness[pairs.first] = pairs.mac
+        return Partners(theirs, frequency, likeness)
+
+
+@dataclass(frozen=True, eq=False)
+class Partners:
+    """Modes of the shell and their partners in a model; nan where there is none.
+
+    Attributes
+    ----------
+    reference, frequency : (k,)
+        Hz.
+    mac : (k,)
+        How alike their shapes are at the pattern's vertices.
+    """
+
+    reference: NDArray
+    frequency: NDArray
+    mac: NDArray
+
+    @property
+    def deviation(self) -> NDArray:
+        """Frequency over that of the shell, less one."""
+        return self.frequency / self.reference - 1.0
+
+    @property
+    def mean_error(self) -> float:
+        """Mean size of the deviations of the modes that have a partner."""
+        known = self.deviation[np.isfinite(self.deviation)]
+        return float(np.abs(known).mean()) if len(known) else float("nan")
+
+
+def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
+    """Mean rank over the cases, each ranked among the given models alone."""
+    names = list(models)
+    each = [ranks({m: row[m] for m in names if m in row}) for row in table.values()]
+    return {m: float(np.mean([r.get(m, np.nan) for r in each])) for m in names if each}
+
+
+def best(row: Mapping[str, float]) -> str:
+    """Name of the model with the smallest error, or ""."""
+    known = {m: v for m, v in row.items() if np.isfinite(v)}
+    return min(known, key=known.__getitem__) if known else ""
+
+
+def label(model: str) -> str:
+    """What tables call a model."""
+    return MODELS[model].label if model in MODELS else model_of(model).label
