@@ -151,8 +151,9 @@ def test_every_top_level_name_is_in_the_api_page():
     assert not missing, f"docs/api.md does not show {missing}"
 
 
-def test_stale_caches_are_removed(tmp_path):
-    layer = tmp_path / "mechanics"
+@pytest.mark.parametrize("folder", ["mechanics", "dynamics/implicit"])
+def test_stale_caches_are_removed(tmp_path, folder):
+    layer = tmp_path / folder
     (layer / "__pycache__").mkdir(parents=True)
     source, index, data = (
         layer / "force.py",

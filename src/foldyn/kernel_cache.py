@@ -15,16 +15,16 @@ COMPILED_LAYERS = ("materials", "mechanics", "dynamics")
 
 def remove_stale_caches(source: Path = SOURCE) -> int:
     """Delete the caches under `source` if any is stale; returns the number of files removed."""
-    sources = [path for layer in COMPILED_LAYERS for path in (source / layer).glob("*.py")]
-    folders = [source / layer / "__pycache__" for layer in COMPILED_LAYERS]
-    indexes = [path for folder in folders for path in folder.glob("*.nbi")]
+    layers = [source / layer for layer in COMPILED_LAYERS]
+    sources = [path for layer in layers for path in layer.rglob("*.py")]
+    indexes = [path for layer in layers for path in layer.rglob("__pycache__/*.nbi")]
     if not sources or not indexes:
         return 0
     try:
         newest = max(path.stat().st_mtime for path in sources)
         if all(path.stat().st_mtime >= newest for path in indexes):
             return 0
-        stale = [path for folder in folders for path in folder.glob("*.nb[ic]")]
+        stale = [path for layer in layers for path in layer.rglob("__pycache__/*.nb[ic]")]
         for path in stale:
             path.unlink(missing_ok=True)
     except OSError:  # another process does the same, or the folder is read-only: then it is fixed

@@ -41,6 +41,7 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
         "force": False,
         "tolerance": None,
         "start": 0.0,
+        "spectral_radius": None,
     }
     np.testing.assert_array_equal(found.output.nodes, [6, 7])
     assert found.output.every == 0.01

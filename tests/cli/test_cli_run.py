@@ -107,10 +107,10 @@ def test_a_load_on_supports_in_part_warns_and_runs(workplace, edited) -> None:
 
 def test_the_shipped_cases_are_what_they_say(workplace) -> None:
     studied = [f"herkal/case{k}" for k in (1, 2, 3, 4)]
-    motions = {"gallery/deployment", "gallery/tumbling", *studied}
+    motions = {"gallery/deployment", "gallery/tumbling", "herkal/specimen-release", *studied}
     kinds = {name: fd.read_case(path).analysis.kind for name, path in shipped_cases().items()}
     assert {name for name, kind in kinds.items() if kind == "dynamics"} == motions
-    assert set(kinds.values()) == {"dynamics", "statics"}
+    assert set(kinds.values()) == {"dynamics", "statics", "modes", "frf"}
     ratios, forces = [], []
     for name in studied:
         path = shipped_cases()[name]

@@ -50,6 +50,14 @@ def test_half_the_mesh_changes_little(name):
     assert np.abs(frequency[:3]).max() < 0.005
 
 
+def test_half_the_mesh_and_half_the_step_change_the_motion_of_case_1_little():
+    """Relative L2 over 10 s, below 0.5 %."""
+    mesh, finest = (read_motion("case1", divisions, 0.005) for divisions in (16, FINEST))
+    assert compare.motion_away(mesh, finest) < 0.005
+    step, shortest = (read_motion("case1", 8, dt) for dt in (0.005, 0.0025))
+    assert compare.motion_away(step, shortest) < 0.005
+
+
 def test_case_1_is_symmetric():
     """The fold is its own mirror image at y = 1/2; so is its mesh with an even number of cells."""
     left, right = np.moveaxis(stored("case1").displacement, 1, 0)
@@ -96,6 +104,13 @@ def test_a_fine_shell_agrees(name, divisions):
     moved, frequency = compare.away(ours(name, divisions), stored(name))
     assert moved < 0.01
     assert np.abs(frequency[:3]).max() < 0.01
+
+
+@pytest.mark.slow
+def test_the_motion_of_case_1_agrees():
+    """Relative L2 over 10 s, with 16 divisions against 32."""
+    motion = compare.our_motion("case1", 16, 0.005)
+    assert compare.motion_away(motion, read_motion("case1", FINEST, 0.005)) < 0.05
 
 
 # ------------------------------------------------------------------ the model

@@ -28,9 +28,14 @@ from foldyn.structures import MASS_RULES
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
 METHODS = (
-    "rk4", "central_difference", "dormand_prince", "newmark", "generalized_alpha", "energy_momentum",
+    "rk4",
+    "central_difference",
+    "dormand_prince",
+    "newmark",
+    "generalized_alpha",
+    "energy_momentum",
 )
-"""Integrators that a case file may name."""
+"""Integrators that a case file may name, beside "auto"."""
 PATH_METHODS = ("newton", "displacement", "mgdcm", "arc_length")
 """Methods of following a path that a case file may name."""
 ANIMATIONS = ("gif", "mp4")
@@ -110,11 +115,14 @@ class DynamicsSection(Section):
 
     kind: str
     duration: Positive
-    method: Annotated[str, PlainValidator(lambda value: choice("", value, METHODS))] = "rk4"
+    method: Annotated[str, PlainValidator(lambda value: choice("", value, ("auto", *METHODS)))] = (
+        "rk4"
+    )
     dt: Positive | None = None
     force: bool = False
     tolerance: Positive | None = None
     start: float = 0.0
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
 class UntilSection(Section):

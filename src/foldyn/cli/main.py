@@ -62,6 +62,20 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
+    study = commands.add_parser(
+        "study",
+        help="the study of a paper, its numbers beside ours",
+        description="Compute the case studies of a paper, with a shell and with every mass "
+        "distribution; results, figures and report.html go to a folder. What is in the folder "
+        "already is not computed again.",
+    )
+    study.add_argument("name", choices=("herkal",), help="which: herkal (Herkal et al.)")
+    study.add_argument(
+        "--quick", action="store_true", help="coarser shell, shorter motions: minutes, no measure"
+    )
+    study.add_argument("--out", help="folder of the results (default: NAME-study or NAME-quick)")
+    study.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+
     commands.add_parser(
         "info",
         help="versions, threads, optional parts, shipped cases",
@@ -133,6 +147,11 @@ def _call(given: argparse.Namespace) -> None:
         from foldyn.cli.info import info
 
         print(info())
+        return
+    if given.command == "study":
+        from foldyn.cli.study import study
+
+        study(given.name, given.quick, given.out, given.quiet)
         return
     from foldyn.cli.run import run
 

@@ -51,13 +51,22 @@ class MotionRun:
         return self.motion.run(progress)
 
     def line(self, result: xarray.Dataset) -> str:
-        """Steps, speed and accuracy."""
+        """Method and its reason if it was chosen, steps, speed and accuracy."""
         a = result.attrs
         per_second = a["steps"] / max(a["wall_seconds"], 1e-9)
+        size = f"{a['dt']:.3g} s"
+        if "smallest_step" in a:
+            size = f"{a['smallest_step']:.3g} to {a['largest_step']:.3g} s"
+        how = f"critical {a['critical_step']:.3g} s"
+        if "iterations" in a:
+            how = f"{a['iterations'] / max(a['steps'], 1):.1f} iterations each"
+            how += f", {a['halved_steps']} in parts" if a["halved_steps"] else ""
+        chosen = ""
+        if "method_reason" in a:
+            chosen = f"  {self.rule}: {a['method']}, {a['method_reason']}\n"
         return (
-            f"  {self.rule}: {a['steps']} steps of {a['dt']:.3g} s (critical "
-            f"{a['critical_step']:.3g} s), {per_second:,.0f} steps/s, energy error "
-            f"{a['energy_error']:.1e}"
+            f"{chosen}  {self.rule}: {a['steps']} steps of {size} ({how}), "
+            f"{per_second:,.0f} steps/s, energy error {a['energy_error']:.1e}"
         )
 
 
@@ -70,6 +79,7 @@ class Motions:
         self.case_file = case_file
         motions = {rule: MotionRun(case_file, rule, figures) for rule in case_file.masses}
         self.runs: Mapping[str, Run] = motions
+        self._motions = list(motions.values())
         case = case_file.case()
         try:  # all of them together
             check_memory(
@@ -84,7 +94,7 @@ class Motions:
         """Whether the integrator is used for the first time."""
         from foldyn.dynamics import compiled
 
-        return not compiled(self.case_file.analysis.arguments["method"])
+        return not all(compiled(run.motion.method.name) for run in self._motions)
 
     def write(self, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
         """Draw the motions."""

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 # where the case file has what the functions that it calls complain about
 KEYS = {
     "analysis": (
-        "duration", "method", "dt", "load_factors", "steps", "first_step", "constant",
-        "inertia_relief", "count", "secant", "frequencies", "amplitude",
+        "duration", "method", "dt", "tolerance", "spectral_radius", "load_factors", "steps",
+        "first_step", "constant", "inertia_relief", "count", "secant", "frequencies", "amplitude",
     ),
     "output": ("every",),
 }  # fmt: skip

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.discrete_gradient import (
     add_bar_forces,
     add_bar_tangent,
@@ -73,6 +74,13 @@ class EnergyMomentum:
             packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.shift, b.out,
             b.course.angle, b.work.angle, b.scratch,
         )  # fmt: skip
+
+    def keep_on(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int] | None:  # fmt: skip
+        """See `Scheme`; its matrices are not symmetric."""
+        return None
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""

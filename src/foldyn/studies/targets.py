@@ -1,4 +1,4 @@
-"""Values of a paper beside what was computed: the rows of a study's `targets.toml`."""
+"""Values and claims of a paper beside what was computed: the rows of a study's `targets.toml`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
+
+from foldyn.errors import InputError
 
 
 @dataclass(frozen=True)
 class Target:
-    """A value that a paper gives.
+    """A value that a paper gives, or a bound that says what one of its claims means in numbers.
 
     Attributes
     ----------
@@ -24,6 +27,10 @@ class Target:
     tolerance : float or None
         Largest deviation, as a fraction of the value, with which the computed value agrees; None
         where the two are only shown beside each other.
+    bound : {"least", "most"} or None
+        Of a claim: it holds where the computed value is at least, or at most, `value`.
+    group : str
+        Which part of the study computes it.
     """
 
     key: str
@@ -32,6 +39,15 @@ class Target:
     source: str
     what: str
     tolerance: float | None = None
+    bound: Literal["least", "most"] | None = None
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        """Check that it is a value or a bound."""
+        if self.bound not in (None, "least", "most"):
+            raise InputError(f'{self.key}: bound = {self.bound!r}: give "least" or "most"')
+        if self.bound is not None and self.tolerance is not None:
+            raise InputError(f"{self.key}: a bound has no tolerance; leave out one of the two")
 
 
 @dataclass(frozen=True)
@@ -48,24 +64,39 @@ class Verdict:
 
     @property
     def holds(self) -> bool | None:
-        """Whether they agree; None where no tolerance is set."""
+        """Whether they agree; None where neither tolerance nor bound is set."""
+        if self.target.bound == "least":
+            return self.computed >= self.target.value
+        if self.target.bound == "most":
+            return self.computed <= self.target.value
         if self.target.tolerance is None:
             return None
         return math.isfinite(self.computed) and abs(self.deviation) <= self.target.tolerance
 
     def line(self) -> str:
         """One line for people."""
-        told = {True: "holds", False: "fails", None: "beside"}[self.holds]
         return (
             f"{self.target.what}: {self.computed:.4g} {self.target.unit} beside "
-            f"{self.target.value:.4g} ({self.target.source}), {self.deviation:+.1%}: {told}"
+            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.told}"
         )
 
+    @property
+    def told(self) -> str:
+        """In a word whether they agree."""
+        return {True: "holds", False: "fails", None: "beside"}[self.holds]
 
-def read_targets(path: Path) -> Mapping[str, Target]:
-    """Targets of a file by their keys, one table each."""
-    tables = tomllib.loads(path.read_text())
-    return {key: Target(key=key, **table) for key, table in tables.items()}
+    @property
+    def asked(self) -> str:
+        """The target's number, with what it is of a claim."""
+        before = {"least": "at least ", "most": "at most ", None: ""}[self.target.bound]
+        return f"{before}{self.target.value:.4g}"
+
+
+def read_targets(path: Path, group: str | None = None) -> Mapping[str, Target]:
+    """Targets of a file by their keys, one table each; of one group if it is given."""
+    tables = tomllib.loads(path.read_text("utf-8"))
+    targets = {key: Target(key=key, **table) for key, table in tables.items()}
+    return {k: t for k, t in targets.items() if group is None or t.group == group}
 
 
 def verdicts(targets: Mapping[str, Target], computed: Mapping[str, float]) -> list[Verdict]:

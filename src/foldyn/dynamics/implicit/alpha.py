@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics.actuation import actuator_power, turn
+from foldyn.dynamics.implicit.banded import substitute
+from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
@@ -74,6 +76,17 @@ class Alpha:
         return residual(
             packed.model, packed.system, packed.mass, self._p, h, t, b.old, b.new, b.shift, b.out,
             b.work, b.scratch,
+        )  # fmt: skip
+
+    def keep_on(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int] | None:  # fmt: skip
+        """See `Scheme`."""
+        b, packed = self.bench, self.bench.packed
+        return _keep_on(
+            packed.model, packed.system, packed.mass, self._p, h, t, b.old, b.new, b.shift, b.out,
+            b.work, b.scratch, b.earlier, matrix.band, matrix.free, goal, last, lowest, most,
         )  # fmt: skip
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
@@ -136,6 +149,36 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     for i in range(q0.size):
         norm += left[i] * left[i]
     return np.sqrt(norm), np.sqrt(reference)
+
+
+@kernel
+def _keep_on(
+    model, system, mass, p, h, t, old, new, shift, out, work, s, earlier, band, free, goal, last,
+    lowest, most,
+):  # fmt: skip
+    """Iterate with the factors of a band; see `Newton._keep_on`."""
+    step, d, q, before, left = (
+        np.empty(free.size),
+        flat(shift),
+        flat(new.q),
+        flat(earlier),
+        flat(out),
+    )
+    norm = np.inf
+    for steps in range(most):
+        norm, reference = residual(model, system, mass, p, h, t, old, new, shift, out, work, s)
+        found = judge(goal, norm, reference, last, lowest)
+        if found != GO_ON:
+            return found, norm, steps
+        lowest, last = min(lowest, norm), norm
+        for i in range(q.size):
+            before[i] = q[i]
+        for k in range(free.size):
+            step[k] = left[free[k]]
+        substitute(band, step)
+        for k in range(free.size):
+            d[free[k]] -= step[k]
+    return NOT_CONVERGED, norm, most
 
 
 @kernel

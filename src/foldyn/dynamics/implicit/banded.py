@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from foldyn.materials.compiled import summing
 from foldyn.statics.linear_solver import SingularTangentError
 
 
 class Cholesky:
-    """Factors of a symmetric positive definite band, which they replace in memory.
+    """Factors U' U of a symmetric positive definite band, which they replace in memory.
 
     Parameters
     ----------
@@ -28,13 +29,15 @@ class Cholesky:
     """
 
     def __init__(self, band: NDArray) -> None:
-        self._factors, failed = lapack.dpbtrf(band, lower=0, overwrite_ab=1)
-        if failed or not np.isfinite(self._factors[-1, -1]):
+        factors, failed = lapack.dpbtrf(band, lower=0, overwrite_ab=1)
+        if failed or not np.isfinite(factors[-1, -1]):
             raise SingularTangentError("the matrix is not positive definite")
+        self.columns = factors.T  # (n, width + 1), a column of the factor in each row
 
     def solve(self, b: NDArray) -> NDArray:
-        """Solution x of A x = b."""
-        return lapack.dpbtrs(self._factors, b, lower=0)[0]
+        """Solution x of A x = b, in the memory of b."""
+        substitute(self.columns, b)
+        return b
 
 
 class BandLU:
@@ -61,3 +64,22 @@ class BandLU:
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b."""
         return lapack.dgbtrs(self._factors, self._width, self._width, b, self._pivots)[0]
+
+
+@summing
+def substitute(columns, b):
+    """Replace b (n,) by the solution of U' U x = b, U a band by columns; see `Cholesky`."""
+    width = columns.shape[1] - 1
+    for j in range(b.size):
+        first = max(0, j - width)
+        column, known = columns[j, width - j + first :], b[first:j]
+        total = 0.0
+        for i in range(known.size):
+            total += column[i] * known[i]
+        b[j] = (b[j] - total) / columns[j, width]
+    for j in range(b.size - 1, -1, -1):
+        first = max(0, j - width)
+        column, others = columns[j, width - j + first :], b[first:j]
+        b[j] /= columns[j, width]
+        for i in range(others.size):
+            others[i] -= column[i] * b[j]

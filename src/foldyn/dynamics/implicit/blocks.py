@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.dynamics.implicit.tangent import put_tangent
 from foldyn.dynamics.kinds import rows_of
-from foldyn.mechanics import Sparsity, node_order, sparsity
+from foldyn.mechanics import BarsHinges, Sparsity, node_order, sparsity
 from foldyn.shells.extrapolated import add_extrapolated_strain
 from foldyn.shells.kernels import ShellModel, shell_work
 from foldyn.shells.sparsity import shell_pattern
@@ -48,7 +48,7 @@ class BarsHingesBlocks:
 
     def __init__(self, model: Any) -> None:
         self.pattern = sparsity(model)
-        self.order = (3 * node_order(model)[:, None] + np.arange(3)).ravel()
+        self.order = (3 * _narrow_order(model, self.pattern)[:, None] + np.arange(3)).ravel()
         self.unused = np.zeros(0, np.int64)
 
     def put(
@@ -56,6 +56,25 @@ class BarsHingesBlocks:
     ) -> None:
         """See `Blocks`."""
         put_tangent(model, pattern, u, before, again, out)
+
+
+def _narrow_order(model: BarsHinges, pattern: Sparsity) -> NDArray:
+    """Order of the nodes (n,) with the narrowest band: sweeps along the axes, or `node_order`.
+
+    On a rectangular sheet a sweep along its longer side has half the width of the latter.
+    """
+    size = np.ptp(model.rest, axis=0).max()
+    x, y, z = np.round(model.rest / size, 6).T  # so that rows of nodes are straight
+    orders = [np.lexsort(keys) for keys in ((z, y, x), (z, x, y), (y, x, z))]
+    nodes = len(model.rest)
+    row, column = np.repeat(np.arange(nodes), np.diff(pattern.indptr)), pattern.indices
+
+    def width(order: NDArray) -> int:
+        number = np.empty(nodes, np.int64)
+        number[order] = np.arange(nodes)
+        return int(np.abs(number[row] - number[column]).max())
+
+    return min((node_order(model), *orders), key=width)
 
 
 class ShellBlocks:

@@ -78,9 +78,10 @@ def mean_moment(code, address, p, rest, theta, change):
     before = hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
     after = hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
     missed = after - before - moment * change
-    # what stress-free laws subtract cancels digits
-    size = abs(p[3]) + abs(p[2]) * (abs(theta - rest) + abs(change))
-    if abs(change) > LEAST and abs(missed) > NOISE * (max(abs(before), abs(after)) + size):
+    size = max(abs(before), abs(after))
+    if p[2] != 0.0 or p[3] != 0.0:  # what stress-free laws subtract cancels digits
+        size += 1.0 + abs(p[2]) + abs(p[3])
+    if abs(change) > LEAST and abs(missed) > NOISE * size:
         moment += missed / change
     return moment, slope
 

@@ -15,8 +15,9 @@ import numpy as np
 from foldyn.dynamics import outcome
 from foldyn.dynamics.course import Course, Plan, Samples, sample
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
+from foldyn.dynamics.implicit.convergence import NOT_FINITE, SOLVED
 from foldyn.dynamics.implicit.matrix import StepMatrix
-from foldyn.dynamics.implicit.newton import Found, Newton
+from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import Bench, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.kinds import longest
@@ -193,10 +194,9 @@ class Implicit:
         turned = np.abs(bench.work.angle - bench.course.angle)
         if turned.max(initial=0.0) > TURN:
             return outcome.PENETRATION, int(turned.argmax())
-        if found is Found.YES:
+        if found == SOLVED:
             return outcome.DONE, -1
-        code = outcome.NOT_FINITE if found is Found.NOT_FINITE else outcome.NOT_CONVERGED
-        return code, -1
+        return (outcome.NOT_FINITE if found == NOT_FINITE else outcome.NOT_CONVERGED), -1
 
     def _hopeless(self, h: float, wanted: float) -> bool:
         """Whether a smaller step would not help either."""

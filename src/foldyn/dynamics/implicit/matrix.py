@@ -24,7 +24,7 @@ from foldyn.statics.backends import factorizer
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 # products of a band's factorization (rows times width squared) above which a sparse one is quicker
-MOST_SYMMETRIC, MOST_UNSYMMETRIC = 2e9, 1e8
+MOST_SYMMETRIC, MOST_UNSYMMETRIC = 8e9, 4e9
 
 
 class Weights(NamedTuple):
@@ -123,6 +123,11 @@ class StepMatrix:
     def factorized(self) -> bool:
         """Whether there is something to solve with."""
         return self._factors is not None
+
+    @property
+    def band(self) -> NDArray | None:
+        """Columns of the factor of a symmetric band, if that is what there is."""
+        return self._factors.columns if isinstance(self._factors, Cholesky) else None
 
     def solve(self, residual: NDArray, out: NDArray) -> NDArray:
         """Solution of A x = residual at the free dofs of `out`; the others stay; all (n, 3)."""

@@ -2,36 +2,28 @@
 
 The matrix is made anew in each iteration, unless the residual falls fast with the last one: panels
 that turn within a step move the directions of their stiff bars, and with the old directions the
-iteration soon converges slowly or not at all. Increments of a step whose matrix is kept cost a
-force and a substitution each.
+iteration soon converges slowly or not at all. Iterations whose matrix is kept cost a force and a
+substitution each.
 """
 
 from __future__ import annotations
 
-from enum import Enum
-
 import numpy as np
 
+from foldyn.dynamics.implicit.convergence import (
+    GO_ON,
+    NEW_MATRIX,
+    NOT_CONVERGED,
+    SOLVED,
+    Goal,
+    judge,
+)
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.scheme import Scheme
 from foldyn.statics.linear_solver import SingularTangentError
 
 MOST = 25  # iterations
-FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
 SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
-GROWTH = 1e8  # of the residual, at which the iteration has lost its way
-# what is left where the residual no longer falls: rounding, if it is below one of these
-ENOUGH = 1e-8  # of the forces at play
-ROUNDING = 8.0  # times the rounding of the bars' forces
-STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
-
-
-class Found(Enum):
-    """What became of a step."""
-
-    YES = 0
-    NOT_CONVERGED = 1
-    NOT_FINITE = 2
 
 
 class Newton:
@@ -52,37 +44,56 @@ class Newton:
         scheme.tangent(self.matrix, bench.displacement(), False)
         scheme.works(h)
 
-    def solve(self, h: float, t: float) -> Found:
-        """Move bench.shift from its prediction to equilibrium at the end t of a step h (s)."""
-        scheme, bench = self.scheme, self.scheme.bench
-        u0 = bench.displacement()
-        least_force = bench.hinge_forces()
-        before, last, fresh, started = u0, np.inf, False, np.inf
+    def solve(self, h: float, t: float) -> int:
+        """Move bench.shift from its prediction to equilibrium at the end t of a step h (s).
+
+        Returns `SOLVED`, or why not.
+        """
+        scheme, bench, matrix = self.scheme, self.scheme.bench, self.matrix
+        goal = Goal(scheme.tolerance, bench.hinge_forces(), bench.rounding)
         kept = self._lasting and abs(h - self._h) < SAME_STEP * h
-        made = self.matrix.factorizations
-        for iteration in range(MOST):
-            norm, reference = scheme.residual(h, t)
-            self.evaluations += 1
-            if not norm < np.inf:
-                return Found.NOT_FINITE
-            reference = max(reference, least_force)
-            enough = max(ENOUGH * reference, ROUNDING * bench.rounding)
-            if norm <= scheme.tolerance * reference or (norm <= enough and norm > STALL * last):
-                self._lasting = self.matrix.factorizations <= made + 1
-                return Found.YES
-            started = norm if iteration == 0 else started
-            if norm > GROWTH * started:
-                return Found.NOT_CONVERGED
-            if iteration > 0 and norm > FAST * last:
-                kept = False
-            if not kept:
-                scheme.tangent(self.matrix, before, fresh)
-                try:
-                    self.matrix.factorize(scheme.weights(h))
-                except SingularTangentError:
-                    return Found.NOT_CONVERGED
-                self._h, kept = h, True
-            before, fresh, last = bench.moved().copy(), True, norm
-            bench.shift -= self.matrix.solve(bench.out, bench.step)
+        last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
+        before, again = bench.displacement().copy(), False
+        while left > 0:
+            found, norm, steps = self._keep_on(goal, h, t, last, lowest, left)
+            self.iterations += steps
+            self.evaluations += steps + 1
+            left, again = left - steps, again or steps > 0
+            if found != NEW_MATRIX:
+                self._lasting = found == SOLVED and matrix.factorizations <= made + 1
+                return found
+            lowest = min(lowest, norm)
+            if again:
+                before = bench.carried(bench.earlier, bench.new.factor)
+            scheme.tangent(matrix, before, again)
+            try:
+                matrix.factorize(scheme.weights(h))
+            except SingularTangentError:
+                break
+            self._h, last, again = h, norm, True
+            bench.earlier[:] = bench.new.q
+            bench.shift -= matrix.solve(bench.out, bench.step)
             self.iterations += 1
-        return Found.NOT_CONVERGED
+            left -= 1
+        self._lasting = False
+        return NOT_CONVERGED
+
+    def _keep_on(
+        self, goal: Goal, h: float, t: float, last: float, lowest: float, most: int
+    ) -> tuple[int, float, int]:
+        """Iterate with the matrix as it is; returns what was found, the residual, and how often."""
+        scheme, bench = self.scheme, self.scheme.bench
+        if self.matrix.band is not None:
+            whole = scheme.keep_on(self.matrix, goal, h, t, last, lowest, most)
+            if whole is not None:
+                return whole
+        norm = np.inf
+        for steps in range(most):
+            norm, reference = scheme.residual(h, t)
+            found = judge(goal, norm, reference, last, lowest)
+            if found != GO_ON:
+                return found, norm, steps
+            lowest, last = min(lowest, norm), norm
+            bench.earlier[:] = bench.new.q
+            bench.shift -= self.matrix.solve(bench.out, bench.step)
+        return NOT_CONVERGED, norm, most

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Course
+from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.kinds import hinges_alone, put_force, stretching_forces, workspace_of
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
@@ -63,6 +64,13 @@ class Scheme(Protocol):
         """
         ...
 
+    def keep_on(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int] | None:  # fmt: skip
+        """`Newton._keep_on` as one compiled function for matrices with a `band`, or None."""
+        ...
+
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """Fill the stiffness blocks at new.q; see `put_tangent` for `before` and `again`."""
         ...
@@ -98,6 +106,7 @@ class Bench:
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
+        self.earlier = np.zeros(shape)  # new.q before the last iteration
         self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
         q, w, a, force = (np.zeros(shape) for _ in range(4))
         self.new = Phase(q, w, a, force, np.zeros(histories))
@@ -125,18 +134,19 @@ class Bench:
 
     def displacement(self) -> NDArray:
         """Displacement (n, 3) of old.q with that of the supports."""
-        return self._carried(self.old)
+        return self.carried(self.old.q, self.old.factor)
 
     def moved(self) -> NDArray:
         """Displacement (n, 3) of new.q with that of the supports."""
-        return self._carried(self.new)
+        return self.carried(self.new.q, self.new.factor)
 
-    def _carried(self, phase: Phase) -> NDArray:
+    def carried(self, q: NDArray, factor: NDArray) -> NDArray:
+        """Displacement (n, 3) of q with that of the supports for factors (h, 3)."""
         moved = self.packed.system.moved
         if not len(moved.dof):
-            return phase.q
-        out = phase.q.copy()
-        np.add.at(out.reshape(-1), moved.dof, moved.value * phase.factor[moved.row, 0])
+            return q
+        out = q.copy()
+        np.add.at(out.reshape(-1), moved.dof, moved.value * factor[moved.row, 0])
         return out
 
     def predict(self, h: float) -> None:

@@ -76,10 +76,14 @@ class Job:
     variant: Variant = field(default_factory=Variant)
 
     @property
+    def name(self) -> str:
+        """What it is called."""
+        return "-".join(filter(None, (self.case, self.model, self.kind, self.variant.name)))
+
+    @property
     def file(self) -> str:
         """Name of its file."""
-        parts = (self.case, self.model, self.kind, self.variant.name)
-        return "-".join(filter(None, parts)) + ".nc"
+        return f"{self.name}.nc"
 
     def settings(self) -> dict[str, Any]:
         """All that its result depends on but the program."""

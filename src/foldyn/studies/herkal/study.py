@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 CASES = ("case1", "case2", "case3", "case4")
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
-LEAST_MAC = 0.5  # below which modes are no partners
+LEAST_MAC = 0.5  # below which modes are no partners,
+FAR = 2.0  # nor where their frequencies are this many times apart
 
 
 @dataclass(frozen=True)
@@ -160,9 +161,11 @@ class Study:
         if reference is None or ours is None:
             return None
         vertices = list(range(len(self.case_file(case).pattern.vertices)))
-        alike = mac(reference, ours, nodes=vertices)
-        pairs = pair_modes(alike, LEAST_MAC)
         theirs = reference["frequency"].values
+        ratio = ours["frequency"].values / theirs[:, None]
+        near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot tell waves of any length
+        alike = np.where(near, mac(reference, ours, nodes=vertices), 0.0)
+        pairs = pair_modes(alike, LEAST_MAC)
         frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
         frequency[pairs.first] = ours["frequency"].values[pairs.second]
         likeness[pairs.first] = pairs.mac

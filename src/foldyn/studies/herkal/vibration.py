@@ -142,7 +142,7 @@ def vibration() -> list[Verdict]:
         "release_frequency": decrement.damped_frequency,
         "release_damping": 100.0 * decrement.damping_ratio,
     }
-    return verdicts(read_targets(TARGETS), computed)
+    return verdicts(read_targets(TARGETS, "specimen"), computed)
 
 
 if __name__ == "__main__":
