@@ -1,0 +1,144 @@
+"""The automatic choice between explicit and implicit integration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oscillators import MASS, linear_law, oscillator, released
+
+import foldyn as fd
+from foldyn.dynamics import METHODS, prepare
+from foldyn.dynamics.timescale import frequency, vibrating_share
+from foldyn.studies import find_case
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))
+
+
+def miura(**options) -> fd.Structure:
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    return fd.discretize(pattern, SHEET, **options)
+
+
+def pushed(history, vector=(0.01, 0.0, 0.0), **damping) -> fd.Case:
+    return fd.Case(miura(), SUPPORTS, [fd.Force([7], vector, history)], fd.Rayleigh(**damping))
+
+
+def chosen(case: fd.Case, duration: float, **options) -> tuple[str, str]:
+    motion = prepare(case, duration, "auto", **options)
+    return motion.method.name, motion.reason
+
+
+def test_a_small_sheet_in_a_short_motion_is_explicit():
+    """Case study 2: 26,000 steps of a few microseconds each."""
+    case = fd.read_case(find_case("herkal/case2")).case("circumcenter")
+    name, reason = chosen(case, 10.0, every=0.01)
+    assert name == "rk4"
+    assert reason.startswith("explicit: about 26,000 explicit steps (critical step 0.00076 s)")
+
+
+def test_an_impact_is_explicit():
+    """A blow that is over before the slow vibrations begin: steps must be short anyway."""
+    case = fd.read_case(find_case("herkal/specimen")).case()
+    supports = [support for support in case.supports if isinstance(support, fd.Fix)]
+    blow = fd.Force([3], (0.5, 0.0, 0.0), fd.HalfSine(1e-4))
+    assert chosen(fd.Case(case.structure, supports, [blow]), 2e-3)[0] == "rk4"
+    v = np.zeros(case.structure.nodes.shape)
+    v[3, 0] = 5.0  # one node alone: its bars vibrate
+    kicked = fd.Case(case.structure, supports, damping=fd.Rayleigh(1.0))
+    assert chosen(kicked, 0.1, initial=fd.State(velocity=v))[0] == "rk4"
+
+
+def test_stiff_damping_is_implicit():
+    """With beta the specimen's critical step is below a microsecond."""
+    case = fd.read_case(find_case("herkal/specimen-release")).case()
+    damped = fd.Case(case.structure, case.supports, case.loads, fd.Rayleigh(14.4, 4.1e-4))
+    name, reason = chosen(damped, 1.0, every=0.01)
+    assert name == "generalized_alpha"
+    assert "critical step 1.8e-07 s" in reason
+
+
+def test_a_slow_load_is_implicit():
+    """Ten seconds of pushing are half a million explicit steps, and a few hundred implicit ones."""
+    case = fd.read_case(find_case("herkal/specimen-release")).case()
+    slow = fd.Force(range(7), (0.01, 0.0, 0.0), fd.Ramp(10.0, smooth=True))
+    case = fd.Case(case.structure, case.supports, [slow], fd.Rayleigh(15.8))
+    assert chosen(case, 10.0)[0] == "generalized_alpha"
+    motion = fd.simulate(case, 10.0, "auto", tolerance=1e-4)
+    assert motion.attrs["method"] == "generalized_alpha"
+    assert motion.attrs["method_reason"].startswith("implicit: about")
+    assert motion.attrs["steps"] < 1000
+
+
+def test_what_nothing_damps_gets_a_method_that_conserves():
+    """A long free vibration: central differences, or energy and momentum for a stiff sheet."""
+    v = np.zeros((13, 3))
+    v[[6, 7, 8], 0] = 0.01
+    state = fd.State(velocity=v)
+    assert chosen(fd.Case(miura(), SUPPORTS), 0.01, initial=state)[0] == "rk4"
+    assert chosen(fd.Case(miura(), SUPPORTS), 100.0, initial=state)[0] == "central_difference"
+    # a thin sheet, whose bars are far stiffer than its folds, let go from a slightly bent shape
+    thin = fd.discretize(miura().pattern, fd.Sheet(1e9, 0.25, 1e-4, 1e3), bend_law="linear")
+    bent = fd.trace(fd.Case(thin, SUPPORTS, [fd.Force([7], (1e-6, 0.0, 0.0))]), steps=1)
+    start = fd.initial_state(bent)
+    name, reason = chosen(fd.Case(thin, SUPPORTS), 100.0, initial=start)
+    assert name == "energy_momentum", reason
+
+
+def test_a_given_step_or_tolerance_decides():
+    case = pushed(fd.HalfSine(0.5), alpha=0.1)
+    critical = fd.critical_step(case)
+    assert chosen(case, 1.0, dt=0.5 * critical) == (
+        "rk4",
+        f"explicit: dt is within the critical step of {critical:.2g} s",
+    )
+    name, reason = chosen(case, 1.0, dt=5.0 * critical)
+    assert name == "generalized_alpha"
+    assert "above the critical step" in reason
+    assert chosen(case, 1.0, tolerance=1e-8)[0] == "dormand_prince"
+
+
+def test_nodes_without_mass_are_implicit():
+    case = oscillator(linear_law(), 8.0)
+    structure = fd.Structure(
+        case.structure.nodes, case.structure.bars, case.structure.bar_area, case.structure.sheet,
+        case.structure.options, node_mass=np.array([1.0, 0.0]),
+    )  # fmt: skip
+    name, reason = chosen(fd.Case(structure, case.supports), 1.0)
+    assert METHODS[name].implicit
+    assert "without mass" in reason
+
+
+def test_frequency_of_an_oscillator():
+    """By the force that pushes it and by the state from which it is let go."""
+    omega = 4.0
+    case = oscillator(linear_law(), MASS * omega**2)
+    u, v = np.zeros((2, 3)), np.zeros((2, 3))
+    push = fd.Case(case.structure, case.supports, [fd.Force([1], (0.1, 0.0, 0.0))])
+    assert frequency(push, u, v, 100.0) == pytest.approx(omega, rel=1e-2)
+    let_go = released(0.01)
+    assert frequency(case, let_go.displacement, v, 100.0) == pytest.approx(omega, rel=1e-2)
+    flung = released(0.0, 0.1)
+    assert frequency(case, u, flung.velocity, 100.0) == pytest.approx(omega, rel=1e-9)
+    turning = fd.Case(miura())
+    spin = np.cross([0.0, 0.0, 3.0], turning.structure.nodes)
+    found = frequency(turning, np.zeros_like(spin), spin, 10.0)
+    assert found == pytest.approx(3.0, rel=1e-6)
+
+
+def test_what_varies_slowly_vibrates_little():
+    rest, still = np.zeros((13, 3)), np.zeros((13, 3))
+    omega = 5.0  # a period of 1.3 s
+
+    def share(history, start=0.0):
+        return vibrating_share(pushed(history), rest, still, start, 100.0, omega)
+
+    assert share(fd.Step(1.0)) == 1.0
+    assert share(fd.Pulse(2.0)) == 1.0
+    assert share(None) == 1.0  # there from the beginning
+    assert share(fd.Harmonic(0.8)) > 0.5
+    assert share(fd.Ramp(90.0, smooth=True)) < 2e-3
+    assert share(fd.Ramp(90.0, smooth=True)) < share(fd.Ramp(90.0)) < 0.02
+    moving = still.copy()
+    moving[7, 0] = 1.0
+    assert vibrating_share(pushed(fd.Ramp(90.0)), rest, moving, 0.0, 100.0, omega) == 1.0
