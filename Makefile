@@ -11,6 +11,7 @@ DEMO_CASES ?= case1 case2 case3 case4
 DEMO_OUT   ?= demo-results
 DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
+WORKERS ?= -n auto --maxprocesses 4
 
 .PHONY: help demo test lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help
@@ -20,7 +21,7 @@ help:  ## list what can be made
 	@echo
 	@echo '  PYTHON=python3.12        the interpreter that .venv is made with'
 	@echo '  DEMO_CASES="case1"       a part of the demo;  DEMO_FLAGS="..." more flags of foldyn run'
-	@echo '  PYTEST_FLAGS="-k mass"   more flags of pytest'
+	@echo '  PYTEST_FLAGS="-k mass"   more flags of pytest;  WORKERS="-n 0": one test at a time'
 
 # ------------------------------------------------------------------------------ set-up
 $(BIN)/python:
@@ -55,7 +56,7 @@ demo: $(STAMP)  ## run the four shipped case studies; pictures in demo-results/
 	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
 test: $(STAMP)  ## run the tests
-	@$(BIN)/python -m pytest $(PYTEST_FLAGS)
+	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
 
 lint: $(STAMP)  ## ruff, pyright and the layers contract
 	$(BIN)/ruff check .

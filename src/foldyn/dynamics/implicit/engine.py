@@ -14,6 +14,7 @@ import numpy as np
 
 from foldyn.dynamics import outcome
 from foldyn.dynamics.course import Course, Plan, Samples, sample
+from foldyn.dynamics.implicit.banded import one_thread
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
 from foldyn.dynamics.implicit.convergence import NOT_FINITE, SOLVED
 from foldyn.dynamics.implicit.matrix import StepMatrix
@@ -69,6 +70,10 @@ class Implicit:
 
     def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         """See `Engine`."""
+        with one_thread():
+            return self._advance(course, plan, out, stretch)
+
+    def _advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         if self._newton is None:
             found = self._begin(course, plan, out)
             if found != outcome.DONE:
