@@ -148,6 +148,17 @@ def test_a_shell():
     assert np.abs(peak.natural_frequency / natural - 1.0).min() < 1e-3
 
 
+def test_a_shell_struck():
+    """By an implicit method, since explicit ones need mass everywhere."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    shell = fd.shells.shell(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), divisions=2)
+    case = fd.Case(shell, miura_case().supports, damping=fd.Rayleigh(2.0, 1e-3))
+    drive, f = fd.Force([7], (1e-4, 0, 0)), np.arange(0.2, 2.01, 0.2)
+    struck, exact = frf(case, drive, f, method="impulse"), frf(case, drive, f)
+    assert struck.attrs["integrator"] == "generalized_alpha"
+    assert largest_error(struck.receptance.values, exact.receptance.values) < 3e-3
+
+
 def test_static_correction_converges_faster():
     case, drive = miura_case(), fd.Force([7], (0.01, 0, 0))
     direct = frf(case, drive, F).receptance.values

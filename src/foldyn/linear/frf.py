@@ -223,7 +223,7 @@ def _in_time(
     _refuse_secant(secant, how, "takes the laws as they are")
     rig = Rig(station(case, state, load_factor), drive, options)
     found = how.compute(rig, frequency, options, report)
-    facts = {"integrator": options.integrator, "dt": options.dt, **found.facts}
+    facts = {"integrator": rig.integrator, "dt": options.dt, **found.facts}
     return rig.state, found._replace(facts=facts)
 
 

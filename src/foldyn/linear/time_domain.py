@@ -28,6 +28,7 @@ from foldyn.dynamics import METHODS, Progress, simulate
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.equilibrium import Station
 from foldyn.linear.excitation import Drive
+from foldyn.shells import Shell
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class Integration:
 
     Parameters
     ----------
-    integrator : str
-        Method of `simulate`.
+    integrator : str, optional
+        Method of `simulate`. Without it "rk4", for shells "generalized_alpha".
     dt : float, optional
         Largest time step (s), shortened to divide the sampling interval. Without it, the default
         of `simulate`.
@@ -45,13 +46,14 @@ class Integration:
         As of `simulate`.
     """
 
-    integrator: str = "rk4"
+    integrator: str | None = None
     dt: float | None = None
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        choice("integrator", self.integrator, METHODS)
+        if self.integrator is not None:
+            choice("integrator", self.integrator, METHODS)
         for name in ("dt", "tolerance"):
             if getattr(self, name) is not None:
                 number(name, getattr(self, name), above=0.0)
@@ -67,6 +69,8 @@ class Rig:
     def __init__(self, station: Station, drive: Drive, integration: Integration) -> None:
         self.case, self.state = station.problem.case, station.displacement
         self.drive, self.integration = drive, integration
+        massless = isinstance(self.case.structure, Shell)
+        self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
         folded = [load for load in self.case.loads if isinstance(load, Actuate)]
         history = Table([0.0, 1.0], [station.factor, station.factor])
         self._loads: list[Force | Actuate] = [
@@ -113,7 +117,7 @@ class Rig:
         how = self.integration
         dt = None if how.dt is None else every / math.ceil(every / how.dt * (1.0 - 1e-12))
         motion = simulate(
-            self.driven(history), duration, how.integrator, dt, every,
+            self.driven(history), duration, self.integrator, dt, every,
             initial or State(self.state), tolerance=how.tolerance, start=start, progress=progress,
         )  # fmt: skip
         displacement, velocity = motion["displacement"].values, motion["velocity"].values
