@@ -76,4 +76,4 @@ def test_a_start_from_another_structure(workplace, edited, first) -> None:
     bad = workplace.run(edited(cells, start('file = "first-results/result.nc"')))
     assert (bad.status, bad.new) == (2, [])
     assert 'initial.file = "first-results/result.nc": holds a motion of 13 nodes, but' in bad.err
-    assert "this structure has 23; give a result of the same pattern and scheme" in bad.err
+    assert "this structure has 23; give a result of the same pattern and model" in bad.err

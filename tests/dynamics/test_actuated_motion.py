@@ -114,3 +114,16 @@ def test_a_rest_angle_beyond_closing_is_named():
     assert 0.3 < float(e.value.partial.time[-1]) < 0.42
     with pytest.raises(fd.errors.InputError, match="actuation with the history step jumps"):
         fd.simulate(fd.Case(fold(), loads=[fd.Actuate([0], 240.0, fd.Step(0.5))]), 1.0)
+
+
+@pytest.mark.parametrize("history", [fd.Ramp(0.5, smooth=True), None])
+def test_a_shell_that_its_crease_folds(history):
+    """Free of all else it comes to rest at the new angle, and the actuator's work is counted."""
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=150)
+    s = fd.shell(pattern, SHEET, divisions=2)
+    case = fd.Case(s, loads=[fd.Actuate([0], 170.0, history)], damping=fd.Rayleigh(alpha=8.0))
+    motion = fd.simulate(case, 4.0, "newmark", every=0.5)
+    assert motion.attrs["energy_error"] < 2e-3
+    corners = motion.displacement[-1].to_numpy()[: len(pattern.vertices)]
+    folds, _ = fd.discretize(pattern, SHEET, scheme="n4b5").dihedrals(corners)
+    assert np.degrees(folds) == pytest.approx(170.0, abs=0.05)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Self
 
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
+from foldyn.cases.models import MASSLESS_METHODS, SHELL
 from foldyn.cases.schema import (
     CaseSchema,
     LoadSection,
@@ -19,11 +20,11 @@ from foldyn.cases.schema import (
     Section,
     SupportSection,
     Vector,
+    check_mass,
 )
 from foldyn.cases.supports import check_axis
 from foldyn.cases.values import choice, indices, number, show
 from foldyn.errors import InputError
-from foldyn.structures import MASS_RULES
 
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
@@ -58,13 +59,13 @@ def _result_file(value: Any) -> str:
     return value
 
 
-def _one_mass(value: Any) -> list[str]:
+def _one_mass(value: Any, info: ValidationInfo) -> list[str]:
     if isinstance(value, list):
         raise InputError(
             f" = {show(value)}: a path is computed once; give one rule, or none: only gravity and "
             "inertia relief use the mass"
         )
-    return [choice("", value, MASS_RULES)]
+    return [check_mass("", value, info)]
 
 
 def _timeless(value: Any) -> None:
@@ -229,6 +230,23 @@ class MotionSchema(CaseSchema):
     initial: MotionStart | None = None
     analysis: DynamicsSection
     output: MotionOutput = MotionOutput()
+
+    @model_validator(mode="after")
+    def _moves_the_model(self) -> Self:
+        if self.model.kind == SHELL:
+            if "method" not in self.analysis.model_fields_set:
+                self.analysis.method = "auto"
+            check_implicit("method", self.analysis.method, ("auto", *MASSLESS_METHODS))
+        return self
+
+
+def check_implicit(key: str, method: str | None, fit: tuple[str, ...] = MASSLESS_METHODS) -> None:
+    """Refuse an integrator that a shell cannot have."""
+    if method is not None and method not in fit:
+        raise InputError(
+            f"analysis.{key} = {show(method)}: needs mass everywhere, and the rotations of a shell "
+            f"have none; choose one of {', '.join(fit)}, or leave it out"
+        )
 
 
 class PathSchema(CaseSchema):

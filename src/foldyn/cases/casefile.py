@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from foldyn.cases.case import Case
 from foldyn.cases.initial import Initial, rigid_motion
+from foldyn.cases.models import MODELS
 from foldyn.cases.state import State
 from foldyn.cases.values import choice, show
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.structures import MASS_RULES, Sheet, discretize
+from foldyn.structures import Sheet
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,8 @@ class CaseFile:
         Its title, or "".
     pattern : Pattern
     sheet : Sheet
+    model : str
+        "bars_and_hinges" or "shell".
     masses : list of str
         Mass rules, one or several to compare.
     analysis : Analysis
@@ -100,6 +103,7 @@ class CaseFile:
     title: str
     pattern: Pattern
     sheet: Sheet
+    model: str
     masses: list[str]
     analysis: Analysis
     output: Output
@@ -109,7 +113,7 @@ class CaseFile:
 
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""
-        rule = self.masses[0] if mass is None else choice("mass", mass, MASS_RULES)
+        rule = self.masses[0] if mass is None else choice("mass", mass, MODELS[self.model].masses)
         if rule not in self._cases:
             self._cases[rule] = build(self.path, self.pattern, self.sheet, rule, self._parts)
         return self._cases[rule]
@@ -158,7 +162,7 @@ class CaseFile:
             if array is not None and len(np.asarray(array)) != wanted:
                 raise InputError(
                     f"{place}holds a motion of {len(np.asarray(array))} nodes, but this structure "
-                    f"has {wanted}; give a result of the same pattern and scheme"
+                    f"has {wanted}; give a result of the same pattern and model"
                 )
         return state
 
@@ -166,7 +170,7 @@ class CaseFile:
 def build(path: Path, pattern: Pattern, sheet: Sheet, mass: str, parts: Mapping[str, Any]) -> Case:
     """Make the case of a file with one mass rule."""
     with placed(path, "model: "):
-        structure = discretize(pattern, sheet, mass=mass, **parts["options"])
+        structure = MODELS[parts["model"]].make(pattern, sheet, mass=mass, **parts["options"])
         if sheet.density is not None:
             _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
     with placed(path, ""):

@@ -85,9 +85,56 @@ def _text(file: Path) -> str:
         raise InputError(f"cannot be read: {reason}") from None
 
 
-def _columns(
-    text: str, time: str | None, value: str | None, wanted: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def read_numbers(
+    path: str | os.PathLike[str], wanted: Mapping[str, tuple[str, str]]
+) -> dict[str, NDArray[np.float64]]:
+    """Numbers of several columns of a CSV file, of any quantities, in lines of any order.
+
+    Parameters
+    ----------
+    path : path
+        A file as `Table.from_csv` reads it.
+    wanted : mapping of str to (str, str)
+        By field, for messages and the result: the heading of its column, with or without the
+        unit, and the unit that its numbers become.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (lines,)
+
+    Raises
+    ------
+    InputError
+        As `Table.from_csv`, but for the order of the lines.
+    """
+    file = Path(path)
+    try:
+        columns, rows = _lines(_text(file))
+        found = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
+        ratios = [
+            _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
+            for item, (_, unit) in zip(found, wanted.values(), strict=True)
+        ]
+        values = np.array([[_number(n, row, c, r) for c, r in zip(found, ratios, strict=True)]
+                           for n, row in rows])  # fmt: skip
+        if not len(values):
+            raise InputError("holds no lines of numbers below the names of the columns")
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    return dict(zip(wanted, values.T, strict=True))
+
+
+def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
+    """Names and units of the columns of a CSV file; None where a column has no unit."""
+    file = Path(path)
+    try:
+        return [(column.name, column.unit) for column in _lines(_text(file))[0]]
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def _lines(text: str) -> tuple[list[_Column], list[tuple[int, list[str]]]]:
+    """Columns of a table, and its lines below the header: number in the file, and cells."""
     lines = [
         (number, line)
         for number, line in enumerate(re.split(r"\r\n|\r|\n", text), 1)
@@ -98,10 +145,6 @@ def _columns(
     number, first = lines[0]
     delimiter = next((mark for mark in _DELIMITERS if mark in first), ",")
     columns = _headings(number, _cells(number, first, delimiter))
-    found = _find("time", time, columns, 0), _find("value", value, columns, 1)
-    if found[0] == found[1]:
-        raise InputError(f'time and value: are both the column "{found[0].heading}"; name two')
-    ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
     rows = []
     for number, line in lines[1:]:
         cells = _cells(number, line, delimiter)
@@ -110,9 +153,22 @@ def _columns(
                 f"line {number}: has {len(cells)} cells, the header has {len(columns)} (cells "
                 f"end at every {_DELIMITERS[delimiter]})"
             )
-        rows.append(
-            [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
-        )
+        rows.append((number, cells))
+    return columns, rows
+
+
+def _columns(
+    text: str, time: str | None, value: str | None, wanted: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    columns, lines = _lines(text)
+    found = _find("time", time, columns, 0), _find("value", value, columns, 1)
+    if found[0] == found[1]:
+        raise InputError(f'time and value: are both the column "{found[0].heading}"; name two')
+    ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
+    rows = [
+        [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
+        for number, cells in lines
+    ]
     if len(rows) < 2:
         raise InputError(f"too few lines of numbers ({len(rows)}); a table needs at least two")
     times, values = np.array(rows, dtype=np.float64).T
@@ -120,7 +176,7 @@ def _columns(
     if back.size:
         i = int(back[0]) + 1
         raise InputError(
-            f"line {lines[i + 1][0]}: the time {times[i]:.9g} s does not come after the time "
+            f"line {lines[i][0]}: the time {times[i]:.9g} s does not come after the time "
             f"before it ({times[i - 1]:.9g} s); times must increase"
         )
     return times, values

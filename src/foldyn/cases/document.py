@@ -24,11 +24,12 @@ from foldyn.cases.decode import history_from, law_from
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.loads import Force, Gravity
+from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
-from foldyn.shells import Shell, shell
+from foldyn.shells import Shell
 from foldyn.structures import Sheet, Structure, discretize
 
 LAWS: Mapping[str, Mapping[str, type]] = {
@@ -36,7 +37,6 @@ LAWS: Mapping[str, Mapping[str, type]] = {
     "fold_law": HINGE_LAWS,
     "bend_law": HINGE_LAWS,
 }
-SHELL = "shell"  # the model's kind, where it is not bars and hinges
 PER_CREASE = ("crease_stiffness", "crease_rest")
 
 
@@ -276,10 +276,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         warnings.simplefilter("ignore", FoldynWarning)
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
         sheet = Sheet(**sections["sheet"])
-        kind = model.pop("kind", "bars_hinges")
-        structure = (
-            shell(pattern, sheet, **model) if kind == SHELL else discretize(pattern, sheet, **model)
-        )
+        structure = MODELS[model.pop("kind", BARS_AND_HINGES)].make(pattern, sheet, **model)
         if nodes.shape != structure.nodes.shape:
             raise InputError(
                 f"the result holds rest positions of shape {nodes.shape}, its structure has "

@@ -23,6 +23,7 @@ from foldyn.cases.initial import Initial
 from foldyn.cases.kinds import KINDS, schema_of
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
+from foldyn.cases.models import MODELS, SHELL, remodeled
 from foldyn.cases.schema import LoadSection, SupportSection
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
@@ -31,7 +32,7 @@ from foldyn.cases.vibrations import DriveSection, FrfSection
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import read_pattern
 from foldyn.patterns import GENERATORS, Pattern
-from foldyn.structures import ModelOptions, Sheet
+from foldyn.structures import Sheet
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
@@ -39,13 +40,21 @@ SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys of a path's analysis that are settings of its solver."""
 
 
-def read_case(path: str | os.PathLike[str]) -> CaseFile:
+def read_case(
+    path: str | os.PathLike[str], model: str | None = None, divisions: int | None = None
+) -> CaseFile:
     """Read a case file and check it whole.
 
     Parameters
     ----------
     path : path
         A TOML file; see the documentation for its keys. Relative paths in it start at its folder.
+    model : {"bars_and_hinges", "shell"}, optional
+        Model instead of that of the file. Creases, supports, loads and output stay; what means
+        nothing to the other model is left out: keys of [model] that it does not have, the mass
+        rules, and for a shell an explicit method with its step, and a secant amplitude.
+    divisions : int, optional
+        Pieces of every edge of a shell, instead of those of the file.
 
     Returns
     -------
@@ -58,18 +67,31 @@ def read_case(path: str | os.PathLike[str]) -> CaseFile:
         key, the value and what to do.
     """
     path = Path(path)
-    return case_of_document(path, read_document(path))
+    document = read_document(path)
+    if model is not None or divisions is not None:
+        validated(path, document)
+        with placed(path, ""):
+            document = remodeled(document, model, divisions)
+    return case_of_document(path, document)
+
+
+def validated(path: Path, document: Mapping[str, Any]) -> Any:
+    """Sections of a case file, checked one by one and with each other."""
+    shape: Any = schema_of(document)
+    try:
+        return shape.model_validate(document, context={"folder": path.parent})
+    except ValidationError as error:
+        raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
 
 
 def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     """Check what a case file says and make its cases; see `read_case`."""
-    shape: Any = schema_of(document)
-    try:
-        schema = shape.model_validate(document, context={"folder": path.parent})
-    except ValidationError as error:
-        raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
+    schema = validated(path, document)
     with placed(path, "pattern"):
         pattern = _pattern(schema.pattern, path.parent)
+    if schema.model.kind == SHELL:
+        with placed(path, ""):
+            _check_vertices(schema, len(pattern.vertices))
     with placed(path, ""):
         sheet = Sheet(**schema.sheet.model_dump())
     if sheet.density is None and schema.analysis.kind != "statics":
@@ -77,10 +99,10 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         needed = what.get(schema.analysis.kind, "a frequency response needs")
         raise InputError(f"{path}: sheet.density: missing; {needed} it (kg/m3)")
     parts: dict[str, Any] = {
-        "options": {name: getattr(schema.model, name) for name in schema.model.model_fields_set},
+        "model": schema.model.kind,
+        "options": schema.model.options,
     }
-    named = parts["options"].pop("mass", None)
-    masses = [ModelOptions().mass] if named is None else list(named)
+    masses = list(schema.model.mass or [MODELS[schema.model.kind].mass])
     with placed(path, "damping."):
         parts["damping"] = Rayleigh(**schema.damping.model_dump())
     parts["supports"] = []
@@ -105,6 +127,7 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         title=schema.title,
         pattern=pattern,
         sheet=sheet,
+        model=schema.model.kind,
         masses=masses,
         analysis=analysis,
         output=Output(nodes, schema.output.nodes is not None, **output),
@@ -146,6 +169,26 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
     except InputError as error:
         place = f'.file = "{table["file"]}": ' if "file" in table else ": "
         raise InputError(f"{place}{error}") from None
+
+
+def _check_vertices(schema: Any, count: int) -> None:
+    """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
+    places = {f"supports[{i}].nodes": item.nodes for i, item in enumerate(schema.supports)}
+    places |= {f"loads[{i}].nodes": item.nodes for i, item in enumerate(schema.loads)}
+    drive = getattr(schema, "drive", None) or []
+    places |= {f"drive[{i}].nodes": item.nodes for i, item in enumerate(drive)}
+    until = getattr(schema.analysis, "until", None)
+    places |= {} if until is None else {"analysis.until.node": (until.node,)}
+    places["output.nodes"] = schema.output.nodes
+    for place, nodes in places.items():
+        if nodes is None or isinstance(nodes, str):
+            continue
+        beyond = [node for node in nodes if not 0 <= node < count]
+        if beyond:
+            raise InputError(
+                f"{place}: {beyond[0]} is no vertex of the pattern, which has 0 to {count - 1}; a "
+                "case file names nodes of a shell by vertex, whatever its divisions"
+            )
 
 
 def _support(item: SupportSection) -> Support:

@@ -24,13 +24,13 @@ from foldyn.cases.actuation import check_angles, check_creases
 from foldyn.cases.damping import STATES
 from foldyn.cases.decode import check_keys, history_from, law_from
 from foldyn.cases.histories import History
+from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import check_axis, check_per_node
 from foldyn.cases.values import choice, number, numbers, show, vector
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
-from foldyn.structures import MASS_RULES
 from foldyn.structures.options import CALIBRATIONS, SCHEMES
 
 
@@ -84,15 +84,34 @@ def _inline(value: Mapping[str, Any]) -> None:
         )
 
 
-def _masses(value: Any) -> list[str]:
+def _masses(value: Any, info: ValidationInfo) -> list[str]:
     names = value if isinstance(value, list) else [value]
+    known = known_masses(info)
     if not names:
-        raise InputError(f" = []: give at least one of {', '.join(MASS_RULES)}")
+        raise InputError(f" = []: give at least one of {', '.join(known)}")
     for i, name in enumerate(names):
-        choice(f"[{i}]" if isinstance(value, list) else "", name, MASS_RULES)
+        check_mass(f"[{i}]" if isinstance(value, list) else "", name, info)
         if name in names[:i]:
             raise InputError(f"[{i}] = {show(name)}: is listed twice")
     return names
+
+
+def known_masses(info: ValidationInfo) -> list[str]:
+    """Distributions of mass of the model, or of all models where its kind is wrong."""
+    kinds = [info.data["kind"]] if "kind" in info.data else list(MODELS)
+    return [name for kind in kinds for name in MODELS[kind].masses]
+
+
+def check_mass(place: str, name: Any, info: ValidationInfo) -> str:
+    """Return a distribution of mass that the model has."""
+    known = known_masses(info)
+    for kind, other in MODELS.items():
+        if isinstance(name, str) and name in other.masses and name not in known:
+            raise InputError(
+                f"{place} = {show(name)}: only for model.kind = {show(kind)}; choose one of "
+                f"{', '.join(known)}"
+            )
+    return choice(place, name, known)
 
 
 def _creases(value: Any) -> Any:
@@ -129,9 +148,11 @@ class SheetSection(Section):
 
 
 class ModelSection(Section):
-    """[model]: arguments of `discretize`; what is left out has its default there."""
+    """[model]: arguments of `discretize` or `shell`; what is left out has its default there."""
 
+    kind: Annotated[str, PlainValidator(lambda value: choice("", value, MODELS))] = BARS_AND_HINGES
     scheme: Annotated[Any, PlainValidator(lambda value: choice("", value, SCHEMES))] = None
+    divisions: Annotated[int, Field(ge=1)] | None = None
     mass: Annotated[list[str] | None, PlainValidator(_masses)] = None
     bar_law: BarLawSpec = None
     fold_law: HingeLawSpec = None
@@ -141,6 +162,29 @@ class ModelSection(Section):
     )
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
+
+    @model_validator(mode="after")
+    def _fits_the_kind(self) -> Self:
+        model = MODELS[self.kind]
+        strange = [
+            key
+            for key in type(self).model_fields
+            if key in self.model_fields_set - {"kind"} and key not in model.keys
+        ]
+        if strange:
+            owner = next(kind for kind, other in MODELS.items() if strange[0] in other.keys)
+            raise InputError(
+                f".{strange[0]}: only for model.kind = {show(owner)}; {model.name} "
+                f"{'have' if self.kind == BARS_AND_HINGES else 'has'} no {', '.join(strange)}: "
+                f"leave {'it' if len(strange) == 1 else 'them'} out"
+            )
+        return self
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the file says of the options of its model, but for the mass."""
+        given = self.model_fields_set - {"kind", "mass"}
+        return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
 
 
 class DampingSection(Section):

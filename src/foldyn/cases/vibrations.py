@@ -13,8 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, model_validator
 
-from foldyn.cases.analyses import ANIMATIONS, AXES, METHODS, MOST_SHAPES, PathStart
+from foldyn.cases.analyses import (
+    ANIMATIONS,
+    AXES,
+    METHODS,
+    MOST_SHAPES,
+    PathStart,
+    check_implicit,
+)
 from foldyn.cases.decode import check_keys
+from foldyn.cases.models import SHELL
 from foldyn.cases.schema import (
     CaseSchema,
     LoadSection,
@@ -151,7 +159,7 @@ class FrfSection(Section):
     amplitude: Positive = 1.0
     count: Annotated[int, Field(ge=1)] | None = None
     static_correction: bool = True
-    integrator: Annotated[str, _one_of(METHODS)] = "rk4"
+    integrator: Annotated[str | None, _one_of(METHODS)] = None
     dt: Positive | None = None
     tolerance: Positive | None = None
     iterations: Annotated[int, Field(ge=2)] = 300
@@ -264,6 +272,15 @@ class VibrationSchema(CaseSchema):
     analysis: ModesSection | FrfSection
 
     @model_validator(mode="after")
+    def _knows_the_model(self) -> Self:
+        if self.model.kind == SHELL and "secant" in self.analysis.model_fields_set:
+            raise InputError(
+                f"analysis.secant = {show(self.analysis.secant)}: is for superlinear bends, which "
+                "a shell has not; leave it out"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _has_one_state(self) -> Self:
         stated = "state" in self.analysis.model_fields_set
         if self.initial is not None and stated:
@@ -298,6 +315,12 @@ class FrfSchema(VibrationSchema):
     analysis: FrfSection
     drive: list[DriveSection] = Field(min_length=1)
     output: FrfOutput = FrfOutput()
+
+    @model_validator(mode="after")
+    def _moves_the_model(self) -> Self:
+        if self.model.kind == SHELL:
+            check_implicit("integrator", self.analysis.integrator)
+        return self
 
     @model_validator(mode="after")
     def _drives_alike(self) -> Self:

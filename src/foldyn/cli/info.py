@@ -15,12 +15,12 @@ REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplo
 
 def info() -> str:
     """Text of the command."""
+    from foldyn.cases.models import MODELS
     from foldyn.cases.vibrations import FRF_METHODS
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
     from foldyn.patterns import GENERATORS
     from foldyn.statics import METHODS as PATH_METHODS
-    from foldyn.structures import MASS_RULES
 
     lines = [
         f"foldyn {__version__}",
@@ -36,7 +36,10 @@ def info() -> str:
         f"methods of paths: {', '.join(PATH_METHODS)}",
         f"methods of frequency responses: {', '.join(FRF_METHODS)}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
-        f"mass rules: {', '.join(MASS_RULES)}",
+        *(
+            f"model {kind}: mass {', '.join(model.masses)} (default: {model.mass})"
+            for kind, model in MODELS.items()
+        ),
         "shipped cases:",
         *(f"  {name}" for name in shipped_cases()),
     ]

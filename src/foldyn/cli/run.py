@@ -28,6 +28,11 @@ KINDS: Mapping[str, Callable[[CaseFile, bool], Task]] = {
     "frf": Responses,
 }
 """What is computed for each kind of analysis."""
+PARTS: Mapping[str, tuple[str, ...]] = {
+    "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
+    "shell": ("nodes", "triangles", "folds"),
+}
+"""What is counted of the structure of each model."""
 
 
 def run(
@@ -113,11 +118,9 @@ class _Introduction:
         for one in self.told:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
         structure = self.case_file.case().structure
-        self.say(
-            f"{self.case_file.title or self.case_file.path.name}: {len(structure.nodes)} nodes, "
-            f"{len(structure.bars)} bars, {len(structure.folds)} folds, "
-            f"{len(structure.bends)} bends"
-        )
+        parts = PARTS[self.case_file.model]
+        counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)
+        self.say(f"{self.case_file.title or self.case_file.path.name}: {counted}")
         if self.task.compiles():
             self.say(
                 "compiling the kernels: first use, up to half a minute; they are kept for later "

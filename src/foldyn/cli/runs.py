@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 # where the case file has what the functions that it calls complain about
 KEYS = {
+    "model": ("fold_law",),
     "analysis": (
         "duration", "method", "dt", "tolerance", "spectral_radius", "load_factors", "steps",
         "first_step", "constant", "inertia_relief", "count", "secant", "frequencies", "amplitude",

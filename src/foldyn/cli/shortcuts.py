@@ -9,9 +9,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from foldyn.cases.casefile import CaseFile
+from foldyn.cases.casefile import CaseFile, placed
 from foldyn.cases.kinds import KINDS, schema_of
 from foldyn.cases.messages import describe
+from foldyn.cases.models import remodeled
 from foldyn.cases.reading import case_of_document, read_document
 from foldyn.cases.vibrations import STATES
 from foldyn.errors import FoldynWarning, InputError
@@ -19,7 +20,13 @@ from foldyn.errors import FoldynWarning, InputError
 Document = dict[str, Any]
 
 
-def read_as(path: Path, kind: str, flags: Mapping[str, Any]) -> CaseFile:
+def read_as(
+    path: Path,
+    kind: str,
+    flags: Mapping[str, Any],
+    model: str | None = None,
+    divisions: int | None = None,
+) -> CaseFile:
     """Read a case file of any kind as one of modes or of a frequency response.
 
     Parameters
@@ -29,6 +36,8 @@ def read_as(path: Path, kind: str, flags: Mapping[str, Any]) -> CaseFile:
     flags : mapping
         Keys of [analysis] that the command line gives instead of the file; `state` may be a
         result's file, too.
+    model, divisions
+        As of `read_case`.
 
     Warns
     -----
@@ -42,6 +51,8 @@ def read_as(path: Path, kind: str, flags: Mapping[str, Any]) -> CaseFile:
     except ValidationError as error:
         if shape is not KINDS[kind]:  # where it is, flags may give what is missing
             raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
+    with placed(path, ""):
+        document = remodeled(document, model, divisions)
     flags = {key: value for key, value in flags.items() if value is not None}
     if shape is not KINDS[kind]:
         document = _converted(path, document, kind, flags.get("state", "rest"))

@@ -94,9 +94,9 @@ def folds_of(model: Any) -> Any:
     raise NotImplementedError
 
 
-def fold_angles(work: Any) -> Any:
+def fold_angles(work: Any) -> NDArray:
     """Angles (rad) of the same, after `force_of`."""
-    raise NotImplementedError
+    return work.piece_turn if isinstance(work, ShellWork) else work.angle
 
 
 def energies_of(model: Any, u: Any, work: Any, out: Any) -> Any:

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, State
+from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course, Plan
 from foldyn.dynamics.kinds import angles_of
 from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.body import body_of
+from foldyn.statics.body import ShellBody
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 AXES = "xyz"
@@ -108,7 +109,9 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
     clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
     inward = by.inward(q)
     if by.rows > len(u):  # the dofs beside the displacements stand where they are in balance
-        hidden = body_of(case.structure).dofs(u)[u.size :]
+        if system.turns:
+            turn(model, system.actuators, s.factor)
+        hidden = ShellBody(case.structure, model).dofs(u)[u.size :]
         inward.ravel()[u.size : u.size + len(hidden)] = hidden
     return Course(
         u=inward,

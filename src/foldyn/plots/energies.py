@@ -10,18 +10,10 @@ from matplotlib.figure import Figure
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.strain import PARTS, parts_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-NAMES = {
-    "kinetic": "kinetic",
-    "strain_bars": "strain, bars",
-    "strain_folds": "strain, folds",
-    "strain_bends": "strain, bends",
-    "dissipated": "dissipated",
-    "work": "work of the loads",
-}
 
 
 def energy_error(trajectory: xr.Dataset) -> np.ndarray:
@@ -30,7 +22,7 @@ def energy_error(trajectory: xr.Dataset) -> np.ndarray:
     Parameters
     ----------
     trajectory : xarray.Dataset
-        With the six energies (J) over time.
+        With the energies (J) over time.
 
     Returns
     -------
@@ -46,8 +38,9 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     Parameters
     ----------
     trajectory : xarray.Dataset
-        With ``kinetic``, ``strain_bars``, ``strain_folds``, ``strain_bends``, ``dissipated`` and
-        ``work`` (J) over ``time`` (s).
+        With ``kinetic``, the strain energies of its structure (``strain_bars``, ``strain_folds``
+        and ``strain_bends``, or of a shell ``strain_membrane``, ``strain_bending`` and
+        ``strain_folds``), ``dissipated`` and ``work`` (J) over ``time`` (s).
     title : str
         Title of the figure.
 
@@ -61,7 +54,8 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     InputError
         Where an energy is missing from the trajectory.
     """
-    missing = [name for name in NAMES if name not in trajectory]
+    names = _names(trajectory)
+    missing = [name for name in names if name not in trajectory]
     if missing:
         raise InputError(f"trajectory: no {', '.join(missing)}; give a dataset of foldyn.simulate")
     time = trajectory["time"].values
@@ -71,7 +65,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     style.frame(upper, "", "energy (J)")
     style.frame(lower, "time (s)", "balance error (J)")
     handles = []
-    for index, (name, label) in enumerate(NAMES.items()):
+    for index, (name, label) in enumerate(names.items()):
         values = trajectory[name].values
         (line,) = upper.plot(time, values, label=label, **style.line_style(index))
         handles.append(line)
@@ -92,6 +86,14 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     return style.finish(figure)
 
 
+def _names(trajectory: xr.Dataset) -> dict[str, str]:
+    """What the energies are called, in the order in which they are drawn."""
+    strain = {part: f"strain, {PARTS[part][0]}" for part in parts_of(trajectory)}
+    others = {"dissipated": "dissipated", "work": "work of the loads"}
+    return {"kinetic": "kinetic", **strain, **others}
+
+
 def _table(trajectory: xr.Dataset) -> np.ndarray:
     """Return the energies (J) as the audit has them, a column each."""
-    return np.column_stack([trajectory[name].values for name in audit.AUDITED])
+    names = audit.audited(parts_of(trajectory))
+    return np.column_stack([trajectory[name].values for name in names])

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from foldyn.errors import InputError
 from foldyn.materials import bar_law, hinge_law
 from foldyn.plots import style
+from foldyn.shells import Shell
 
 if TYPE_CHECKING:
     from foldyn.structures import Structure
@@ -22,17 +23,18 @@ _FRAMED = (20.0, 340.0)
 
 
 def plot_laws(
-    structure: Structure, stretch: tuple[float, float] = (0.8, 1.2), title: str = ""
+    structure: Structure | Shell, stretch: tuple[float, float] = (0.8, 1.2), title: str = ""
 ) -> Figure:
     """Draw moment against dihedral of folds and bends, and stress against stretch of bars.
 
-    Hinges of equal stiffness and rest angle share a curve; of each kind at most four different
-    curves are shown, those of the most hinges. A dot and a dotted line mark the rest angle.
+    A shell has folds alone. Hinges of equal stiffness and rest angle share a curve; of each kind
+    at most four different curves are shown, those of the most hinges. A dot and a dotted line mark
+    the rest angle.
 
     Parameters
     ----------
-    structure : Structure
-        Its laws, stiffnesses and rest angles are drawn as they are used.
+    structure : Structure or Shell
+        Its laws, stiffnesses and rest angles are drawn as they are used, those of whole creases.
     stretch : tuple of float
         Range of the bars' stretch.
     title : str
@@ -46,25 +48,39 @@ def plot_laws(
     Raises
     ------
     InputError
-        Where the stretches are not positive and increasing.
+        Where the stretches are not positive and increasing, or a shell has no folds.
     """
     low, high = stretch
     if not (0.0 < low < high < np.inf):
         raise InputError(f"stretch: {stretch!r}; give two positive, increasing stretches")
-    options = structure.options
-    kinds = [
-        ("fold", options.fold_law, structure.folds, structure.fold_stiffness, structure.fold_rest),
-        ("bend", options.bend_law, structure.bends, structure.bend_stiffness, structure.bend_rest),
-    ]
-    kinds = [kind for kind in kinds if len(kind[2])]
-    columns = len(kinds) + 1
+    kinds = _hinges(structure)
+    bars = not isinstance(structure, Shell)
+    if not kinds and not bars:
+        raise InputError("structure: is a shell without folds, which has no laws to draw")
+    columns = len(kinds) + bars
     figure = style.new_figure(3.5 * columns, 3.9)
     style.title_above(figure, title)
     frames = figure.subplots(1, columns, squeeze=False)[0]
     for axes, (kind, spec, hinges, stiffness, rest) in zip(frames, kinds, strict=False):
         _draw_hinges(axes, kind, hinge_law(spec), hinges, stiffness, rest)
-    _draw_bar(frames[-1], bar_law(options.bar_law), structure.sheet.youngs_modulus, low, high)
+    if bars:
+        law = bar_law(structure.options.bar_law)
+        _draw_bar(frames[-1], law, structure.sheet.youngs_modulus, low, high)
     return style.finish(figure)
+
+
+def _hinges(structure: Structure | Shell) -> list[tuple[str, Any, Any, Any, Any]]:
+    """Kinds of hinges that a structure has: name, law, ends (k, 2), stiffness and rest angle."""
+    options, of_folds = structure.options, (structure.fold_stiffness, structure.fold_rest)
+    if isinstance(structure, Shell):  # whose hinges are pieces of creases
+        kinds: list[Any] = [("fold", options.fold_law, structure.pattern.creases, *of_folds)]
+    else:
+        of_bends = structure.bend_stiffness, structure.bend_rest
+        kinds = [
+            ("fold", options.fold_law, structure.folds, *of_folds),
+            ("bend", structure.options.bend_law, structure.bends, *of_bends),
+        ]
+    return [kind for kind in kinds if len(kind[2])]
 
 
 def _draw_hinges(

@@ -220,7 +220,7 @@ def _readable(
         return shape
     if amplitude is not None:
         return shape * (amplitude / largest)
-    first, second = np.concatenate([sheet.edges, sheet.inner_bars]).T
+    first, second = np.concatenate([sheet.pieces, sheet.inner_bars]).T
     length = np.linalg.norm(sheet.nodes[second] - sheet.nodes[first], axis=1)
     parting = np.linalg.norm(shape[second] - shape[first], axis=1)
     limit = float((_STRETCH * length / np.maximum(parting, 1e-30)).min())

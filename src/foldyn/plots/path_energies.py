@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,21 +13,16 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import along, check_nodes_of, check_path, main_direction, way
+from foldyn.plots.strain import PARTS, stacked
 
 if TYPE_CHECKING:
     import xarray as xr
 
-NAMES: Mapping[str, tuple[str, str]] = {
-    "strain_bars": ("bars", style.VERMILLION),
-    "strain_bends": ("bends", style.PURPLE),
-    "strain_folds": ("folds", style.GREEN),
-}
-"""Energies from the bottom of the stack up, their names and colors."""
 _NONE = 1e-9  # of the largest energy: below it there is nothing to share
 
 
 def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Shares of bars, bends and folds in the strain energy of each point; NaN where there is none.
+    """Shares of its parts in the strain energy of each point; NaN where there is none.
 
     Parameters
     ----------
@@ -37,10 +32,11 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     Returns
     -------
     dict of str to ndarray, shape (steps,)
-        "bars", "bends" and "folds", each from 0 to 1.
+        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", each from 0
+        to 1.
     """
     check_path(path, "path")
-    energies = {label: path[name].values for name, (label, _) in NAMES.items()}
+    energies = {PARTS[part][0]: path[part].values for part in stacked(path)}
     total = np.asarray(sum(energies.values()))
     total = np.where(total > _NONE * max(float(total.max(initial=0.0)), 0.0), total, np.nan)
     return {label: energy / total for label, energy in energies.items()}
@@ -52,7 +48,7 @@ def plot_path_energies(
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the strain energies of bars, bends and folds along a path, one upon the other.
+    """Draw the parts of the strain energy along a path, one upon the other: see `energy_shares`.
 
     Parameters
     ----------
@@ -84,9 +80,8 @@ def plot_path_energies(
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.8, 1.0]})
     style.frame(upper, "", "strain energy (J)")
     style.frame(lower, name, "share")
-    layers = [path[key].values for key in NAMES]
-    labels = [label for label, _ in NAMES.values()]
-    colors = [color for _, color in NAMES.values()]
+    layers = [path[part].values for part in stacked(path)]
+    labels, colors = zip(*(PARTS[part] for part in stacked(path)), strict=True)
     handles: list = list(upper.stackplot(x, layers, labels=labels, colors=colors, alpha=0.75))
     work = float(sum(layer[0] for layer in layers)) + path["work"].values
     (line,) = upper.plot(

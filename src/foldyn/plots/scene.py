@@ -77,41 +77,56 @@ class Sheet3D:
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     @cached_property
-    def boundary(self) -> NDArray[np.int64]:
-        """Edges of one panel only, shape (nb, 2)."""
-        return np.asarray(self.pattern.boundary, dtype=np.int64).reshape(-1, 2)
+    def edges(self) -> NDArray[np.int64]:
+        """Nodes along each edge of the pattern, creases first, shape (ne, p).
+
+        p is 2, or for a shell the number of nodes along an edge, which bends.
+        """
+        if hasattr(self.structure, "edge_nodes"):
+            return np.asarray(self.structure.edge_nodes, dtype=np.int64)
+        both = [np.reshape(pairs, (-1, 2)) for pairs in (self._creases, self.pattern.boundary)]
+        return np.concatenate(both).astype(np.int64)
 
     @cached_property
-    def edges(self) -> NDArray[np.int64]:
-        """All edges of the pattern, shape (ne, 2)."""
-        return np.asarray(self.pattern.edges, dtype=np.int64).reshape(-1, 2)
+    def boundary(self) -> NDArray[np.int64]:
+        """Edges of one panel only, shape (nb, p)."""
+        return self.edges[len(self._creases) :]
+
+    @cached_property
+    def pieces(self) -> NDArray[np.int64]:
+        """Neighbors along all edges of the pattern, shape (ne (p - 1), 2)."""
+        return np.stack([self.edges[:, :-1], self.edges[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
     def inner_bars(self) -> NDArray[np.int64]:
-        """Bars of the structure that are no edges of the pattern, shape (k, 2)."""
+        """Bars, or sides of a shell's triangles, that are on no edge of the pattern, (k, 2)."""
         if self.structure is None:
             return np.zeros((0, 2), dtype=np.int64)
-        edges = {tuple(edge) for edge in np.sort(self.edges, axis=1).tolist()}
+        edges = {tuple(edge) for edge in np.sort(self.pieces, axis=1).tolist()}
         bars = np.sort(np.asarray(self.structure.bars, dtype=np.int64), axis=1).tolist()
         inner = [bar for bar in bars if tuple(bar) not in edges]
         return np.array(inner, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
     def actuated(self) -> NDArray[np.int64]:
-        """Creases that the case actuates, shape (k, 2)."""
+        """Creases that the case actuates, shape (k, p)."""
         if self.case is None:
             return np.zeros((0, 2), dtype=np.int64)
-        return np.asarray(self.pattern.creases, dtype=np.int64)[self.case.actuated_creases]
+        return self.edges[self.case.actuated_creases]
 
     def creases(self) -> dict[str, NDArray[np.int64]]:
-        """Return the creases (k, 2) of each assignment that occurs."""
-        creases = np.asarray(self.pattern.creases, dtype=np.int64).reshape(-1, 2)
+        """Return the creases (k, p) of each assignment that occurs."""
+        creases = self.edges[: len(self._creases)]
         kinds = np.array(self.pattern.assignments, dtype=str)
         return {
             kind: creases[kinds == kind]
             for kind in style.CREASES
             if np.count_nonzero(kinds == kind)
         }
+
+    @property
+    def _creases(self) -> NDArray[np.int64]:
+        return np.asarray(self.pattern.creases, dtype=np.int64).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
@@ -332,7 +347,7 @@ def add_segments(
     zorder: float = 2.0,
     alpha: float = 1.0,
 ) -> Line3DCollection:
-    """Draw straight segments (k, 2, 3)."""
+    """Draw segments (k, p, 3), straight from each of their points to the next."""
     lines = Line3DCollection(
         segments,
         colors=color,

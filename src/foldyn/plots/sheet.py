@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from foldyn.plots import scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.visibility import hidden_points, split_edges
+from foldyn.shells import Shell
 
 _HIDDEN = 0.3  # opacity of what lies behind a panel
 
@@ -26,7 +27,7 @@ def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
 
 @dataclass(frozen=True)
 class EdgeKind:
-    """Edges that look alike: their node pairs (k, 2), look and name."""
+    """Edges that look alike: the nodes along them (k, p), look and name."""
 
     name: str
     edges: NDArray[np.int64]
@@ -38,13 +39,16 @@ class EdgeKind:
 def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[EdgeKind]:
     """Return the kinds of edges that a sheet has, from the lowest to the topmost.
 
-    Its inner bars are among them where `elements`, the glow of actuated creases where `actuated`.
+    Its inner bars, or the sides of a shell's triangles, are among them where `elements`, the glow
+    of actuated creases where `actuated`.
     """
     kinds = []
     if actuated and len(sheet.actuated):
         kinds.append(EdgeKind("actuated crease", sheet.actuated, style.ACTUATED, 6.0, "solid"))
     if elements and len(sheet.inner_bars):
-        kinds.append(EdgeKind("bar inside a panel", sheet.inner_bars, style.GRAY, 0.7, "solid"))
+        inner = isinstance(sheet.structure, Shell)
+        name, width = ("side of a triangle", 0.35) if inner else ("bar inside a panel", 0.7)
+        kinds.append(EdgeKind(name, sheet.inner_bars, style.GRAY, width, "solid"))
     kinds.append(EdgeKind("boundary", sheet.boundary, style.BLACK, 1.1, "solid"))
     for kind, edges in sheet.creases().items():
         name = f"{style.CREASE_NAMES[kind]} crease"
@@ -75,7 +79,7 @@ class DrawnSheet:
         Positions of the nodes (m).
     view : View
     elements : bool
-        Draw the bars inside the panels too.
+        Draw the bars inside the panels too, or the sides of a shell's triangles.
     actuated : bool
         Let actuated creases glow.
     """

@@ -54,7 +54,7 @@ def draw_structure(
     displacement : array_like, shape (n, 3), or None
         Node displacements (m): the deformed sheet is drawn over the undeformed one in gray.
     numbers : bool or "all"
-        Write the numbers of the pattern's vertices; "all" also those of the panels' inner nodes.
+        Write the numbers of the pattern's vertices; "all" also those of all other nodes.
     supports : bool
         Mark held and moved nodes: one triangle per direction, and the names of the directions. An
         arrow from each node with an imposed displacement, and one from the middle of a moving
@@ -63,7 +63,7 @@ def draw_structure(
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         and one from the center of mass along gravity. Actuated creases glow.
     elements : bool
-        Draw the bars inside the panels too.
+        Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float
         Factor on the displacement in the picture.
     view : tuple of float
@@ -282,7 +282,7 @@ def _write_labels(
     obstacles = np.vstack(
         [
             points,
-            marks.along_lines(points[sheet.edges]),
+            marks.along_lines(points[sheet.pieces]),
             marks.along_lines(shafts),
             marks.outline(triangles),
             marks.outline(heads),

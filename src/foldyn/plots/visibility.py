@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.plots.scene import View
 
-SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge
+SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge, about
 _CHUNK = 1_000_000  # point-triangle pairs tested at a time (about 100 MB)
 
 
@@ -99,24 +99,40 @@ def split_edges(
     view: View,
     size: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cut edges (k, 2) into segments in sight and segments hidden by panels.
+    """Cut edges (k, p), each straight from node to node, into parts in sight and hidden ones.
 
     Returns
     -------
-    visible, hidden : ndarray, shape (m, 2, 3)
-        Neighboring pieces of an edge with equal visibility are joined.
+    visible, hidden : ndarray, shape (m, q, 3)
+        Neighboring pieces of an edge with equal visibility are joined. All parts have as many
+        points as the longest: shorter ones stay at their last point.
     """
     if len(edges) == 0:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3))
-    start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]
-    middle = (np.arange(SAMPLES) + 0.5)[:, None] / SAMPLES
-    points = start[:, None] * (1.0 - middle) + end[:, None] * middle
+    lines = vertices[edges]
+    each = max(2, SAMPLES // (edges.shape[1] - 1))  # samples from node to node
+    middle = (np.arange(each) + 0.5)[:, None] / each
+    points = lines[:, :-1, None] * (1.0 - middle) + lines[:, 1:, None] * middle
     behind = hidden_points(points.reshape(-1, 3), vertices, triangles, view, size)
     parts: tuple[list, list] = ([], [])
-    for p, q, row in zip(start, end, behind.reshape(-1, SAMPLES), strict=True):
-        cuts = [0, *(np.flatnonzero(row[1:] != row[:-1]) + 1).tolist(), SAMPLES]
+    for line, row in zip(lines, behind.reshape(len(edges), -1), strict=True):
+        cuts = [0, *(np.flatnonzero(row[1:] != row[:-1]) + 1).tolist(), len(row)]
         for low, high in pairwise(cuts):
-            ends = [p + (q - p) * (cut / SAMPLES) for cut in (low, high)]
-            parts[int(row[low])].append(ends)
-    visible, hidden = (np.array(part).reshape(-1, 2, 3) for part in parts)
+            inner = line[low // each + 1 : -(-high // each)]
+            ends = [_point(line, cut / each) for cut in (low, high)]
+            parts[int(row[low])].append(np.array([ends[0], *inner, ends[1]]))
+    visible, hidden = (_together(part) for part in parts)
     return visible, hidden
+
+
+def _point(line: NDArray[np.float64], place: float) -> NDArray[np.float64]:
+    """Point at a place from 0 to p - 1 of a line (p, 3)."""
+    k = min(int(place), len(line) - 2)
+    return line[k] + (line[k + 1] - line[k]) * (place - k)
+
+
+def _together(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Lines of different numbers of points in one array."""
+    longest = max((len(part) for part in parts), default=2)
+    same = [np.concatenate([part, part[-1:].repeat(longest - len(part), 0)]) for part in parts]
+    return np.array(same).reshape(-1, longest, 3)

@@ -10,7 +10,8 @@ import numpy as np
 
 from foldyn import plots
 from foldyn.cases import Case
-from foldyn.report.sections import Heading, Picture, Section
+from foldyn.report.sections import Heading, Picture, Section, Text
+from foldyn.shells import Shell
 
 if TYPE_CHECKING:
     import xarray
@@ -36,16 +37,33 @@ class Album:
         self, case: Case, caption: str = "The pattern with its nodes, supports and loads."
     ) -> list[Section]:
         """Draw the structure and its laws."""
-        return [
+        sections: list[Section] = [
             Heading("The structure"),
             self.figure("structure", caption, lambda: plots.draw_structure(case)),
-            self.figure(
-                "laws",
-                "Constitutive curves: moment of a fold and of a bend against the dihedral, stress "
-                "of a bar against its stretch.",
-                lambda: plots.plot_laws(case.structure),
-            ),
         ]
+        of_shell = isinstance(case.structure, Shell)
+        laws = (
+            "Constitutive curves: moment of a fold, over the whole crease, against the dihedral."
+            if of_shell
+            else "Constitutive curves: moment of a fold and of a bend against the dihedral, stress "
+            "of a bar against its stretch."
+        )
+        if len(case.structure.folds) or not of_shell:
+            sections.append(self.figure("laws", laws, lambda: plots.plot_laws(case.structure)))
+        if of_shell:
+            sections.append(Text(described_shell(case.structure)))
+        return sections
+
+
+def described_shell(shell: Shell) -> str:
+    """What a reader has to know of a shell."""
+    return (
+        "A shell: panels that stretch and bend as thin sheets, in "
+        f"{len(shell.triangles)} triangles ({shell.options.divisions} divisions of every edge), "
+        "turning against each other along exact creases. The sides of the triangles are not drawn. "
+        "With half the divisions one sees how far the numbers depend on the mesh: the difference "
+        "is about three times the error that is left."
+    )
 
 
 def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], str]:

@@ -187,8 +187,8 @@ def _notes(
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{response.attrs['secant']:g} degrees."
         )
-    if "swing" in response:
-        swing = response["swing"].values
+    swing = response["swing"].values if "swing" in response else np.zeros(1)
+    if (swing > 0.0).any():  # else no hinge is superlinear
         at = int(np.nanargmax(swing)) if np.isfinite(swing).any() else 0
         told.append(
             "Each superlinear hinge is linearized for its own amplitude: the largest is "

@@ -93,7 +93,7 @@ def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: li
                 rule,
                 a["steps"],
                 a["dt"],
-                a["critical_step"],
+                a["critical_step"] if np.isfinite(a["critical_step"]) else None,
                 a["steps"] / max(a["wall_seconds"], 1e-9),
                 a["energy_error"],
                 float(np.linalg.norm(moved, axis=-1).max()),

@@ -67,8 +67,8 @@ def write_path(case_file: CaseFile, path: xarray.Dataset, folder: str | Path) ->
         sections.append(
             album.figure(
                 "energies",
-                "Strain energies of bars, bends and folds, one upon the other, with the work that "
-                "was done on the structure; below, their shares.",
+                f"Strain energies of {', '.join(plots.energy_shares(path))}, one upon the other, "
+                "with the work that was done on the structure; below, their shares.",
                 lambda: plots.plot_path_energies(path, *_growing(path, moved)),
             )
         )

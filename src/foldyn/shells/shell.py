@@ -115,6 +115,20 @@ class Shell:
         return rows
 
     @cached_property
+    def edge_nodes(self) -> NDArray:
+        """Nodes along each edge (ne, divisions + 1), from its lower to its higher vertex.
+
+        The creases come first, in their order, then the boundary edges in that of
+        `pattern.boundary`.
+        """
+        ends = np.concatenate([self.pattern.creases, self.pattern.boundary]).reshape(-1, 2)
+        count = self.options.divisions - 1
+        inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)
+        found = np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
+        found.setflags(write=False)
+        return found
+
+    @cached_property
     def bars(self) -> NDArray:
         """Sides of the triangles (nb, 2), each once."""
         tri = self.triangles

@@ -26,6 +26,7 @@ from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, jud
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
+from foldyn.dynamics.kinds import fold_angles
 from foldyn.dynamics.system import acceleration, moving_energy
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.borrow import borrowed
@@ -100,8 +101,8 @@ class Alpha:
         b, packed = self.bench, self.bench.packed
         done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
         if packed.system.turns:
-            angle = b.course.angle
-            done += _actuation(packed.model, packed.system, b.old, b.new, angle, b.work.angle)
+            angle = fold_angles(b.work)
+            done += _actuation(packed.model, packed.system, b.old, b.new, b.folds, angle)
         return done, lost
 
     def change(self, h: float) -> NDArray:
@@ -218,7 +219,7 @@ def _works(system, mass, h, old, new, shift, s):
 
 @kernel
 def _actuation(model, system, old, new, angle0, angle1):
-    """Work of the actuators in a step, from dihedrals angle0 to angle1 (nh,)."""
+    """Work of the actuators in a step, from angles angle0 to angle1 of the folds."""
     change = np.zeros_like(new.factor)
     change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
     turn(model, system.actuators, old.factor)

@@ -42,6 +42,10 @@ class Blocks(Protocol):
         """Fill `out` (nnz, 3, 3) of a pattern that contains this one; see `put_tangent`."""
         ...
 
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """Which entries (nnz, 3, 3) of a pattern that contains this one `put` may fill."""
+        ...
+
 
 class BarsHingesBlocks:
     """Blocks of bars and hinges; see `Blocks`."""
@@ -57,24 +61,35 @@ class BarsHingesBlocks:
         """See `Blocks`."""
         put_tangent(model, pattern, u, before, again, out)
 
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`."""
+        return np.ones((len(pattern.indices), 3, 3), bool)
+
 
 def _narrow_order(model: BarsHinges, pattern: Sparsity) -> NDArray:
-    """Order of the nodes (n,) with the narrowest band: sweeps along the axes, or `node_order`.
+    """Order of the nodes (n,) with the narrowest band: sweeps along the axes, or `node_order`."""
+    row = np.repeat(np.arange(len(model.rest)), np.diff(pattern.indptr))
+    return _narrowest(node_order(model), model.rest, row, pattern.indices)
 
-    On a rectangular sheet a sweep along its longer side has half the width of the latter.
+
+def _narrowest(order: NDArray, position: NDArray, row: NDArray, column: NDArray) -> NDArray:
+    """`order` of places (n,), or a sweep along an axis if it couples none as far apart.
+
+    On a rectangular sheet a sweep along its longer side has half the width of other orders.
+
+    position : (n, 3).
+    row, column : places that are coupled.
     """
-    size = np.ptp(model.rest, axis=0).max()
-    x, y, z = np.round(model.rest / size, 6).T  # so that rows of nodes are straight
-    orders = [np.lexsort(keys) for keys in ((z, y, x), (z, x, y), (y, x, z))]
-    nodes = len(model.rest)
-    row, column = np.repeat(np.arange(nodes), np.diff(pattern.indptr)), pattern.indices
+    size = np.ptp(position, axis=0).max()
+    x, y, z = np.round(position / size, 6).T  # so that rows of nodes are straight
+    sweeps = [np.lexsort(keys) for keys in ((z, y, x), (z, x, y), (y, x, z))]
 
     def width(order: NDArray) -> int:
-        number = np.empty(nodes, np.int64)
-        number[order] = np.arange(nodes)
+        number = np.empty(len(position), np.int64)
+        number[order] = np.arange(len(position))
         return int(np.abs(number[row] - number[column]).max())
 
-    return min((node_order(model), *orders), key=width)
+    return min((order, *sweeps), key=width)
 
 
 class ShellBlocks:
@@ -95,8 +110,9 @@ class ShellBlocks:
         )  # fmt: skip
         self._row, self._column = row, own.indices.astype(np.int64)
         self._place: tuple[Sparsity, NDArray] | None = None
-        self.order = reverse_cuthill_mckee(ones.tocsr(), symmetric_mode=True).astype(np.int64)
         self.unused = np.arange(own.size, 3 * rows)
+        order = reverse_cuthill_mckee(ones.tocsr(), symmetric_mode=True).astype(np.int64)
+        self.order = _narrowest(order, _positions(model, 3 * rows), self._row, self._column)
 
     def put(
         self, model: ShellModel, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
@@ -112,6 +128,12 @@ class ShellBlocks:
         out[:] = 0.0
         out.reshape(-1)[self._places(pattern)] = matrix.data
 
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`; three rotations that share a row of blocks may lie far apart."""
+        found = np.zeros((len(pattern.indices), 3, 3), bool)
+        found.reshape(-1)[self._places(pattern)] = True
+        return found
+
     def _places(self, pattern: Sparsity) -> NDArray:
         """Where the entries stand among those of a pattern's blocks."""
         if self._place is None or self._place[0] is not pattern:
@@ -121,6 +143,17 @@ class ShellBlocks:
             block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
             self._place = pattern, 9 * block + 3 * (self._row % 3) + self._column % 3
         return self._place[1]
+
+
+def _positions(model: ShellModel, size: int) -> NDArray:
+    """Where in the shell its dofs are (size, 3): rotations in the middle of their sides."""
+    found = np.zeros((size, 3))
+    n, tri = model.nodes, model.triangles
+    found[: 3 * n] = np.repeat(model.rest[:n], 3, axis=0)
+    middle = 0.5 * (model.rest[tri] + model.rest[np.roll(tri, -1, axis=1)])
+    has = model.rotation >= 0
+    found[3 * n + model.rotation[has]] = middle[has]
+    return found
 
 
 def blocks_of(model: Any) -> Blocks:

@@ -86,7 +86,8 @@ class StepMatrix:
         along = self.blocks.order
         self.free = along[~held[along]]
         self._symmetric = symmetric
-        self._prepare(_entries(self.pattern, self.free, 3 * nodes))
+        filled = self.blocks.filled(self.pattern) | (self._blocks.mass != 0.0)
+        self._prepare(_entries(self.pattern, self.free, filled))
         self._factors: Any = None
         self.factorizations = 0
 
@@ -200,8 +201,9 @@ def _slots(pattern: Sparsity, indptr: NDArray, indices: NDArray) -> NDArray:
     return np.searchsorted(own, other)
 
 
-def _entries(pattern: Sparsity, free: NDArray, dofs: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Row, column and place in the blocks of the entries between free dofs."""
+def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Row, column and place in the blocks of the `filled` entries between free dofs."""
+    dofs = 3 * (len(pattern.indptr) - 1)
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
     node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr)).astype(np.int64)
@@ -209,7 +211,7 @@ def _entries(pattern: Sparsity, free: NDArray, dofs: int) -> tuple[NDArray, NDAr
     row = 3 * node[:, None, None] + axis[:, None] + 0 * axis
     column = 3 * pattern.indices.astype(np.int64)[:, None, None] + axis[:, None] * 0 + axis
     row, column = number[row.ravel()], number[column.ravel()]
-    kept = np.flatnonzero((row >= 0) & (column >= 0))
+    kept = np.flatnonzero((row >= 0) & (column >= 0) & filled.ravel())
     return row[kept], column[kept], kept
 
 

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.kinds import hinges_alone, put_force, stretching_forces, workspace_of
+from foldyn.dynamics.kinds import (
+    fold_angles,
+    hinges_alone,
+    put_force,
+    stretching_forces,
+    workspace_of,
+)
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.materials.compiled import kernel
 from foldyn.mechanics.flat import flat
@@ -116,6 +122,7 @@ class Bench:
         model = packed.model
         self._hinges = hinges_alone(model)
         self.rounding = EPS * stretching_forces(model)
+        self.folds = np.zeros_like(fold_angles(self.work))  # at old.q, rad
 
     def begin(self, t: float) -> None:
         """Make forces and accelerations of `old` those at the time t (s)."""
@@ -126,6 +133,7 @@ class Bench:
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
         old.force[:], old.factor[:] = s.force, s.factor
+        self.folds[:] = fold_angles(self.work)
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
@@ -164,6 +172,7 @@ class Bench:
         self._speed[:], self._last = speed, h
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
+        self.folds[:] = fold_angles(self.work)
 
 
 @kernel
