@@ -3,14 +3,35 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from foldyn.cli.folder import check_folder
 from foldyn.errors import ComputationError
 
+if TYPE_CHECKING:
+    from foldyn.studies.herkal.pool import Done
 
-def study(name: str, quick: bool, out: str | None, quiet: bool = False, processes: int = 2) -> Path:
+Say = Callable[[str], None]
+PROCESSES = 2
+
+
+def study(
+    name: str, quick: bool, out: str | None, quiet: bool = False, sensitivity: bool = False
+) -> Path:
     """Compute what a study has not computed yet and write its page; returns its path.
+
+    Parameters
+    ----------
+    name : str
+    quick : bool
+        Coarser shells.
+    out : str or None
+        Folder.
+    quiet : bool
+    sensitivity : bool
+        The combinations of what the paper leaves unsaid, instead of the study itself.
 
     Raises
     ------
@@ -21,46 +42,84 @@ def study(name: str, quick: bool, out: str | None, quiet: bool = False, processe
     """
     from tqdm import tqdm
 
+    folder = Path(out or (f"{name}-quick" if quick else f"{name}-study"))
+    check_folder(folder, out, ["sensitivity.html" if sensitivity else "report.html"])
+    say = _nothing if quiet else tqdm.write
+    hidden = quiet or not sys.stderr.isatty()
+    page, ended = (_vary if sensitivity else _study)(quick, folder, say, hidden)
+    say(f"wrote {page}")
+    failed = [done for done in ended if done.failure]
+    if failed:
+        raise ComputationError(
+            f"{len(failed)} of {len(ended)} runs failed, the first of them {failed[0].task.name}: "
+            f"{failed[0].failure}\nfoldyn: kept what was computed: {page}"
+        )
+    return page
+
+
+def _study(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
     from foldyn.studies.herkal import report
-    from foldyn.studies.herkal.runs import Done
     from foldyn.studies.herkal.study import FULL, QUICK, Study
 
-    folder = Path(out or (f"{name}-quick" if quick else f"{name}-study"))
-    check_folder(folder, out, ["report.html"])
     one = Study(QUICK if quick else FULL, folder)
-    say = _nothing if quiet else tqdm.write
     n = one.plan.numerics
     say(
         f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} mass "
         f"distributions, {n.duration:g} s of motion"
     )
-    jobs = one.plan.jobs()
-    hidden = quiet or not sys.stderr.isatty()
-    with tqdm(total=len(jobs), unit="run", disable=hidden, leave=False) as bar:
+    ended = _told(one.compute, len(one.plan.jobs()), folder, say, hidden)
+    say("drawing figures")
+    return report.write(one), ended
+
+
+def _vary(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
+    from foldyn.studies.herkal import pool, report, variations
+    from foldyn.studies.herkal import sensitivity as how
+    from foldyn.studies.herkal.study import CASES, QUICK, VARIED
+
+    numerics = QUICK.numerics if quick else VARIED
+    tasks = how.tasks(CASES, numerics)
+    inside = folder / report.SENSITIVITY
+    inside.mkdir(parents=True, exist_ok=True)
+    say(
+        f"sensitivity of the case studies: {len(tasks)} tasks of a motion of the shell with "
+        f"{numerics.divisions} divisions and {4 * len(how.MODELS)} of bars and hinges each"
+    )
+
+    def compute(tell: Callable[[Done], None], processes: int) -> list[Done]:
+        return pool.run(tasks, inside, tell, processes)
+
+    ended = _told(compute, len(tasks), folder, say, hidden)
+    found = how.variations(inside, CASES, numerics)
+    variations.write(inside, found)
+    if not found.motions:
+        return inside, ended
+    return report.write_sensitivity(folder, found), ended
+
+
+def _told(
+    compute: Callable[[Callable[[Done], None], int], list[Done]], count: int, folder: Path,
+    say: Say, hidden: bool,
+) -> list[Done]:  # fmt: skip
+    """Compute with a progress bar, and say what took long, failed or was skipped."""
+    from tqdm import tqdm
+
+    with tqdm(total=count, unit="run", disable=hidden, leave=False) as bar:
 
         def tell(done: Done) -> None:
             bar.update()
             if done.failure:
-                say(f"  {done.job.name}: failed: {done.failure}")
+                say(f"  {done.task.name}: failed: {done.failure}")
             elif not done.skipped and done.seconds >= 10.0:
-                say(f"  {done.job.name}: {done.seconds:.0f} s")
+                say(f"  {done.task.name}: {done.seconds:.0f} s")
             for text in done.warnings:
-                say(f"  {done.job.name}: warning: {text}")
+                say(f"  {done.task.name}: warning: {text}")
 
-        ended = one.compute(tell, processes)
+        ended = compute(tell, PROCESSES)
     skipped = sum(done.skipped for done in ended)
     if skipped:
         say(f"skipped {skipped} of {len(ended)} runs: their results are in {folder}")
-    say("drawing figures")
-    page = report.write(one)
-    say(f"wrote {page}")
-    failed = [done for done in ended if done.failure]
-    if failed:
-        raise ComputationError(
-            f"{len(failed)} of {len(ended)} runs failed, the first of them {failed[0].job.name}: "
-            f"{failed[0].failure}\nfoldyn: kept what was computed: {page}"
-        )
-    return page
+    return ended
 
 
 def _nothing(text: str) -> None:

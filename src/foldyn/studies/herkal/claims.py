@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import find_peaks, spectrum
-from foldyn.studies.herkal.metric import UP_TO, content, ranks
+from foldyn.studies.herkal.metric import UP_TO, content
 from foldyn.studies.herkal.models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
-from foldyn.studies.targets import Verdict, read_targets, verdicts
+from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 if TYPE_CHECKING:
     import xarray
@@ -90,6 +91,11 @@ def second_peak_case3(study: Study) -> float:
     return _second_peak(study, "case3")
 
 
+def second_peaks_apart(study: Study) -> float:
+    """Second peak of case 3 over that of case 2, in which the density plays no part."""
+    return second_peak_case3(study) / second_peak_case2(study)
+
+
 def _static_deviation(study: Study, case: str) -> NDArray | None:
     """Static displacement over that of the shell, less one, of the reported nodes."""
     if case not in study.plan.cases:
@@ -129,38 +135,38 @@ def softer_folds_err_less(study: Study) -> float:
     return float(np.max(ratios))
 
 
-def _rank(study: Study, case: str, model: str) -> float:
-    found = ranks({m: study.error(case, m) for m in paper_rules()})
-    complete = len(found) == len(paper_rules())
-    return float(found[model]) if complete else NO_VALUE
+def _over_best(study: Study, case: str, model: str) -> float:
+    """Error of a model over the smallest of the five: 1 where it is the best."""
+    row = {m: study.error(case, m) for m in paper_rules()}
+    known = all(0.0 < error < math.inf for error in row.values())
+    return row[model] / min(row.values()) if known else NO_VALUE
 
 
 def best_case1(study: Study) -> float:
-    """Rank of centroid."""
-    return _rank(study, "case1", "centroid")
+    """Error of centroid over the smallest."""
+    return _over_best(study, "case1", "centroid")
 
 
 def best_case2(study: Study) -> float:
-    """Rank of consistent."""
-    return _rank(study, "case2", "consistent")
+    """Error of consistent over the smallest."""
+    return _over_best(study, "case2", "consistent")
 
 
 def best_case3(study: Study) -> float:
-    """Rank of circumcenter."""
-    return _rank(study, "case3", "circumcenter")
+    """Error of circumcenter over the smallest."""
+    return _over_best(study, "case3", "circumcenter")
 
 
 def best_case4(study: Study) -> float:
-    """Rank of circumcenter."""
-    return _rank(study, "case4", "circumcenter")
+    """Error of circumcenter over the smallest."""
+    return _over_best(study, "case4", "circumcenter")
 
 
 def best_overall(study: Study) -> float:
-    """Place of circumcenter by mean rank."""
-    if len(study.plan.cases) < 4:
-        return NO_VALUE
+    """Mean rank of circumcenter over the smallest of the five."""
     means = mean_ranks(study.table(models=paper_rules()), paper_rules())
-    return float(ranks(means).get("circumcenter", NO_VALUE))
+    known = len(study.plan.cases) == 4 and all(map(math.isfinite, means.values()))
+    return means["circumcenter"] / min(means.values()) if known else NO_VALUE
 
 
 CLAIMS: Mapping[str, Callable[[Study], float]] = {
@@ -171,6 +177,7 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
         second_peak_case1,
         second_peak_case2,
         second_peak_case3,
+        second_peaks_apart,
         mismatch_third_node,
         match_other_nodes,
         softer_folds_move_more,
@@ -188,6 +195,25 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
 def claims(study: Study) -> list[Verdict]:
     """The paper's claims beside what was computed; those that could not be are left out."""
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
+
+
+@cache
+def _table1() -> Mapping[str, Target]:
+    return read_targets(TARGETS, "table1")
+
+
+def paper_table() -> dict[str, dict[str, float]]:
+    """Table 1 of the paper: errors by case and distribution."""
+    found: dict[str, dict[str, float]] = {}
+    for key, target in _table1().items():
+        case, _, model = key.partition("_")
+        found.setdefault(case, {})[model] = target.value
+    return found
+
+
+def tolerance() -> float:
+    """Deviation, as a fraction, up to which a number of Table 1 is said to agree."""
+    return max(target.tolerance or 0.0 for target in _table1().values())
 
 
 def table1(study: Study) -> list[Verdict]:

@@ -100,3 +100,9 @@ def ranks(values: Mapping[str, float]) -> dict[str, int]:
     """Rank of each model by its error: 1 for the smallest; models without an error have none."""
     known = {name: value for name, value in values.items() if np.isfinite(value)}
     return {name: 1 + sum(v < value for v in known.values()) for name, value in known.items()}
+
+
+def best(values: Mapping[str, float]) -> str:
+    """Name of the model with the smallest error, or ""."""
+    known = {name: value for name, value in values.items() if np.isfinite(value)}
+    return min(known, key=known.__getitem__) if known else ""

@@ -153,6 +153,11 @@ def paper_rules() -> tuple[str, ...]:
     return tuple(name for name, model in MODELS.items() if model.paper)
 
 
+def label(name: str) -> str:
+    """What tables call a model."""
+    return model_of(name).label
+
+
 def case_with(
     case_file: CaseFile, model: str, variant: Variant = AS_FILED, divisions: int = 16
 ) -> Case:

@@ -1,29 +1,26 @@
 """The computations of the case studies, each kept in a file of its own.
 
-So a study goes on where it was interrupted.
+So a study goes on where it was interrupted. A file holds what it was computed with, the program's
+sources among it: results of another program are computed again.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import time
-import warnings
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from foldyn.cases import Case, CaseFile, read_case
 from foldyn.dynamics import simulate
-from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.errors import InputError
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
 from foldyn.studies import find_case
 from foldyn.studies.herkal.models import REFERENCE, Variant, case_with
+from foldyn.studies.herkal.program import program
 
 if TYPE_CHECKING:
     import xarray
@@ -86,8 +83,7 @@ class Job:
         return f"{self.name}.nc"
 
     def settings(self) -> dict[str, Any]:
-        """All that its result depends on but the program."""
-        text = find_case(f"herkal/{self.case}").read_bytes()
+        """All that its result depends on."""
         numerics = asdict(self.numerics)
         if self.model != REFERENCE:  # neither a mesh nor steps of its own
             numerics = {"duration": self.numerics.duration}
@@ -96,12 +92,26 @@ class Job:
             numerics.pop("dt", None)
         return {
             "case": self.case,
-            "case_file": hashlib.sha256(text).hexdigest()[:16],
+            "case_file": case_file_digest(self.case),
+            "program": program(),
             "model": self.model,
             "kind": self.kind,
             "variant": asdict(self.variant),
             **numerics,
         }
+
+    def there(self, folder: Path) -> bool:
+        """Whether its result is in a folder."""
+        return stored(folder, self) is not None
+
+    def make(self, folder: Path) -> None:
+        """Compute its result into a folder."""
+        save(compute(self), folder / self.file)
+
+
+def case_file_digest(case: str) -> str:
+    """Digest of a shipped case file."""
+    return hashlib.sha256(find_case(f"herkal/{case}").read_bytes()).hexdigest()[:16]
 
 
 def compute(job: Job) -> xarray.Dataset:
@@ -156,101 +166,3 @@ def stored(folder: Path, job: Job) -> xarray.Dataset | None:
     except InputError:  # cut short by a full disk, or no result at all: computed again
         return None
     return found if found.attrs.get(SETTINGS) == _text(job) else None
-
-
-@dataclass(frozen=True)
-class Done:
-    """What became of a job.
-
-    Attributes
-    ----------
-    job : Job
-    seconds : float
-        That it took; 0 where it was skipped.
-    skipped : bool
-        Whether its result was there already.
-    failure : str
-        Why there is no result, or "".
-    warnings : tuple of str
-        What was warned of.
-    """
-
-    job: Job
-    seconds: float = 0.0
-    skipped: bool = False
-    failure: str = ""
-    warnings: tuple[str, ...] = ()
-
-
-def run(
-    jobs: Iterable[Job],
-    folder: Path,
-    tell: Callable[[Done], None] = lambda done: None,
-    processes: int = 2,
-) -> list[Done]:
-    """Run what is not yet in a folder.
-
-    Parameters
-    ----------
-    jobs : iterable of Job
-        The longest first.
-    folder : Path
-        Exists; gets a file for each job.
-    tell : callable
-        Called with each job that is done, skipped or failed.
-    processes : int
-        How many jobs run at a time; 1: in this process.
-
-    Returns
-    -------
-    list of Done
-        Jobs fail one by one; the others are computed all the same.
-    """
-    ended: list[Done] = []
-
-    def end(done: Done) -> None:
-        ended.append(done)
-        tell(done)
-
-    open_jobs: list[Job] = []
-    for job in dict.fromkeys(jobs):
-        if stored(folder, job) is None:
-            open_jobs.append(job)
-        else:
-            end(Done(job, skipped=True))
-    if processes <= 1 or len(open_jobs) <= 1:
-        for job in open_jobs:
-            end(_compute_and_keep(job, folder))
-        return ended
-    _in_processes(open_jobs, folder, end, processes)
-    return ended
-
-
-def _in_processes(
-    jobs: Sequence[Job], folder: Path, end: Callable[[Done], None], processes: int
-) -> None:
-    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
-    try:
-        running = {pool.submit(_compute_and_keep, job, folder) for job in jobs}
-        while running:
-            finished, running = wait(running, return_when=FIRST_COMPLETED)
-            for one in finished:
-                end(one.result())
-    except KeyboardInterrupt:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _compute_and_keep(job: Job, folder: Path) -> Done:
-    began = time.perf_counter()
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        try:
-            save(compute(job), folder / job.file)
-            failure = ""
-        except FoldynError as error:
-            failure = str(error)
-    messages = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
-    return Done(job, time.perf_counter() - began, False, failure, tuple(dict.fromkeys(messages)))

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import CaseFile, read_case
-from foldyn.linear import mac, pair_modes
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO, errors, ranks
-from foldyn.studies.herkal.models import AS_FILED, MODELS, REFERENCE, Variant, model_of, rules
-from foldyn.studies.herkal.runs import Done, Job, Numerics, run, stored
+from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of, rules
+from foldyn.studies.herkal.partners import Partners, partners
+from foldyn.studies.herkal.pool import Done, run
+from foldyn.studies.herkal.runs import Job, Numerics, stored
 
 if TYPE_CHECKING:
     import xarray
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 CASES = ("case1", "case2", "case3", "case4")
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
-LEAST_MAC = 0.5  # below which modes are no partners,
-FAR = 2.0  # nor where their frequencies are this many times apart
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,8 @@ class Plan:
 
 
 FULL = Plan()
-QUICK = Plan(Numerics(divisions=6, dt=0.01, duration=4.0))
+QUICK = Plan(Numerics(divisions=8, dt=0.01))
+VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class Study:
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
     ) -> list[Done]:
-        """Compute what is not there yet; see `foldyn.studies.herkal.runs.run`."""
+        """Compute what is not there yet; see `foldyn.studies.herkal.pool.run`."""
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
         return run(self.plan.jobs(), results, tell, processes)
@@ -160,44 +160,7 @@ class Study:
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
             return None
-        vertices = list(range(len(self.case_file(case).pattern.vertices)))
-        theirs = reference["frequency"].values
-        ratio = ours["frequency"].values / theirs[:, None]
-        near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot tell waves of any length
-        alike = np.where(near, mac(reference, ours, nodes=vertices), 0.0)
-        pairs = pair_modes(alike, LEAST_MAC)
-        frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
-        frequency[pairs.first] = ours["frequency"].values[pairs.second]
-        likeness[pairs.first] = pairs.mac
-        return Partners(theirs, frequency, likeness)
-
-
-@dataclass(frozen=True, eq=False)
-class Partners:
-    """Modes of the shell and their partners in a model; nan where there is none.
-
-    Attributes
-    ----------
-    reference, frequency : (k,)
-        Hz.
-    mac : (k,)
-        How alike their shapes are at the pattern's vertices.
-    """
-
-    reference: NDArray
-    frequency: NDArray
-    mac: NDArray
-
-    @property
-    def deviation(self) -> NDArray:
-        """Frequency over that of the shell, less one."""
-        return self.frequency / self.reference - 1.0
-
-    @property
-    def mean_error(self) -> float:
-        """Mean size of the deviations of the modes that have a partner."""
-        known = self.deviation[np.isfinite(self.deviation)]
-        return float(np.abs(known).mean()) if len(known) else float("nan")
+        return partners(reference, ours)
 
 
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
@@ -205,14 +168,3 @@ def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) 
     names = list(models)
     each = [ranks({m: row[m] for m in names if m in row}) for row in table.values()]
     return {m: float(np.mean([r.get(m, np.nan) for r in each])) for m in names if each}
-
-
-def best(row: Mapping[str, float]) -> str:
-    """Name of the model with the smallest error, or ""."""
-    known = {m: v for m, v in row.items() if np.isfinite(v)}
-    return min(known, key=known.__getitem__) if known else ""
-
-
-def label(model: str) -> str:
-    """What tables call a model."""
-    return MODELS[model].label if model in MODELS else model_of(model).label

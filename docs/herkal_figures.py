@@ -1,0 +1,76 @@
+"""Figures and tables of the page on the case studies, from a full study.
+
+    foldyn study herkal --out FOLDER
+    python docs/herkal_figures.py FOLDER
+
+writes images/herkal-*.png and prints the tables in Markdown.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from foldyn import plots
+from foldyn.studies.herkal import report, sensitivity_page, variations
+from foldyn.studies.herkal.claims import claims, paper_table, tolerance
+from foldyn.studies.herkal.figures import plot_sensitivity
+from foldyn.studies.herkal.models import REFERENCE, label, rules
+from foldyn.studies.herkal.sensitivity import BEND_LAWS
+from foldyn.studies.herkal.study import FULL, Study
+
+IMAGES = Path(__file__).with_name("images")
+
+
+def draw(study: Study, found: variations.Variations) -> None:
+    """Write the two figures."""
+    nodes, axis = study.reported("case2")
+    names = (REFERENCE, "panel", "circumcenter", "consistent")
+    every = {label(m): study.result("case2", m, "motion") for m in names}
+    motions = {name: motion for name, motion in every.items() if motion is not None}
+    plots.plot_history(motions, nodes, axis, 5.0).savefig(IMAGES / "herkal-case2.png", dpi=100)
+    models = (*rules(), sensitivity_page.TURNED)
+    plot_sensitivity(found, models, paper_table()).savefig(
+        IMAGES / "herkal-sensitivity.png", dpi=100
+    )
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Print a table."""
+    titles = list(header)
+    print(f"\n| {' | '.join(titles)} |\n|{'---|' * len(titles)}")
+    for row in rows:
+        cells = ["" if c is None else f"{c:.3g}" if isinstance(c, float) else str(c) for c in row]
+        print(f"| {' | '.join(cells)} |")
+
+
+def main(folder: Path) -> None:
+    """Draw and print."""
+    study, found = Study(FULL, folder), variations.read(variations.STORED)
+    assert found is not None
+    draw(study, found)
+    for case, row in study.table().items():
+        paper = [paper_table()[case].get(m) for m in rules()]
+        table(
+            [f"case {case[-1]}", *map(label, rules())], [["paper", *paper], ["here", *row.values()]]
+        )
+    table(
+        ["claim", "paper or bound", "here", ""],
+        [[v.target.what, v.asked, float(v.computed), v.told] for v in claims(study)],
+    )
+    for one in (
+        report.rank_table(study),
+        sensitivity_page.one_at_a_time(found, tolerance()),
+        sensitivity_page.by_load(found),
+        *(sensitivity_page.over_all(found, law) for law in BEND_LAWS),
+        sensitivity_page.orientations(found),
+        sensitivity_page.frequencies(found),
+    ):
+        table(one.header, one.rows)
+    print(f"\n{report.verdict(study, found)}\n\n{sensitivity_page.opinion(found)}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,129 @@
+"""Tasks run in processes, each of which keeps its own result, so that they can be gone on with."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Protocol
+
+from foldyn.errors import FoldynError, FoldynWarning
+
+
+class Task(Protocol):
+    """Something to compute; hashable, and it can be sent to another process."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    def there(self, folder: Path) -> bool:
+        """Whether its result is in a folder."""
+        ...
+
+    def make(self, folder: Path) -> None:
+        """Compute its result into a folder."""
+        ...
+
+
+@dataclass(frozen=True)
+class Done:
+    """What became of a task.
+
+    Attributes
+    ----------
+    task : Task
+    seconds : float
+        That it took; 0 where it was skipped.
+    skipped : bool
+        Whether its result was there already.
+    failure : str
+        Why there is no result, or "".
+    warnings : tuple of str
+        What was warned of.
+    """
+
+    task: Task
+    seconds: float = 0.0
+    skipped: bool = False
+    failure: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def run(
+    tasks: Iterable[Task],
+    folder: Path,
+    tell: Callable[[Done], None] = lambda done: None,
+    processes: int = 2,
+) -> list[Done]:
+    """Run what is not yet in a folder.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+        The longest first.
+    folder : Path
+        Exists; gets the results.
+    tell : callable
+        Called with each task that is done, skipped or failed.
+    processes : int
+        How many tasks run at a time; 1: in this process.
+
+    Returns
+    -------
+    list of Done
+        Tasks fail one by one; the others are computed all the same.
+    """
+    ended: list[Done] = []
+
+    def end(done: Done) -> None:
+        ended.append(done)
+        tell(done)
+
+    left: list[Task] = []
+    for task in dict.fromkeys(tasks):
+        if task.there(folder):
+            end(Done(task, skipped=True))
+        else:
+            left.append(task)
+    if processes <= 1 or len(left) <= 1:
+        for task in left:
+            end(_make(task, folder))
+    else:
+        _in_processes(left, folder, end, processes)
+    return ended
+
+
+def _in_processes(
+    tasks: Sequence[Task], folder: Path, end: Callable[[Done], None], processes: int
+) -> None:
+    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+    try:
+        running = {pool.submit(_make, task, folder) for task in tasks}
+        while running:
+            finished, running = wait(running, return_when=FIRST_COMPLETED)
+            for one in finished:
+                end(one.result())
+    except KeyboardInterrupt:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _make(task: Task, folder: Path) -> Done:
+    began = time.perf_counter()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            task.make(folder)
+            failure = ""
+        except FoldynError as error:
+            failure = str(error)
+    messages = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+    return Done(task, time.perf_counter() - began, False, failure, tuple(dict.fromkeys(messages)))

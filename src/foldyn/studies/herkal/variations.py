@@ -1,0 +1,212 @@
+"""Tables of the sensitivity: kept as CSV, read again, and summarized."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foldyn.studies.herkal.metric import best, ranks
+
+STORED = Path(__file__).with_name("results")
+"""Tables that come with the package."""
+METRIC, FREQUENCIES = "sensitivity.csv", "frequencies.csv"
+FILED = {
+    "pulse": 0.5, "loads": "file", "bend_law": "superlinear", "calibration": "standard",
+}  # fmt: skip
+"""The case files as they are."""
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Variations:
+    """What was found.
+
+    Attributes
+    ----------
+    about : str
+        With what it was computed.
+    motions : sequence of mappings
+        A combination each: case, pulse (s), loads, bend_law, calibration, and by model the error
+        of the frequency content.
+    frequencies : sequence of mappings
+        A mode each: case, bend_law, calibration, model, mode, frequencies `shell` and `frequency`
+        (Hz, nan without a partner) and mac.
+    """
+
+    about: str
+    motions: Sequence[Row]
+    frequencies: Sequence[Row]
+
+    def chosen(self, **asked: Any) -> list[Row]:
+        """Motions with these values."""
+        return [row for row in self.motions if all(row[k] == v for k, v in asked.items())]
+
+    def filed(self, **changes: Any) -> dict[str, Row]:
+        """Motions by case: the case files but for some changes.
+
+        A file that loads the whole edge already has no other set of loaded nodes.
+        """
+        found = {}
+        for case in sorted({row["case"] for row in self.motions}):
+            asked = {**FILED, **changes}
+            rows = self.chosen(case=case, **asked) or self.chosen(
+                case=case, **{**asked, "loads": FILED["loads"]}
+            )
+            if rows:
+                found[case] = rows[0]
+        return found
+
+
+def write(folder: Path, variations: Variations) -> None:
+    """Write the tables into a folder; a first line says what they are of."""
+    for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
+        with (folder / name).open("w", encoding="utf-8", newline="") as file:
+            file.write(f"# {variations.about}\n")
+            table = csv.writer(file, lineterminator="\n")
+            if rows:
+                table.writerow(rows[0])
+                table.writerows([_text(value) for value in row.values()] for row in rows)
+
+
+def read(folder: Path) -> Variations | None:
+    """Read the tables of a folder; None where there are none."""
+    if not (folder / METRIC).is_file() or not (folder / FREQUENCIES).is_file():
+        return None
+    about, motions = _read(folder / METRIC)
+    return Variations(about, motions, _read(folder / FREQUENCIES)[1])
+
+
+def _read(path: Path) -> tuple[str, list[Row]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        about = file.readline().removeprefix("# ").strip()
+        return about, [{k: _value(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+def _text(value: Any) -> Any:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.4g}"
+    return value
+
+
+def _value(text: str) -> Any:
+    if not text:
+        return math.nan
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+# ---------------------------------------------------------------------- ranks
+@dataclass(frozen=True)
+class Standing:
+    """How a model does over many combinations.
+
+    Attributes
+    ----------
+    mean_rank : float
+        Mean over the cases of the mean over the combinations of each.
+    worst_rank, best : int
+        The worst rank, and in how many combinations it is the first.
+    median, largest : float
+        Of the errors.
+    """
+
+    mean_rank: float
+    worst_rank: int
+    best: int
+    median: float
+    largest: float
+
+
+def standings(rows: Sequence[Row], models: Sequence[str]) -> dict[str, Standing]:
+    """Standing of each model among the given ones."""
+    ranked = [ranks({m: row[m] for m in models}) for row in rows]
+    cases = sorted({row["case"] for row in rows})
+    found = {}
+    for model in models:
+        of_case = [
+            np.mean([r[model] for r, row in zip(ranked, rows, strict=True) if row["case"] == case])
+            for case in cases
+        ]
+        places, errors = [r[model] for r in ranked], [row[model] for row in rows]
+        found[model] = Standing(
+            float(np.mean(of_case)), max(places), places.count(1), float(np.median(errors)),
+            max(errors),
+        )  # fmt: skip
+    return found
+
+
+def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
+    """Spearman's of two sets of errors: 1 for the same order of the models, -1 for the reverse."""
+    first, second = ranks(a), ranks({m: b[m] for m in a})
+    n = len(first)
+    apart = sum((first[m] - second[m]) ** 2 for m in first)
+    return 1.0 - 6.0 * apart / (n * (n * n - 1))
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How like one table of errors is to another.
+
+    Attributes
+    ----------
+    within : int
+        How many numbers differ by less than the tolerance, as a fraction of the other's,
+    of : int
+        of how many.
+    median, largest : float
+        Of the differences.
+    same_best : int
+        Cases with the same best model.
+    correlation : float
+        Mean rank correlation over the cases.
+    """
+
+    within: int
+    of: int
+    median: float
+    largest: float
+    same_best: int
+    correlation: float
+
+
+Table = Mapping[str, Mapping[str, float]]
+
+
+def likeness(ours: Table, theirs: Table, models: Sequence[str], tolerance: float) -> Likeness:
+    """Compare two tables of errors by case and model; of cases and models that both have."""
+    cases = [c for c in ours if c in theirs]
+    pairs = {c: ({m: ours[c][m] for m in models}, {m: theirs[c][m] for m in models}) for c in cases}
+    off = np.array([abs(a[m] / b[m] - 1.0) for a, b in pairs.values() for m in models])
+    return Likeness(
+        int((off <= tolerance).sum()),
+        len(off),
+        float(np.median(off)),
+        float(off.max()),
+        sum(best(a) == best(b) for a, b in pairs.values()),
+        float(np.mean([rank_correlation(a, b) for a, b in pairs.values()])),
+    )
+
+
+# ---------------------------------------------------------------------- frequencies
+def frequency_errors(rows: Iterable[Row], models: Sequence[str]) -> tuple[dict[str, float], int]:
+    """Mean size of the deviations of each model's frequencies, over modes that all models have.
+
+    Returns the errors by model, and how many modes these are.
+    """
+    off: dict[tuple[Any, ...], dict[str, float]] = {}
+    for row in rows:
+        if row["model"] in models and math.isfinite(row["frequency"]):
+            key = (row["case"], row["bend_law"], row["calibration"], row["mode"])
+            off.setdefault(key, {})[row["model"]] = abs(row["frequency"] / row["shell"] - 1.0)
+    common = [found for found in off.values() if len(found) == len(models)]
+    means = {m: float(np.mean([f[m] for f in common])) if common else math.nan for m in models}
+    return means, len(common)
