@@ -61,11 +61,12 @@ _HOME = {
     "simulate": "dynamics",
     "critical_step": "dynamics",
     "initial_state": "dynamics",
+    "fit": "experiment",
 }
 _MODULES = (
-    "cases", "checks", "dynamics", "errors", "formats", "linear", "materials", "mechanics",
-    "patterns", "plots", "report", "results", "shells", "signals", "statics", "structures",
-    "studies",
+    "cases", "checks", "dynamics", "errors", "experiment", "formats", "linear", "materials",
+    "mechanics", "patterns", "plots", "report", "results", "shells", "signals", "statics",
+    "structures", "studies",
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ if TYPE_CHECKING:
         read_case,
     )
     from foldyn.dynamics import critical_step, initial_state, simulate
+    from foldyn.experiment import fit
     from foldyn.formats import read_pattern, write_pattern
     from foldyn.linear import frf, mac, modes
     from foldyn.materials import BarLaw, CustomBarLaw, CustomHingeLaw, EnhancedLinear, HingeLaw

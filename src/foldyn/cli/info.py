@@ -32,6 +32,7 @@ def info() -> str:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
     lines += [
         f"optional parts: ffmpeg for MP4 animations, {_ffmpeg()}",
+        f"optional part for camera tracking: OpenCV, {_opencv()}",
         *(f"optional solver for large structures: {text}" for text in _solvers()),
         f"methods of paths: {', '.join(PATH_METHODS)}",
         f"methods of frequency responses: {', '.join(FRF_METHODS)}",
@@ -53,6 +54,15 @@ def _ffmpeg() -> str:
         return f"found: {find_ffmpeg()}"
     except InputError:
         return "missing: pip install imageio-ffmpeg"
+
+
+def _opencv() -> str:
+    from foldyn.experiment.opencv import opencv
+
+    try:
+        return f"found: {opencv().__version__}"
+    except InputError:
+        return "missing: pip install opencv-python-headless"
 
 
 def _solvers() -> list[str]:

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from foldyn import __version__
+from foldyn.cli.fit import add_fit, run_fit
+from foldyn.cli.track import add_track, track
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -71,11 +73,18 @@ def parser() -> argparse.ArgumentParser:
     )
     study.add_argument("name", choices=("herkal",), help="which: herkal (Herkal et al.)")
     study.add_argument(
-        "--quick", action="store_true", help="coarser shell, shorter motions: minutes, no measure"
+        "--quick", action="store_true", help="coarser shell, longer steps: minutes, no measure"
+    )
+    study.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="instead: the same under other pulses, loads, bends and calibrations",
     )
     study.add_argument("--out", help="folder of the results (default: NAME-study or NAME-quick)")
     study.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
+    add_fit(commands)
+    add_track(commands)
     commands.add_parser(
         "info",
         help="versions, threads, optional parts, shipped cases",
@@ -92,6 +101,14 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     command.add_argument("--out", help=f"folder of the results (default: NAME-{results})")
     command.add_argument(
         "--no-figures", action="store_true", help="write the result only, no figures and report"
+    )
+    command.add_argument(
+        "--model",
+        metavar="bars_and_hinges|shell",
+        help="model instead of that of the file; results go to NAME-MODEL-" + results,
+    )
+    command.add_argument(
+        "--divisions", type=int, metavar="N", help="pieces of every edge of a shell (16)"
     )
     command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
@@ -148,19 +165,31 @@ def _call(given: argparse.Namespace) -> None:
 
         print(info())
         return
+    if given.command == "fit":
+        run_fit(given)
+        return
+    if given.command == "track":
+        track(given)
+        return
     if given.command == "study":
         from foldyn.cli.study import study
 
-        study(given.name, given.quick, given.out, given.quiet)
+        study(given.name, given.quick, given.out, given.quiet, given.sensitivity)
         return
+    from foldyn.cases.reading import read_case
     from foldyn.cli.run import run
 
+    model = given.model, given.divisions
     how: dict[str, Any] = {"figures": not given.no_figures, "quiet": given.quiet}
-    if given.command != "run":
+    if given.command == "run":
+        how |= {"read": lambda path: read_case(path, *model), "results": "results"}
+    else:
         from foldyn.cli.shortcuts import read_as
 
         kind, flags = given.command, _flags(given)
-        how |= {"read": lambda path: read_as(path, kind, flags), "results": kind}
+        how |= {"read": lambda path: read_as(path, kind, flags, *model), "results": kind}
+    if given.model is not None:
+        how["results"] = f"{given.model}-{how['results']}"
     run(given.case, given.out, **how)
 
 

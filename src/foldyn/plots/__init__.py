@@ -21,15 +21,18 @@ if TYPE_CHECKING:
     from foldyn.plots.mode_film import animate_modes
     from foldyn.plots.modes import draw_modes
     from foldyn.plots.nyquist import plot_nyquist
+    from foldyn.plots.overlay import draw_overlay
     from foldyn.plots.path import plot_load_displacement, plot_reaction, total_reaction
     from foldyn.plots.path_energies import energy_shares, plot_path_energies
     from foldyn.plots.shapes import draw_shapes
     from foldyn.plots.structure import draw_structure
+    from foldyn.plots.tracks import plot_steps, plot_tracks
 
 __all__ = [
     "animate",
     "animate_modes",
     "draw_modes",
+    "draw_overlay",
     "draw_shapes",
     "draw_structure",
     "energy_shares",
@@ -43,6 +46,8 @@ __all__ = [
     "plot_nyquist",
     "plot_path_energies",
     "plot_reaction",
+    "plot_steps",
+    "plot_tracks",
     "total_reaction",
 ]
 
@@ -50,6 +55,7 @@ _HOMES = {
     "animate": "animation",
     "animate_modes": "mode_film",
     "draw_modes": "modes",
+    "draw_overlay": "overlay",
     "draw_shapes": "shapes",
     "draw_structure": "structure",
     "energy_shares": "path_energies",
@@ -63,6 +69,8 @@ _HOMES = {
     "plot_nyquist": "nyquist",
     "plot_path_energies": "path_energies",
     "plot_reaction": "path",
+    "plot_steps": "tracks",
+    "plot_tracks": "tracks",
     "total_reaction": "path",
 }
 

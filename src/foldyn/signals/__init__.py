@@ -10,6 +10,13 @@ from foldyn.signals.half_power import HalfPower, half_power
 from foldyn.signals.log_decrement import LogDecrement, log_decrement
 from foldyn.signals.matrix_pencil import DecayingModes, matrix_pencil
 from foldyn.signals.peaks import Peaks, find_peaks
+from foldyn.signals.preprocessing import (
+    choose_window,
+    fill_gaps,
+    first_turning_point,
+    remove_trend,
+    subtract_final,
+)
 from foldyn.signals.sampling import is_uniform, sampling_interval
 from foldyn.signals.spectrum import spectrum
 from foldyn.signals.stepped_sine import SineFit, fit_sine, stepped_sine
@@ -23,20 +30,25 @@ __all__ = [
     "Peaks",
     "SineFit",
     "base_transmissibility",
+    "choose_window",
     "circle_fit",
     "circle_fits",
     "convert_response",
     "exponential_window",
+    "fill_gaps",
     "find_peaks",
+    "first_turning_point",
     "fit_sine",
     "frequency_response",
     "half_power",
     "is_uniform",
     "log_decrement",
     "matrix_pencil",
+    "remove_trend",
     "sampling_interval",
     "spectrum",
     "stepped_sine",
+    "subtract_final",
     "transmissibility",
     "without_window",
 ]

@@ -1,0 +1,190 @@
+"""`foldyn fit`: a case fitted to measurements, from reading to report."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from foldyn.cli.folder import check_folder
+from foldyn.errors import ComputationError, InputError
+
+if TYPE_CHECKING:
+    from foldyn.experiment import Course, Estimate, Fit
+    from foldyn.experiment.fit_file import FitFile
+
+WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
+KEPT = "evaluations"
+
+
+def add_fit(commands: Any) -> None:
+    """Add the arguments of `foldyn fit`."""
+    fit = commands.add_parser(
+        "fit",
+        help="fit parameters of a case to measurements",
+        description="Fit parameters of a case to measurements: a fit file names them all, or give "
+        "a case file, the data and what to vary. Estimates with intervals, the case with the "
+        "values found, figures and report.html go to a folder; so does every evaluation of the "
+        "model, so that a fit that was cut off goes on.",
+    )
+    fit.add_argument("file", help="fit file, or case file (TOML) or the name of a shipped case")
+    fit.add_argument(
+        "data", nargs="*", help="with a case file: measurements (CSV, or the tracks of a film)"
+    )
+    fit.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY[=START[:LOWER:UPPER]]",
+        help="with a case file: a key that is a parameter, as sheet.thickness=2e-4:1e-4:4e-4",
+    )
+    fit.add_argument(
+        "--tie",
+        action="append",
+        default=[],
+        metavar="KEY=EXPRESSION",
+        help="with a case file: a key that follows parameters",
+    )
+    fit.add_argument(
+        "--sigma",
+        action="append",
+        type=float,
+        default=[],
+        help="with a case file: standard error (SI units) of the data, for each of them once",
+    )
+    fit.add_argument("--axis", default="x", help="with a case file: axis of the data (default: x)")
+    fit.add_argument("--starts", type=int, help="searches, from random starts within the bounds")
+    fit.add_argument("--processes", type=int, help="evaluations that run at a time")
+    fit.add_argument("--out", help="folder of the results (default: NAME-fit)")
+    fit.add_argument(
+        "--no-figures", action="store_true", help="write the numbers only, no figures and report"
+    )
+    fit.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+
+
+def run_fit(given: argparse.Namespace) -> Path:
+    """Fit what the arguments of `add_fit` ask for; returns the folder of the results."""
+    from tqdm import tqdm
+
+    from foldyn.experiment import fit
+
+    plan = plan_of(given)
+    folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
+    check_folder(folder, given.out, [*WRITTEN, *([] if given.no_figures else ["report.html"])])
+    say: Callable[[str], None] = (lambda text: None) if given.quiet else print
+    hidden = given.quiet or not sys.stderr.isatty()
+    layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
+    with tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=hidden) as bar:
+        bar.set_postfix_str("first use compiles kernels, up to half a minute")
+
+        def tell(course: Course) -> None:
+            if math.isfinite(course.cost):
+                bar.set_postfix_str(f"smallest cost {course.cost:.6g}", refresh=False)
+            bar.n = course.computed + course.found
+            bar.refresh()
+
+        found = fit(
+            plan.case, plan.data, plan.parameters, ties=plan.ties, folder=folder / KEPT,
+            progress=tell, **plan.solver,
+        )  # fmt: skip
+    for one in found.estimates:
+        say(f"  {_line(one, found.confidence)}")
+    for score in found.scores:
+        held = ", held out" if score.held_out else ""
+        say(f"  {score.name}{held}: rms misfit {score.rms:.3g} {score.unit}, "
+            f"{100.0 * score.relative:.2g} % of its variation")  # fmt: skip
+    _write(found, plan, folder, not given.no_figures)
+    say(f"wrote {folder / ('fit.json' if given.no_figures else 'report.html')}")
+    return folder
+
+
+def _write(found: Fit, plan: FitFile, folder: Path, figures: bool) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        for name in WRITTEN[:2]:
+            found.save(folder / name)
+        found.write_case(folder / WRITTEN[2])
+        if figures:
+            from foldyn.experiment.fit_page import write_fit
+
+            write_fit(found, folder, plan.title)
+    except InputError as error:  # the input was right: something else went wrong
+        raise ComputationError(f"{folder}: {error}") from None
+
+
+def _line(one: Estimate, confidence: float) -> str:
+    if one.note:
+        return f"{one.key} = {one.value:.6g} ({one.note})"
+    return (
+        f"{one.key} = {one.value:.6g}, {100.0 * confidence:g} % from {one.lower:.6g} to "
+        f"{one.upper:.6g}"
+    )
+
+
+def plan_of(given: argparse.Namespace) -> FitFile:
+    """What to fit: from a fit file, or a case file and the other arguments."""
+    from foldyn.experiment.fit_file import is_fit_file, read_fit
+    from foldyn.studies import find_case
+
+    path = find_case(given.file)
+    if is_fit_file(path):
+        extra = {"DATA": given.data, "--vary": given.vary, "--tie": given.tie}
+        for name, told in {**extra, "--sigma": given.sigma}.items():
+            if told:
+                raise InputError(f"{name}: {path} is a fit file, which says that itself")
+        plan = read_fit(path, find_case)
+    else:
+        plan = _of_case(path, given)
+    changed = {key: getattr(given, key) for key in ("starts", "processes")}
+    solver = plan.solver | {key: value for key, value in changed.items() if value is not None}
+    return replace(plan, solver=solver)
+
+
+def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
+    from foldyn.experiment.fit_file import FitFile
+    from foldyn.experiment.measured_files import recognize
+
+    if not given.data:
+        raise InputError(
+            f"{path}: is a case file: name the data to fit it to and what to --vary, or give a fit "
+            "file (one with [[parameters]])"
+        )
+    if not given.vary:
+        raise InputError("--vary: missing; name what to fit, as in --vary sheet.thickness")
+    if given.sigma and len(given.sigma) != len(given.data):
+        raise InputError(f"--sigma: {len(given.sigma)} of them for {len(given.data)} data files")
+    sigmas = given.sigma or [None] * len(given.data)
+    data = [
+        recognize(Path(file), given.axis, name=Path(file).stem, sigma=sigma)
+        for file, sigma in zip(given.data, sigmas, strict=True)
+    ]
+    ties = dict(_halves(text, "--tie") for text in given.tie)
+    return FitFile(
+        path, "", path, tuple(data), tuple(map(_parameter, given.vary)), ties, {}
+    )  # fmt: skip
+
+
+def _halves(text: str, option: str) -> tuple[str, str]:
+    key, equals, rest = text.partition("=")
+    if not equals or not rest.strip():
+        raise InputError(f'{option} "{text}": write KEY=..., with a key of the case file')
+    return key.strip(), rest.strip()
+
+
+def _parameter(text: str) -> Any:
+    from foldyn.experiment import Parameter
+
+    if "=" not in text:
+        return Parameter(text.strip())
+    key, rest = _halves(text, "--vary")
+    try:
+        numbers = [float(part) for part in rest.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3):
+        raise InputError(f'--vary "{text}": write KEY, KEY=START or KEY=START:LOWER:UPPER')
+    return Parameter(key, *numbers)

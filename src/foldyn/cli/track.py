@@ -1,0 +1,256 @@
+"""`foldyn track`: a film, or photographs, to histories of corners and nodes."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from foldyn.cli.folder import check_folder
+from foldyn.errors import ComputationError, InputError
+from foldyn.studies import find_case
+
+if TYPE_CHECKING:
+    import argparse
+
+    import xarray
+
+    from foldyn.experiment import Model, Tracking
+
+_SHOWN = 3  # nodes in the figure of histories
+
+
+def add_track(commands: Any) -> None:
+    """Add the command and its arguments."""
+    track: argparse.ArgumentParser = commands.add_parser(
+        "track",
+        help="camera tracking of a film, or of photographs",
+        description="Track the corners of a folded sheet in a film, or find the nodes of a model "
+        "in photographs; histories go to OUT (NetCDF), a CSV file and figures beside it.",
+    )
+    track.add_argument("inputs", nargs="+", metavar="VIDEO|PHOTO", help="a film, or photographs")
+    track.add_argument("--roi", metavar="X,Y,W,H", help="region of interest (pixels)")
+    track.add_argument("--scale", metavar="METRES", help="metres per pixel, in the front plane")
+    track.add_argument(
+        "--reference",
+        action="append",
+        metavar="PX1,PY1,PX2,PY2,METRES",
+        help="a known length between two pixels, instead of --scale; may be given twice",
+    )
+    track.add_argument(
+        "--model",
+        metavar="CASE|RESULT",
+        help="case file, shipped case or path (NetCDF) whose nodes are recognized; the states of "
+        "a path, also that of a static case, are tried",
+    )
+    track.add_argument("--out", default="tracks.nc", help="file to write (default: tracks.nc)")
+    track.add_argument(
+        "--rate", metavar="HZ", help="frames per second, where the film says another"
+    )
+    track.add_argument("--distance", metavar="METRES", help="from the camera to the front plane")
+    track.add_argument("--up", default="-x", help="the model's axis that points up (--up=-x)")
+    track.add_argument("--facing", default="z", help="the model's axis towards the camera (z)")
+    track.add_argument(
+        "--match",
+        default="first",
+        help="frame in which the model is recognized: first (default) or last",
+    )
+    track.add_argument("--nodes", metavar="N,N,...", help="nodes that must be found")
+    track.add_argument("--loads", metavar="N,N,...", help="load of each photograph (N)")
+    track.add_argument("--reach", metavar="PIXELS", help="length of the edges that make a corner")
+    track.add_argument("--no-figures", action="store_true", help="write NetCDF and CSV only")
+    track.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+
+
+def track(given: Namespace) -> Path:
+    """Run the command; returns the path of the tracks."""
+    from foldyn import experiment
+
+    experiment.opencv()  # nothing else is worth a look without it
+    out = Path(given.out)
+    if out.suffix != ".nc":
+        raise InputError(f"--out {given.out}: name a file that ends in .nc")
+    check_folder(out.parent, given.out, [out.name, out.with_suffix(".csv").name])
+    photos = _are_photos(given.inputs)
+    how = _tracking(given)
+    roi = None if given.roi is None else tuple(int(v) for v in numbers("--roi", given.roi, 4))
+    rate = None if given.rate is None else numbers("--rate", given.rate, 1)[0]
+    loads = None if given.loads is None else numbers("--loads", given.loads)
+    if loads is not None and not photos:
+        raise InputError("--loads: a film has times; loads belong to photographs")
+    film = None if photos else experiment.open_film(given.inputs[0], roi, rate)  # type: ignore
+    model = None if given.model is None else model_of(given.model)
+    if photos and model is None:
+        raise InputError(
+            "--model: photographs need one: from one to the next points move too far to be "
+            "followed, and only a model tells which is which"
+        )
+    say = _nothing if given.quiet else _say
+    tell, close = _progress(given, None if film is None else film.path)
+    try:
+        if film is None:
+            ds = experiment.track_photos(given.inputs, model, how, loads, roi, tell)  # type: ignore
+        else:
+            ds = experiment.track_film(film, model, how, tell)
+    finally:
+        close()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    experiment.save_tracks(ds, out)
+    experiment.write_csv(ds, out.with_suffix(".csv"))
+    say(summary(ds))
+    written = [str(out), str(out.with_suffix(".csv"))]
+    if not given.no_figures:
+        written += _figures(ds, out, given.inputs, film)
+    say(f"wrote {', '.join(written)}")
+    return out
+
+
+def numbers(name: str, text: str, count: int | None = None) -> list[float]:
+    """Numbers that a person gave, separated by commas."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{name} {text}: give numbers separated by commas") from None
+    if count is not None and len(values) != count:
+        raise InputError(f"{name} {text}: {len(values)} numbers; {count} are needed")
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} {text}: every number must be finite")
+    return values
+
+
+def model_of(name: str) -> Model:
+    """Model of a result, of a case at rest, or with all states of the path of a static case."""
+    import foldyn as fd
+    from foldyn.experiment import Model
+
+    if name.endswith(".nc"):
+        return Model.of(fd.load(name))
+    case_file = fd.read_case(find_case(name))
+    case = case_file.case()
+    if case_file.analysis.kind != "statics":
+        return Model.of(case)
+    return Model.of(fd.trace(case, **case_file.analysis.arguments))
+
+
+def summary(ds: xarray.Dataset) -> str:
+    """What was tracked, in a few words."""
+    along = "photo" if "photo" in ds.dims else "time"
+    known = np.isfinite(ds["position_px"].values[..., 0])
+    what = "photographs" if along == "photo" else "frames"
+    text = f"{ds.sizes[along]} {what}, {ds.sizes['point']} points, measured in {known.mean():.1%}"
+    if "displacement" in ds:
+        rms = ", ".join(f"{value:.2g}" for value in ds.attrs["match_rms_px"])
+        counts = ", ".join(str(value) for value in ds.attrs["matched_nodes"])
+        text += (
+            f"\n{counts} of {ds.sizes['node']} nodes recognized, {rms} pixels rms from the model; "
+            f"{ds.attrs['metres_per_pixel']:.5g} m per pixel"
+        )
+    return text
+
+
+def _are_photos(inputs: Sequence[str]) -> bool:
+    """Whether the inputs are photographs; they are all of a kind, and a film is alone."""
+    from foldyn.experiment.films import PHOTOS
+
+    photos = [Path(name).suffix.lower() in PHOTOS for name in inputs]
+    if any(photos) and not all(photos):
+        raise InputError(f"{inputs[photos.index(False)]}: give a film or photographs, not both")
+    if not any(photos) and len(inputs) > 1:
+        raise InputError(f"{inputs[1]}: one film at a time")
+    for name in inputs:
+        if not Path(name).is_file():
+            raise InputError(f"{name}: there is no such file")
+    if photos == [True]:
+        raise InputError(
+            f"{inputs[0]}: one photograph alone shows no displacement; give at least two, the "
+            "first one unloaded"
+        )
+    return all(photos)
+
+
+def _tracking(given: Namespace) -> Tracking:
+    from foldyn.experiment import CornerSettings, Placing, Scale, Tracking, scale_of_lengths
+
+    if given.scale is not None and given.reference:
+        raise InputError("--scale, --reference: give one or the other")
+    scale = None
+    if given.scale is not None:
+        scale = Scale(numbers("--scale", given.scale, 1)[0]).metres_per_pixel
+    if given.reference:
+        lengths = [numbers("--reference", one, 5) for one in given.reference]
+        scale = scale_of_lengths(lengths).metres_per_pixel
+    distance = None if given.distance is None else numbers("--distance", given.distance, 1)[0]
+    nodes = None if given.nodes is None else tuple(int(n) for n in numbers("--nodes", given.nodes))
+    if nodes is not None and given.model is None:
+        raise InputError("--nodes: which nodes there are is known with a --model only")
+    reach = None if given.reach is None else numbers("--reach", given.reach, 1)[0]
+    return Tracking(
+        corners=CornerSettings(reach=reach),
+        placing=Placing(given.up, given.facing, scale, distance),
+        match=given.match,
+        nodes=nodes,
+    )
+
+
+def _progress(given: Namespace, film: Path | None) -> tuple[Callable[[int], None], Callable]:
+    from tqdm import tqdm
+
+    total = len(given.inputs) if film is None else None
+    hidden = given.quiet or not sys.stderr.isatty()
+    unit = "photo" if film is None else "frame"
+    bar = tqdm(total=total, unit=unit, disable=hidden, leave=False)
+
+    def tell(number: int) -> None:
+        bar.update()
+
+    return tell, bar.close
+
+
+def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) -> list[str]:
+    """Draw the overlays and histories; returns the names of their files."""
+    from foldyn import plots
+    from foldyn.experiment import read_photo
+
+    written = []
+    try:
+        if film is not None:
+            at = int(ds.attrs["match_frame"]) if "displacement" in ds else 0
+            pictures = {f"{out.stem}-overlay.png": (film.picture(at), at)}
+        else:
+            pictures = {
+                f"{out.stem}-overlay-{k}.png": (read_photo(name), k)
+                for k, name in enumerate(inputs)
+            }
+        for name, (picture, at) in pictures.items():
+            plots.draw_overlay(picture, ds, at).savefig(out.with_name(name))
+            written.append(str(out.with_name(name)))
+        if "displacement" in ds:
+            history = plots.plot_tracks(ds, _best(ds))
+            history.savefig(out.with_name(f"{out.stem}-history.png"))
+            written.append(str(out.with_name(f"{out.stem}-history.png")))
+    except InputError as error:
+        raise ComputationError(f"figures: {error}\nfoldyn: kept what was computed: {out}") from None
+    return written
+
+
+def _best(ds: xarray.Dataset) -> list[int]:
+    """Nodes that move most among those that were measured most of the time."""
+    moved = ds["displacement"].values
+    known = np.isfinite(moved)
+    high = np.where(known, moved, -np.inf).max(axis=0)
+    low = np.where(known, moved, np.inf).min(axis=0)
+    span = np.where(np.isfinite(high - low), high - low, 0.0).max(axis=1)
+    span[ds["tracked"].values < 0.9 * ds["tracked"].values.max()] = -1.0
+    return sorted(int(node) for node in np.argsort(-span)[:_SHOWN])
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _nothing(text: str) -> None:
+    pass

@@ -1,0 +1,178 @@
+"""A perspective camera with radial lens distortion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+
+_TERMS = 6  # of the polynomial in r^2 that inverts the distortion
+_REACH = 1.08  # part of the half diagonal, up to which it is fitted
+
+DIRECTIONS = {
+    f"{sign}{axis}": (1.0 if sign != "-" else -1.0) * np.eye(3)[k]
+    for k, axis in enumerate("xyz")
+    for sign in ("", "+", "-")
+}
+"""Directions by the names that a person types: "x", "-x", "+z"."""
+
+
+def direction(name: str, value: str) -> NDArray[np.float64]:
+    """Unit vector of "x", "-y", "+z"."""
+    if value not in DIRECTIONS:
+        raise InputError(f"{name}: {value!r} is no direction; use x, -x, y, -y, z or -z")
+    return DIRECTIONS[value]
+
+
+def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
+    """Rotation from the model's axes to those of an image: to the right, down and forward.
+
+    Parameters
+    ----------
+    up : str
+        Direction of the model that points up in the image, for example "-x": x runs down.
+    facing : str
+        Direction of the model that points towards the camera.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows are the unit vectors to the right, down and away from the camera.
+
+    Raises
+    ------
+    InputError
+        Not two directions at a right angle.
+    """
+    top, toward = direction("up", up), direction("facing", facing)
+    if abs(top @ toward) > 0.5:
+        raise InputError(f"up: {up!r} and facing: {facing!r} lie along the same axis; turn one")
+    return np.array([np.cross(top, toward), -top, -toward])
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Pinhole with radial distortion; pixel (0, 0) is the center of the upper left one.
+
+    A point with the camera coordinates (x, y, z), z forward, is seen at
+    center + focal (1 + k1 r^2 + k2 r^4) (x, y)/z with r^2 = (x^2 + y^2)/z^2 (Brown, 1971).
+
+    Attributes
+    ----------
+    size : tuple of int
+        Width and height (pixels).
+    focal : float
+        Focal length (pixels).
+    rotation : ndarray, shape (3, 3)
+        Rows: to the right, down and forward, in the model's axes.
+    position : ndarray, shape (3,)
+        Of the pinhole (m).
+    k1, k2 : float
+        Radial distortion; the image must not fold back on itself.
+    """
+
+    size: tuple[int, int]
+    focal: float
+    rotation: NDArray[np.float64]
+    position: NDArray[np.float64]
+    k1: float = 0.0
+    k2: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.focal) and self.focal > 0.0):
+            raise InputError(f"focal: {self.focal!r}; give a positive number of pixels")
+        if min(self.size) < 8:
+            raise InputError(f"size: {self.size} pixels; at least 8 x 8 are needed")
+        r2 = self._outermost**2 * np.linspace(0.0, 1.0, 64) ** 2
+        if (1.0 + 3.0 * self.k1 * r2 + 5.0 * self.k2 * r2**2 <= 0.1).any():
+            raise InputError(
+                f"k1, k2: {self.k1:g}, {self.k2:g} fold the image back on itself within its "
+                "corners; take smaller ones"
+            )
+
+    @classmethod
+    def looking_at(
+        cls,
+        target: ArrayLike,
+        distance: float,
+        metres_per_pixel: float,
+        size: tuple[int, int],
+        up: str = "-x",
+        facing: str = "z",
+        k1: float = 0.0,
+        k2: float = 0.0,
+        turned: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Camera:
+        """Camera at a distance (m) from a point, which it shows in the middle of the image.
+
+        `metres_per_pixel` holds in the plane through the target; `turned` are angles (degrees)
+        about the image's right, down and forward, by which the camera goes around the target.
+        """
+        if not (np.isfinite(distance) and distance > 0.0):
+            raise InputError(f"distance: {distance!r}; give a positive number of m")
+        if not (np.isfinite(metres_per_pixel) and metres_per_pixel > 0.0):
+            raise InputError(f"metres_per_pixel: {metres_per_pixel!r}; give a positive number")
+        from scipy.spatial.transform import Rotation
+
+        tilt = Rotation.from_rotvec(np.radians(np.asarray(turned, dtype=float))).as_matrix()
+        rotation = tilt @ axes_of_view(up, facing)
+        position = np.asarray(target, dtype=np.float64) - distance * rotation[2]
+        return cls(size, distance / metres_per_pixel, rotation, position, k1, k2)
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Where the axis of the camera meets the image (pixels)."""
+        return 0.5 * (np.array(self.size, dtype=np.float64) - 1.0)
+
+    def depth(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Distance of points (..., 3) from the pinhole along the axis (m)."""
+        return (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation[2]
+
+    def straight(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Slopes (x, y)/z of the rays to points (..., 3), shape (..., 2)."""
+        seen = (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation.T
+        if (seen[..., 2] <= 0.0).any():
+            raise InputError("points: some lie behind the camera; move it away from them")
+        return seen[..., :2] / seen[..., 2:]
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Pixels (u, v) at which points (..., 3) in m are seen."""
+        slope = self.straight(points)
+        r2 = np.sum(slope**2, axis=-1, keepdims=True)
+        return self.center + self.focal * (1.0 + self.k1 * r2 + self.k2 * r2**2) * slope
+
+    def rays(self, uv: ArrayLike) -> NDArray[np.float64]:
+        """Slopes (x, y)/z of the rays through pixels (..., 2): the inverse of the distortion."""
+        seen = (np.asarray(uv, dtype=np.float64) - self.center) / self.focal
+        r2 = np.sum(seen**2, axis=-1, keepdims=True)
+        slope = seen * np.polynomial.polynomial.polyval(r2, self.inverse)
+        for _ in range(4):  # Newton on the radius, from a polynomial that is close already
+            s2 = np.sum(slope**2, axis=-1, keepdims=True)
+            factor = 1.0 + self.k1 * s2 + self.k2 * s2**2
+            stretch = 1.0 + 3.0 * self.k1 * s2 + 5.0 * self.k2 * s2**2
+            slope = slope - (slope * factor - seen) / stretch
+        return slope
+
+    def on_plane(self, uv: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
+        """Points (..., 3) in m seen at pixels (..., 2), at given depths (m) before the camera."""
+        slope = self.rays(uv)
+        z = np.broadcast_to(np.asarray(depth, dtype=np.float64), slope.shape[:-1])[..., np.newaxis]
+        return self.position + np.concatenate([slope * z, z], axis=-1) @ self.rotation
+
+    @property
+    def _outermost(self) -> float:
+        """Slope of the ray to a corner, without distortion."""
+        return _REACH * 0.5 * float(np.hypot(*self.size)) / self.focal
+
+    @cached_property
+    def inverse(self) -> NDArray[np.float64]:
+        """Coefficients, by powers of r^2, of the factor from distorted to straight slopes."""
+        r = self._outermost * np.linspace(0.01, 1.0, 200)
+        seen = r * (1.0 + self.k1 * r**2 + self.k2 * r**4)
+        top = seen.max() ** 2
+        powers = (seen**2 / top)[:, np.newaxis] ** np.arange(_TERMS)
+        return np.linalg.lstsq(powers, r / seen, rcond=None)[0] / top ** np.arange(_TERMS)

@@ -1,0 +1,287 @@
+"""`fit`: least squares over parameters of a case."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from foldyn.cases.values import number
+from foldyn.errors import ComputationError, InputError
+from foldyn.experiment.evaluations import Evaluations
+from foldyn.experiment.fit_problem import Problem, problem
+from foldyn.experiment.fitted import Descent, Estimate, Fit, score
+from foldyn.experiment.measurement import Measurement
+from foldyn.experiment.parameters import Parameter
+from foldyn.experiment.uncertainty import Uncertainty, uncertainty
+
+STEP = 1e-3
+"""Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
+ENOUGH = 1e-5
+"""Change of the parameters, in themselves, at which a search ends."""
+LEVEL = 1e-8
+"""Fall of the cost, in itself, at which a search ends."""
+TRIED = 60
+"""Steps after which a search is given up."""
+WHY = {
+    0: f"given up after {TRIED} steps",
+    1: "the cost has no slope left",
+    2: "the cost falls no more",
+    3: "the parameters move no more",
+    4: "neither cost nor parameters move any more",
+}
+"""Why a search ended, by the status of `least_squares`."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How far a fit is.
+
+    Attributes
+    ----------
+    computed, found : int
+        Evaluations of the model that were computed, and that were kept from before.
+    cost : float
+        The smallest so far.
+    """
+
+    computed: int
+    found: int
+    cost: float
+
+
+def fit(
+    case: str | os.PathLike[str],
+    data: Sequence[Measurement],
+    parameters: Sequence[Parameter],
+    *,
+    ties: Mapping[str, str] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    processes: int = 1,
+    confidence: float = 0.95,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[Course], None] | None = None,
+) -> Fit:
+    """Fit parameters of a case to measurements by least squares.
+
+    Every key of the case file that holds a number can be a parameter: for other values of it the
+    file is read anew. Searches are by the trust region method of `scipy.optimize.least_squares`
+    with bounds, in the parameters over their scales, with difference quotients.
+
+    Parameters
+    ----------
+    case : path
+        A case file of kind "statics" or "dynamics".
+    data : sequence of Measurement
+        `ForceDisplacement`, `Shapes`, `History`, `Spectrum`.
+    parameters : sequence of Parameter
+    ties : mapping of str to str, optional
+        Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
+    starts : int
+        How many searches: the first from the given values, the others from random ones within the
+        bounds.
+    seed : int
+        Of the random starts.
+    processes : int
+        How many evaluations run at a time.
+    confidence : float
+        Of the intervals, by Student's t; 0.95 by default.
+    folder : path, optional
+        Keeps every evaluation: a fit that was cut off goes on where it stopped.
+    progress : callable, optional
+        Called with a `Course` after every evaluation.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        Anything cannot be used; the message says what and why.
+    ComputationError
+        No search found an end.
+
+    Notes
+    -----
+    A motion is computed with fixed steps, `analysis.dt`, or for an implicit method without it the
+    interval of its output: steps chosen by their error would make the misfit jump.
+    """
+    confidence = number("confidence", confidence, above=0.0)
+    if confidence >= 1.0:
+        raise InputError(f"confidence = {confidence:g}: must be below 1, as in 0.95")
+    for name, given in (("starts", starts), ("processes", processes)):
+        if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+            raise InputError(f"{name} = {given!r}: must be a whole number, at least 1")
+    made = problem(case, data, parameters, ties or {})
+    points = made.space.starts(starts, seed)
+    began = time.perf_counter()
+    best = [math.inf]
+
+    def tell(computed: int, found: int) -> None:
+        if progress is not None:
+            progress(Course(computed, found, best[0]))
+
+    kept = None if folder is None else Path(folder)
+    with Evaluations(made, processes, kept, tell) as evaluations:
+        searches = [_Search(made, evaluations, best) for _ in points]
+        if processes > 1 and starts > 1:
+            with ThreadPoolExecutor(min(starts, processes)) as threads:
+                descents = list(threads.map(_Search.descend, searches, points))
+        else:
+            descents = [one.descend(point) for one, point in zip(searches, points, strict=True)]
+        lowest = min(descents, key=lambda one: one.cost)
+        if not math.isfinite(lowest.cost):
+            raise ComputationError(f"no search found an end: {lowest.message}")
+        values = np.array(lowest.values)
+        known = searches[0].uncertainty(values, confidence)
+        predicted = _split(made, _sound(evaluations.at([values])[0]))
+        spent = evaluations.computed + evaluations.found
+    return Fit(
+        _estimates(made, values, known),
+        known.correlation,
+        known.singular_values,
+        known.directions,
+        confidence,
+        known.freedom,
+        known.misfit,
+        tuple(
+            score(one.name, one.held_out, one.unit, one.observed(), said)
+            for one, said in zip(made.measurements, predicted, strict=True)
+        ),
+        tuple(descents),
+        made,
+        tuple(predicted),
+        spent,
+        time.perf_counter() - began,
+    )
+
+
+class _Search:
+    """A search for the smallest misfit, in parameters over their scales."""
+
+    def __init__(self, made: Problem, evaluations: Evaluations, best: list[float]) -> None:
+        self.made, self.evaluations, self.best = made, evaluations, best
+        space = made.space
+        self.scale = space.column("scale")
+        self.lower, self.upper = space.column("lower"), space.column("upper")
+        observed = made.observed()
+        weights = [
+            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or _spread(seen)))
+            for one, seen in zip(made.measurements, observed, strict=True)
+        ]
+        self.weight = np.concatenate(weights)
+        self.chosen = self.weight > 0.0
+        self.observed = np.concatenate(observed)
+
+    def descend(self, start: NDArray[np.float64]) -> Descent:
+        """Search from a start."""
+        begin = tuple(start.tolist())
+        (first,) = self.evaluations.at([start])
+        if isinstance(first, str):
+            return Descent(begin, begin, math.inf, 1, first, False)
+        try:
+            found = least_squares(
+                lambda z: self._residual([z * self.scale])[0],
+                start / self.scale,
+                lambda z: self._jacobian(z * self.scale, both_sides=False),
+                bounds=(self.lower / self.scale, self.upper / self.scale),
+                xtol=ENOUGH, ftol=LEVEL, gtol=1e-12, max_nfev=TRIED,
+            )  # fmt: skip
+        except ComputationError as error:
+            return Descent(begin, begin, math.inf, 1, str(error), False)
+        values = tuple((found.x * self.scale).tolist())
+        return Descent(
+            begin, values, float(found.cost), int(found.nfev), WHY[found.status], found.status > 0
+        )
+
+    def uncertainty(self, values: NDArray[np.float64], confidence: float) -> Uncertainty:
+        """How well the parameters are known at the end of a search."""
+        jacobian = self._jacobian(values, both_sides=True)
+        near = STEP * self.scale
+        at_bound = (values - self.lower < near) | (self.upper - values < near)
+        return uncertainty(jacobian, self._residual([values])[0], self.scale, at_bound, confidence)
+
+    def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+        """Weighted residuals; infinite where the model fails, so that a search steps back."""
+        residuals = []
+        for said in self.evaluations.at(points):
+            if isinstance(said, str):
+                residuals.append(np.full(int(self.chosen.sum()), np.inf))
+                continue
+            residual = ((said - self.observed) * self.weight)[self.chosen]
+            self.best[0] = min(self.best[0], 0.5 * float(residual @ residual))
+            residuals.append(residual)
+        return residuals
+
+    def _jacobian(self, values: NDArray[np.float64], both_sides: bool) -> NDArray[np.float64]:
+        """Residuals by the parameters over their scales: difference quotients within the bounds."""
+        points = [values]
+        pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
+        for k, scale in enumerate(self.scale):
+            up, down = (values.copy() for _ in range(2))
+            up[k] += STEP * scale
+            down[k] -= STEP * scale
+            above, below = up[k] <= self.upper[k], down[k] >= self.lower[k]
+            sides = [side for side, fits in ((up, above), (down, below)) if fits]
+            if not sides:
+                raise ComputationError(
+                    f"{self.made.space.keys[k]}: the bounds are closer than {STEP:g} of its scale"
+                )
+            sides = sides if both_sides else sides[:1]
+            points += sides
+            first = len(points) - len(sides)
+            end = first + 1 if len(sides) == 2 else 0
+            pairs.append((first, end, (points[first][k] - points[end][k]) / scale))
+        residuals = self._residual(points)
+        with np.errstate(invalid="ignore"):  # where the model fails
+            columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
+        if not np.isfinite(columns).all():
+            place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
+            (why,) = self.evaluations.at([points[pairs[place][0]]])
+            raise ComputationError(
+                f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
+            )
+        return np.stack(columns, axis=1)
+
+
+def _spread(observed: NDArray[np.float64]) -> float:
+    """Size of measured values, by which they are weighed where their error is not known."""
+    return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
+
+
+def _estimates(
+    made: Problem, values: NDArray[np.float64], known: Uncertainty
+) -> tuple[Estimate, ...]:
+    at_bound = np.isnan(known.standard_error)
+    return tuple(
+        Estimate(
+            key, float(value), float(error), float(value - half), float(value + half),
+            bool(determined), bool(held),
+        )
+        for key, value, error, half, determined, held in zip(
+            made.space.keys, values, known.standard_error, known.half_width, known.determined,
+            at_bound, strict=True,
+        )
+    )  # fmt: skip
+
+
+def _sound(said: NDArray[np.float64] | str) -> NDArray[np.float64]:
+    if isinstance(said, str):
+        raise ComputationError(said)
+    return said
+
+
+def _split(made: Problem, said: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Predictions of each measurement."""
+    lengths = [len(one) for one in made.observed()]
+    return np.split(said, np.cumsum(lengths)[:-1])

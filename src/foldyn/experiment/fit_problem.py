@@ -1,0 +1,288 @@
+"""The model of a fit: from values of the parameters to what it says of every measurement."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import foldyn
+from foldyn.cases import State
+from foldyn.cases.casefile import CaseFile
+from foldyn.cases.reading import case_of_document, read_document, validated
+from foldyn.cases.values import show
+from foldyn.dynamics import initial_state, simulate
+from foldyn.dynamics.methods import method_of
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.experiment.key_paths import replaced, value_at
+from foldyn.experiment.measurement import Measurement
+from foldyn.experiment.parameters import Parameter, Space, space
+from foldyn.results import load
+from foldyn.statics import Settings, trace
+
+STEADY = "generalized_alpha"
+"""Integrator of a fit where the case leaves the choice to us."""
+ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
+"""Fields of measurements that do not change what is predicted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One computation that gives several measurements.
+
+    Attributes
+    ----------
+    path : Path
+        Its case file.
+    document : dict
+        What that says, with the changes of these measurements.
+    members : tuple of int
+        Numbers of the measurements.
+    """
+
+    path: Path
+    document: dict[str, Any]
+    members: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Cases, parameters and measurements of a fit.
+
+    Attributes
+    ----------
+    path : Path
+        The case file.
+    document : dict
+        What it says.
+    space : Space
+    measurements : tuple of Measurement
+    runs : tuple of Run
+    """
+
+    path: Path
+    document: dict[str, Any]
+    space: Space
+    measurements: tuple[Measurement, ...]
+    runs: tuple[Run, ...]
+
+    def predict(self, values: Sequence[float] | NDArray) -> list[NDArray[np.float64]]:
+        """What the model says of each measurement.
+
+        Raises
+        ------
+        InputError
+            The case does not allow these values.
+        ComputationError
+            A path or motion cannot be computed.
+        """
+        said: dict[int, NDArray[np.float64]] = {}
+        for run in self.runs:
+            case_file = self.case_file(run, values)
+            members = [self.measurements[i] for i in run.members]
+            result = _result(case_file, members)
+            for i in run.members:
+                said[i] = self.measurements[i].predicted(result, case_file.case())
+        return [said[i] for i in range(len(self.measurements))]
+
+    def case_file(self, run: Run, values: Sequence[float] | NDArray) -> CaseFile:
+        """Case file of a run at given values; its warnings have been told when it was checked."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            return case_of_document(run.path, replaced(run.document, self.space.changes(values)))
+
+    def result(
+        self,
+        run: Run,
+        values: Sequence[float] | NDArray,
+        members: Sequence[Measurement] | None = None,
+    ) -> Any:
+        """Path or motion of a run at given values, for its measurements or others."""
+        if members is None:
+            members = [self.measurements[i] for i in run.members]
+        return _result(self.case_file(run, values), members)
+
+    def observed(self) -> list[NDArray[np.float64]]:
+        """Measured values of each measurement."""
+        return [one.observed() for one in self.measurements]
+
+    def digest(self) -> str:
+        """Digest of all that predictions depend on but for the parameters' values."""
+        found = hashlib.sha256(foldyn.__version__.encode())
+        told = [self.space.keys, [(tie.key, tie.expression) for tie in self.space.ties]]
+        found.update(json.dumps(told).encode())
+        for run in self.runs:
+            found.update(json.dumps(run.document, sort_keys=True, default=str).encode())
+            state = _start(self.case_file(run, self.space.column("start")))
+            for array in () if state is None else (state.displacement, state.velocity):
+                found.update(b"" if array is None else np.asarray(array).tobytes())
+            for file in sorted(_files(run.document)):
+                there = run.path.parent / file
+                found.update(there.read_bytes() if there.is_file() else b"")
+        for one in self.measurements:
+            for item in fields(one):
+                if item.name in ASIDE:
+                    continue
+                value = getattr(one, item.name)
+                value = np.isfinite(value) if item.name == "values" else value
+                array = isinstance(value, np.ndarray)
+                found.update(value.tobytes() if array else repr(value).encode())
+        return found.hexdigest()
+
+
+def problem(
+    case: Any,
+    measurements: Sequence[Measurement],
+    parameters: Sequence[Parameter],
+    ties: Mapping[str, str],
+) -> Problem:
+    """Check all that a fit is told, and make its model.
+
+    Raises
+    ------
+    InputError
+        Anything cannot be used: the case files at the values to start from, a measurement that
+        its case cannot give, a parameter that is none.
+    """
+    try:
+        path = Path(case)
+    except TypeError:
+        raise InputError(f"case: got {type(case).__name__}, give the path of a case file") from None
+    document = read_document(path)
+    if not measurements:
+        raise InputError("data: none; give at least one measurement")
+    for number, one in enumerate(measurements):
+        if not isinstance(one, Measurement):
+            raise InputError(f"data[{number}]: got {show(one)}, give a measurement")
+    _check_sigmas(measurements)
+    _check_keys(path, document, parameters, ties)
+    made = Problem(
+        path, document, space(document, parameters, ties), tuple(measurements),
+        tuple(_runs(path, document, measurements)),
+    )  # fmt: skip
+    start = made.space.column("start")
+    for run in made.runs:
+        case_file = case_of_document(run.path, replaced(run.document, made.space.changes(start)))
+        for i in run.members:
+            _check(measurements[i], case_file)
+    fitted = sum(len(one.observed()) for one in measurements if not one.held_out)
+    if fitted < len(parameters):
+        raise InputError(
+            f"data: {fitted} values that are not held out cannot give {len(parameters)} "
+            "parameters; measure more, or fit fewer"
+        )
+    return made
+
+
+def _check_keys(
+    path: Path, document: dict[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
+) -> None:
+    """Refuse keys that no case file has, before it is asked what the file says of them."""
+    for one in parameters:
+        if isinstance(one, Parameter) and value_at(document, one.key) is None:
+            tried = 1.0 if one.start is None else one.start
+            validated(path, replaced(document, {one.key: tried}))
+    for key in ties:
+        if value_at(document, key) is None:
+            validated(path, replaced(document, {key: 1.0}))
+
+
+def _check_sigmas(measurements: Sequence[Measurement]) -> None:
+    fitted = [one for one in measurements if not one.held_out]
+    without = [one for one in fitted if one.sigma is None]
+    if len(fitted) > 1 and without:
+        raise InputError(
+            f"{without[0].name}: sigma: missing; several measurements are weighed by the standard "
+            "errors of their values, so each needs its own"
+        )
+
+
+def _runs(
+    path: Path, document: dict[str, Any], measurements: Sequence[Measurement]
+) -> list[Run]:  # fmt: skip
+    """Measurements with the same case and the same changes, together."""
+    groups: dict[str, tuple[Path, dict[str, Any], list[int]]] = {}
+    for i, one in enumerate(measurements):
+        there = path if one.case is None else Path(one.case)
+        key = json.dumps([str(there), dict(one.changes)], sort_keys=True, default=str)
+        if key not in groups:
+            said = document if one.case is None else read_document(there)
+            groups[key] = there, replaced(said, one.changes), []
+        groups[key][2].append(i)
+    return [Run(there, said, tuple(members)) for there, said, members in groups.values()]
+
+
+def _check(one: Measurement, case_file: CaseFile) -> None:
+    kind = case_file.analysis.kind
+    if kind != one.analysis:
+        raise InputError(
+            f'{one.name}: kind = "{one.kind}" needs a case of kind "{one.analysis}", but '
+            f"{case_file.path} is of kind {show(kind)}"
+        )
+    if kind == "dynamics":
+        _steady(case_file)
+    one.check(case_file.case(), case_file.analysis.arguments)
+
+
+def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
+    """Path or motion that a case file asks for, at the load factors that are measured."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        state, case = _start(case_file), case_file.case()
+        if case_file.analysis.kind == "dynamics":
+            return simulate(case, initial=state, **_steady(case_file))
+        given = case_file.analysis.arguments
+        factors = np.unique(np.concatenate([one.factors(case) for one in members]))
+        way = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
+        kept = {key: given[key] for key in ("constant", "inertia_relief")}
+        settings = Settings(**{**case_file.analysis.settings, "stability": False})
+        return trace(case, load_factors=way, start=state, settings=settings, **kept)
+
+
+def _start(case_file: CaseFile) -> State | None:
+    """State that a case file starts from."""
+    return case_file.initial(read=lambda path, at: initial_state(load(path), at))
+
+
+def _steady(case_file: CaseFile) -> dict[str, Any]:
+    """Arguments of `simulate` with steps that do not depend on the parameters.
+
+    Steps chosen by their error would make the misfit jump between neighboring values.
+    """
+    given = dict(case_file.analysis.arguments)
+    if given["method"] == "auto":
+        given["method"] = STEADY
+    method = method_of(given["method"])
+    if method.adaptive:
+        raise InputError(
+            f"{case_file.path}: analysis.method = {show(method.name)}: chooses its steps by their "
+            "error, which makes a misfit jump; fit with rk4, newmark or generalized_alpha"
+        )
+    if method.implicit:
+        given["tolerance"] = None
+        if given["dt"] is None:
+            if not isinstance(given["every"], float):
+                raise InputError(
+                    f"{case_file.path}: analysis.dt: missing; a fit needs fixed steps: give dt, or "
+                    "output.every in seconds, which is then the step"
+                )
+            given["dt"] = given["every"]
+    return given
+
+
+def _files(value: Any) -> list[str]:
+    """Paths of all files that a case file names, but for the result that it starts from."""
+    if isinstance(value, Mapping):
+        own = [value["file"]] if isinstance(value.get("file"), str) else []
+        inner = [item for key, item in value.items() if key != "initial"]
+        return own + [file for item in inner for file in _files(item)]
+    if isinstance(value, list):
+        return [file for item in value for file in _files(item)]
+    return []

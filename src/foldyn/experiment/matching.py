@@ -1,0 +1,387 @@
+"""Which corner is which node: the model is projected, the assignment solved, and all are looked up.
+
+A folded sheet looks much the same one cell further on. So a placement counts by the nodes that are
+really there: at each one's place in the picture edges must meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.experiment.camera import axes_of_view
+from foldyn.experiment.junctions import refine
+from foldyn.experiment.view import Array, View, fit_view
+
+_TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # of the image about the line of sight
+_SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # about the scale by size, where it is not known
+_STATES = 9  # of a path, that are tried before the best is refined
+_BEST = 6  # placements that are refined
+_FEWEST = 6  # matched nodes, without which a placement is chance
+_LEAST_SHARE = 0.5  # of the nodes that no panel hides
+_NEIGHBORS = 6  # whose places correct that of a node
+_STRAY = 0.2  # of the nodes' spacing, by which a node may miss the place its neighbors tell
+
+
+@dataclass(frozen=True)
+class Placing:
+    """How the model is seen, as far as the user says.
+
+    Attributes
+    ----------
+    up, facing : str
+        Directions of the model that point up in the image and towards the camera.
+    metres_per_pixel : float or None
+        In the plane of the model that is nearest to the camera; None: fitted.
+    distance : float or None
+        Of that plane from the camera (m); None: fitted.
+    axis : tuple of float or None
+        Pixel on the axis of the camera: the middle of the whole image.
+    """
+
+    up: str = "-x"
+    facing: str = "z"
+    metres_per_pixel: float | None = None
+    distance: float | None = None
+    axis: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        axes_of_view(self.up, self.facing)
+        if self.distance is not None and not (np.isfinite(self.distance) and self.distance > 0.0):
+            raise InputError(f"--distance {self.distance!r}: give a positive number of m")
+
+
+@dataclass(frozen=True)
+class Match:
+    """Nodes that were recognized in a picture.
+
+    Attributes
+    ----------
+    node : ndarray of int, shape (m,)
+        Nodes, rising, and
+    uv : ndarray, shape (m, 2)
+        where they are seen (pixels).
+    view : View
+    positions : ndarray, shape (n, 3)
+        Positions of all nodes (m) in the state that fits best.
+    state : float
+        Its place among the states: 2.5 is half way between numbers 2 and 3.
+    rms : float
+        Root mean square distance between seen and projected nodes (pixels): how far the specimen
+        differs from the model.
+    seen : ndarray of bool, shape (n,)
+        Nodes that no panel hides.
+    expected : ndarray, shape (n, 2)
+        Where each node should be by its neighbors (pixels), measured or not.
+    """
+
+    node: NDArray[np.int64]
+    uv: Array
+    view: View
+    positions: Array
+    state: float
+    rms: float
+    seen: NDArray[np.bool_]
+    expected: Array
+
+
+def match_nodes(
+    image: NDArray[np.uint8],
+    corners: Array,
+    states: Array,
+    triangles: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+    placing: Placing,
+    reach: float,
+    place: str = "the picture",
+) -> Match:
+    """Recognize the nodes of a model in a picture.
+
+    The model is laid over the corners in every way that `placing` leaves open. The placements in
+    which most nodes fall on corners are refined by turns: assignment of nodes to corners (the
+    shortest total distance), then a fit of the view and the state. Nodes without a corner are
+    looked for where their neighbors put them. The placement with most nodes wins.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width)
+    corners : ndarray, shape (p, 2)
+        Found in it (pixels).
+    states : ndarray, shape (k, n, 3)
+        Positions of all nodes (m) in the states in which the model may be, a path in order.
+    triangles : ndarray, shape (m, 3)
+        Panels, to tell which nodes they hide.
+    nodes : ndarray of int
+        Nodes that may be seen: the vertices of the pattern.
+    placing : Placing
+    reach : float
+        Length of the edges that make a corner (pixels).
+    place : str
+        What the picture is called in messages.
+
+    Returns
+    -------
+    Match
+
+    Raises
+    ------
+    InputError
+        Too few corners, or no placement in which enough nodes are there.
+    """
+    if len(corners) < _FEWEST:
+        raise InputError(
+            f"{place}: {len(corners)} corners are found in it; at least {_FEWEST} are needed to "
+            "recognize nodes of the model"
+        )
+    best: Match | None = None
+    for start, number in _placements(corners, states[:, nodes], placing):
+        found = _refined(image, corners, states, number, start, triangles, nodes, placing, reach)
+        if found is not None and (best is None or _rank(found) > _rank(best)):
+            best = found
+    count = 0 if best is None else len(best.node)
+    if best is None or count < max(_FEWEST, _LEAST_SHARE * best.seen[nodes].sum()):
+        raise InputError(
+            f"{place}: the model's nodes do not fall on the {len(corners)} corners found there (at "
+            f"best {count} of {len(nodes)}): check --roi, --up, --facing and --scale, choose the "
+            "frame by --match, or give the path of a statics case as --model, whose states are "
+            "tried"
+        )
+    return best
+
+
+def _rank(match: Match) -> tuple[int, float]:
+    return len(match.node), -match.rms
+
+
+def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, int]]:
+    """The best ways to lay the model over the points, by how many nodes fall on a point."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(uv)
+    axes = axes_of_view(placing.up, placing.facing)
+    chosen = np.unique(np.linspace(0, len(states) - 1, _STATES).round().astype(int))
+    ranked = []
+    for number in chosen:
+        seen = (states[number] - states[number].mean(axis=0)) @ axes.T
+        spacing = _spacing(seen[:, :2])
+        for scale in _scales(uv, seen, placing):
+            for turn in _TURNS:
+                c, s = np.cos(turn), np.sin(turn)
+                flat = seen[:, :2] @ np.array([[c, s], [-s, c]]) / scale
+                tolerance = 0.3 * spacing / scale
+                shift = _most_votes(uv, flat, tolerance)
+                distance, partner = tree.query(flat + shift, distance_upper_bound=tolerance)
+                hits = np.isfinite(distance)
+                count = len(np.unique(partner[hits]))
+                rest = float(distance[hits].mean() / tolerance) if hits.any() else 1.0
+                ranked.append((count - rest, number, scale, turn, shift))
+    ranked.sort(key=lambda one: -one[0])
+    kept = []
+    for _, number, scale, turn, shift in ranked[:_BEST]:
+        kept.append((_view_of(states[number], axes, scale, turn, shift, placing), int(number)))
+    return kept
+
+
+def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
+    """Metres per pixel that are tried, in the middle plane of the model."""
+    if placing.metres_per_pixel is not None:
+        near = -seen[:, 2].min()
+        deeper = 1.0 if placing.distance is None else 1.0 + near / placing.distance
+        return placing.metres_per_pixel * deeper * np.array([0.98, 1.0, 1.02])
+    size = np.linalg.norm(np.ptp(np.quantile(uv, [0.02, 0.98], axis=0), axis=0))
+    return float(np.linalg.norm(np.ptp(seen[:, :2], axis=0))) / float(size) * _SCALES
+
+
+def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
+    """Shift for which most nodes fall on points: every pair votes for its own."""
+    votes = (uv[:, np.newaxis] - flat).reshape(-1, 2)
+    low = votes.min(axis=0)
+    cell = np.floor((votes - low) / tolerance).astype(np.int64)
+    width = cell[:, 0].max() + 2
+    table = np.bincount(cell[:, 1] * width + cell[:, 0], minlength=width * (cell[:, 1].max() + 2))
+    table = np.pad(table, (0, -len(table) % width)).reshape(-1, width)
+    block = table[:-1, :-1] + table[1:, :-1] + table[:-1, 1:] + table[1:, 1:]
+    row, column = np.unravel_index(int(block.argmax()), block.shape)
+    own = ((cell - [column, row] >= 0) & (cell - [column, row] <= 1)).all(axis=1)
+    return np.median(votes[own], axis=0)
+
+
+def _spacing(flat: Array) -> float:
+    """Median distance of a node to its nearest neighbor, as seen."""
+    apart = np.hypot(*(flat[:, np.newaxis] - flat).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    return float(np.median(apart.min(axis=1)))
+
+
+def _view_of(
+    points: Array, axes: Array, scale: float, turn: float, shift: Array, placing: Placing
+) -> View:
+    """The view of a placement, with the nearest plane of the model as that of the scale."""
+    middle = points.mean(axis=0)
+    nearest = ((points - middle) @ axes[2]).min()
+    distance = placing.distance or 1e3 * float(np.ptp(points, axis=0).max())
+    c, s = np.cos(turn), np.sin(turn)
+    spin = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    axis = shift if placing.axis is None else np.asarray(placing.axis, dtype=np.float64)
+    front = middle + nearest * axes[2]
+    ratio = 1.0 - nearest / distance
+    known = placing.metres_per_pixel
+    center = axis + (shift - axis) * ratio
+    return View(spin @ axes, front, center, known or scale / ratio, distance, axis)
+
+
+def _refined(
+    image: NDArray[np.uint8],
+    corners: Array,
+    states: Array,
+    number: int,
+    view: View,
+    triangles: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+    placing: Placing,
+    reach: float,
+) -> Match | None:
+    """Assignment and fit by turns, then a look at the places of all nodes."""
+    state, positions = float(number), states[number]
+    known = placing.metres_per_pixel is not None, placing.distance is not None
+    for part in (0.45, 0.35, 0.3, 0.25):
+        asked = nodes[~hidden_nodes(positions, triangles, view)[nodes]]
+        flat = view.project(positions[asked])
+        row, point = assign(flat, corners, part * _spacing(flat))
+        if len(row) < _FEWEST:
+            return None
+        view, state, positions, _ = _fitted(view, states, state, asked[row], corners[point], known)
+    place = np.full((len(positions), 2), np.nan)
+    place[asked[row]] = corners[point]
+    for _ in range(3):
+        seen = ~hidden_nodes(positions, triangles, view)
+        place = _looked_up(image, place, view.project(positions), nodes[seen[nodes]], reach)
+        node = np.flatnonzero(np.isfinite(place[:, 0]))
+        if len(node) < _FEWEST:
+            return None
+        view, state, positions, rms = _fitted(view, states, state, node, place[node], known)
+    flat = view.project(positions)
+    expected = by_neighbors(place, flat, np.arange(len(flat)))
+    expected = np.where(np.isfinite(expected), expected, flat)
+    return Match(node, place[node], view, positions, state, rms, seen, expected)
+
+
+def _fitted(
+    view: View,
+    states: Array,
+    state: float,
+    node: NDArray[np.int64],
+    uv: Array,
+    known: tuple[bool, bool],
+) -> tuple[View, float, Array, float]:
+    """View, state, positions of all nodes in it, and what is left (pixels, rms)."""
+    last = len(states) - 1
+    around = None
+    ends = max(state - 3.0, 0.0), min(state + 3.0, float(last))
+    if last:
+        around = np.stack([_between(states, end)[node] for end in ends])
+    view, step, rms = fit_view(view, _between(states, state)[node], uv, *known, around)
+    state += abs(step) * ((ends[1] if step > 0.0 else ends[0]) - state)
+    return view, state, _between(states, state), rms
+
+
+def _looked_up(
+    image: NDArray[np.uint8], place: Array, flat: Array, asked: NDArray[np.int64], reach: float
+) -> Array:
+    """Places of the nodes asked for: where their neighbors put them, if edges meet there."""
+    kept = _without_strays(place, flat, asked)
+    expected = by_neighbors(kept, flat, asked)
+    missing = np.where(np.isfinite(kept), np.nan, expected)
+    found = refine(image, missing, reach, 0.6 * reach)
+    sure = np.isfinite(found.position[:, 0]) & (found.error < 0.5)
+    for node in np.flatnonzero(sure):
+        apart = np.hypot(*(kept - found.position[node]).T)
+        if not (apart < 0.5 * reach).any():  # or it is another node's
+            kept[node] = found.position[node]
+    return kept
+
+
+def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
+    """Places of the nodes but those that their neighbors contradict, the worst one first.
+
+    One by one: a wrong place throws its neighbors out of line, too.
+    """
+    kept = np.full(place.shape, np.nan)
+    kept[asked] = place[asked]
+    limit = max(_STRAY * _spacing(flat[asked]), 2.0)
+    for _ in range(len(asked)):
+        stray = np.hypot(*(kept - by_neighbors(kept, flat, asked)).T)
+        if not np.isfinite(stray).any():
+            break
+        allowed = min(limit, max(6.0 * float(np.nanmedian(stray)), 1.5))
+        worst = int(np.nanargmax(stray))
+        if stray[worst] <= allowed:
+            break
+        kept[worst] = np.nan
+    return kept
+
+
+def by_neighbors(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
+    """Places (n, 2) of the nodes asked for, by the affine misfit of the model at their neighbors.
+
+    NaN for all others, and where fewer than four others are known.
+    """
+    expected = np.full(place.shape, np.nan)
+    misfit = place - flat
+    known = np.flatnonzero(np.isfinite(place[:, 0]))
+    for node in asked:
+        others = known[known != node]
+        if len(others) < 4:
+            continue
+        apart = np.hypot(*(flat[others] - flat[node]).T)
+        some = others[np.argsort(apart)[:_NEIGHBORS]]
+        offset = np.column_stack([np.ones(len(some)), flat[some] - flat[node]])
+        normal = offset.T @ offset
+        normal[1:, 1:] += 0.1 * np.trace(normal[1:, 1:]) * np.eye(2)
+        # the median first: one wrong neighbor must not carry all others away
+        middle = np.median(misfit[some], axis=0)
+        left = misfit[some] - middle
+        expected[node] = flat[node] + middle + np.linalg.solve(normal, offset.T @ left)[0]
+    return expected
+
+
+def _between(states: Array, state: float) -> Array:
+    """State between two of a path."""
+    if len(states) == 1:
+        return states[0]
+    low = min(int(state), len(states) - 2)
+    return states[low] + (state - low) * (states[low + 1] - states[low])
+
+
+def assign(nodes: Array, points: Array, limit: float) -> tuple[NDArray, NDArray]:
+    """Pairs of nodes and points (pixels) with the shortest total distance, none above a limit."""
+    from scipy.optimize import linear_sum_assignment
+
+    distance = np.hypot(*(nodes[:, np.newaxis] - points).transpose(2, 0, 1))
+    # a node without a partner costs the limit: it takes none that is farther away
+    padded = np.concatenate([np.minimum(distance, 1e6), np.full((len(nodes),) * 2, limit)], axis=1)
+    rows, columns = linear_sum_assignment(padded)
+    paired = columns < len(points)
+    return rows[paired], columns[paired]
+
+
+def hidden_nodes(points: Array, triangles: NDArray[np.int64], view: View) -> NDArray[np.bool_]:
+    """Nodes that lie behind a triangle as seen in a view."""
+    flat, depth = view.project(points), view.depth(points)
+    hidden = np.zeros(len(points), dtype=bool)
+    slack = 1e-3 * np.ptp(points, axis=0).max()
+    a, b, c = (flat[triangles[:, k]] for k in range(3))
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    drawn = np.abs(area) > 1e-9
+    a, b, c, area, corner = a[drawn], b[drawn], c[drawn], area[drawn], triangles[drawn]
+    for node in range(len(points)):
+        d = flat[node] - a
+        s = (d[:, 0] * (c - a)[:, 1] - d[:, 1] * (c - a)[:, 0]) / area
+        t = ((b - a)[:, 0] * d[:, 1] - (b - a)[:, 1] * d[:, 0]) / area
+        inside = (s > 1e-6) & (t > 1e-6) & (s + t < 1.0 - 1e-6) & ~(corner == node).any(axis=1)
+        z = (1.0 - s - t) * depth[corner[:, 0]] + s * depth[corner[:, 1]] + t * depth[corner[:, 2]]
+        hidden[node] = bool((inside & (z < depth[node] - slack)).any())
+    return hidden

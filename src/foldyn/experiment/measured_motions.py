@@ -1,0 +1,247 @@
+"""Measurements of a motion: histories of nodes, and their spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from foldyn.cases import Case
+from foldyn.cases.supports import AXES
+from foldyn.cases.values import numbers, show
+from foldyn.errors import InputError
+from foldyn.experiment.measurement import Measurement, axis_number, column
+from foldyn.signals import sampling_interval, spectrum
+
+DETRENDS = (None, "constant", "linear")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class History(Measurement):
+    """Displacements of nodes along an axis over time.
+
+    Parameters
+    ----------
+    time : array_like, shape (t,)
+        Times (s), increasing.
+    values : array_like, shape (t, m)
+        Displacement of each node (m); NaN where it was lost.
+    axis : {"x", "y", "z"}
+    delay : float
+        Time of the model minus that of the measurement (s).
+    detrend : {None, "constant", "linear"}
+        What is taken off the misfit: nothing, its mean, or the straight line of best fit. The mean
+        where the zero of the measured displacements means nothing.
+    """
+
+    time: Any = ()
+    values: Any = ()
+    axis: str = "x"
+    delay: float = 0.0
+    detrend: str | None = None
+    kind: ClassVar[str] = "history"
+    analysis: ClassVar[str] = "dynamics"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        axis_number(self._of("axis"), self.axis)
+        time = column(self._of("time"), self.time)
+        if len(time) < 2 or not (np.diff(time) > 0.0).all():
+            raise InputError(f"{self._of('time')}: must be at least two increasing times (s)")
+        values = np.array(self.values, dtype=np.float64)
+        values = values[:, None] if values.ndim == 1 else values
+        if values.ndim != 2 or len(values) != len(time):
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be ({len(time)} times, nodes)"
+            )
+        if np.isinf(values).any():
+            raise InputError(f"{self._of('values')}: infinite; give NaN where a node was lost")
+        if self.detrend not in DETRENDS:
+            raise InputError(
+                f'{self._of("detrend")} = {show(self.detrend)}: choose "constant", "linear" or none'
+            )
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+        for node in range(values.shape[1]):
+            self._refuse_constant(node)
+
+    def _refuse_constant(self, node: int) -> None:
+        """Refuse a history that says nothing of a motion."""
+        seen = self.values[:, node][np.isfinite(self.values[:, node])]
+        which = f"{self._of('values')}: column {node}"
+        if seen.size < 2:
+            raise InputError(f"{which} has {seen.size} values that are numbers; give at least two")
+        if np.ptp(seen) == 0.0:
+            raise InputError(
+                f"{which} is constant ({seen[0]:g} m at all times): nothing moved, or the wrong "
+                "point was followed; leave it out"
+            )
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self._reduced(self.values)
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        nodes = self.where(case)
+        if len(nodes) != self.values.shape[1]:
+            raise InputError(
+                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
+            )
+        _within(self._of("time"), self.time + self.delay, arguments)
+
+    def curves(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """What a motion says at the measured times, shape (t, m), nothing taken off."""
+        return _sampled(result, self.where(case), self.axis, self.time + self.delay)
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self._reduced(self.curves(result, case))
+
+    def trend(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What `detrend` takes off curves of shape (t, m), found where the nodes were seen."""
+        if self.detrend is None:
+            return np.zeros(curves.shape)
+        degree = DETRENDS.index(self.detrend) - 1
+        lines = []
+        for curve, measured in zip(curves.T, self.values.T, strict=True):
+            seen = np.isfinite(measured)
+            line = np.polynomial.Polynomial.fit(self.time[seen], curve[seen], degree)
+            lines.append(line(self.time))
+        return np.stack(lines, axis=1)
+
+    def _reduced(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Curves where the nodes were seen, with the trend taken off, flat: node after node."""
+        return (curves - self.trend(curves)).T[np.isfinite(self.values).T]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Spectrum(Measurement):
+    """Amplitude spectra of the displacements of nodes along an axis.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (f,)
+        Frequencies (Hz).
+    values : array_like, shape (f, m)
+        Amplitude of each node (m), as `foldyn.signals.spectrum` has it.
+    time : array_like, shape (t,)
+        Times (s) of the model's motion of which the spectrum is compared: those of the record
+        whose spectrum this is, so that both resolve and leak the same.
+    axis : {"x", "y", "z"}
+    detrend : {None, "constant", "linear"}
+        What is taken off the model's motion before; as it was for the record.
+    taper : str, optional
+        Window function of both, as `foldyn.signals.spectrum` takes it.
+    """
+
+    frequency: Any = ()
+    values: Any = ()
+    time: Any = ()
+    axis: str = "x"
+    detrend: str | None = "constant"
+    taper: str | None = None
+    kind: ClassVar[str] = "spectrum"
+    analysis: ClassVar[str] = "dynamics"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        axis_number(self._of("axis"), self.axis)
+        frequency = column(self._of("frequency"), self.frequency)
+        values = numbers(self._of("values"), self.values)
+        values = values[:, None] if values.ndim == 1 else values
+        if values.ndim != 2 or len(values) != len(frequency):
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be ({len(frequency)} "
+                "frequencies, nodes)"
+            )
+        time = column(self._of("time"), self.time)
+        sampling_interval(time)
+        for name, value in (("frequency", frequency), ("values", values), ("time", time)):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(
+        cls,
+        history: History,
+        band: tuple[float, float],
+        detrend: str | None = "constant",
+        taper: str | None = None,
+    ) -> Spectrum:
+        """Spectrum of a measured history within a band of frequencies (Hz).
+
+        Raises
+        ------
+        InputError
+            The times are not evenly spaced, a node was lost on the way, or the band is empty.
+        """
+        if not np.isfinite(history.values).all():
+            raise InputError(
+                f"{history.name}: a spectrum needs every sample of a node; leave out nodes that "
+                "were lost, or compare the history"
+            )
+        step = sampling_interval(history.time)
+        frequency, amplitude = spectrum(history.values, step, window=taper, detrend=detrend)
+        chosen = (frequency >= band[0]) & (frequency <= band[1])
+        if not chosen.any():
+            raise InputError(
+                f"{history.name}: band = {show(band)}: holds none of the frequencies, which are "
+                f"{frequency[1]:.4g} Hz apart up to {frequency[-1]:.4g} Hz"
+            )
+        return cls(
+            nodes=history.nodes, name=history.name, label=history.label, sigma=history.sigma,
+            held_out=history.held_out, case=history.case, changes=history.changes,
+            frequency=frequency[chosen], values=amplitude[chosen], axis=history.axis,
+            time=history.time + history.delay, detrend=detrend, taper=taper,
+        )  # fmt: skip
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.values.T.ravel()
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        nodes = self.where(case)
+        if len(nodes) != self.values.shape[1]:
+            raise InputError(
+                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
+            )
+        _within(self._of("time"), self.time, arguments)
+
+    def spectra(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """Amplitudes of the model at the measured frequencies, shape (f, m)."""
+        along = _sampled(result, self.where(case), self.axis, self.time)
+        step = sampling_interval(self.time)
+        frequency, amplitude = spectrum(along, step, window=self.taper, detrend=self.detrend)
+        return np.stack([np.interp(self.frequency, frequency, one) for one in amplitude.T], axis=1)
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.spectra(result, case).T.ravel()
+
+
+def _sampled(
+    result: Any, nodes: NDArray[np.int64], axis: str, time: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Displacement of nodes along an axis at other times than a motion's samples."""
+    along = result["displacement"].values[:, nodes, AXES.index(axis)]
+    return CubicSpline(result["time"].values, along)(time)
+
+
+def _within(name: str, times: NDArray[np.float64], arguments: Mapping[str, Any]) -> None:
+    """Refuse times that the motion of a case does not have."""
+    first = float(arguments.get("start", 0.0))
+    last = first + arguments["duration"]
+    slack = 1e-9 * (last - first)
+    if times[0] < first - slack or times[-1] > last + slack:
+        raise InputError(
+            f"{name}: {times[0]:.6g} to {times[-1]:.6g} s, delay included, is not within the "
+            f"motion of the case, {first:g} to {last:g} s; change the delay, the window or "
+            "analysis.duration"
+        )

@@ -1,0 +1,171 @@
+"""Measurements of a quasi-static test: forces, and shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.cases.supports import AXES
+from foldyn.cases.values import choice, show
+from foldyn.errors import InputError
+from foldyn.experiment.measurement import Measurement, axis_number, column
+
+IMPOSED = "imposed"
+"""Selects all nodes that supports of the case move along the axis."""
+QUANTITIES = ("displacement", "position")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForceDisplacement(Measurement):
+    """Forces at displacements that supports of the case impose.
+
+    Parameters
+    ----------
+    nodes : sequence of int, or str
+        As of every measurement; "imposed", the default, for all that supports move along the axis.
+    displacement : array_like, shape (n,)
+        Mean displacement of the nodes along the axis (m).
+    force : array_like, shape (n,)
+        Force on all of them together along the axis (N), positive along the axis.
+    axis : {"x", "y", "z"}
+    """
+
+    nodes: Any = IMPOSED
+    displacement: Any = ()
+    force: Any = ()
+    axis: str = "x"
+    kind: ClassVar[str] = "force_displacement"
+    analysis: ClassVar[str] = "statics"
+    unit: ClassVar[str] = "N"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        axis_number(self._of("axis"), self.axis)
+        moved = column(self._of("displacement"), self.displacement)
+        object.__setattr__(self, "displacement", moved)
+        object.__setattr__(self, "force", column(self._of("force"), self.force, len(moved)))
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.force
+
+    def where(self, case: Case) -> NDArray[np.int64]:
+        """See `Measurement`."""
+        if self.nodes == IMPOSED:
+            return np.flatnonzero(case.imposed[:, AXES.index(self.axis)])
+        return super().where(case)
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        if not len(self.where(case)):
+            raise InputError(f"{self._of('nodes')}: no support moves any node along {self.axis}")
+        held = case.imposed[self.where(case), AXES.index(self.axis)]
+        if not held.all():
+            free = self.where(case)[~held][0]
+            raise InputError(
+                f"{self._of('nodes')}: no support of the case moves node {free} along {self.axis}; "
+                "forces are compared where displacements are imposed (to compare displacements "
+                'under given forces use kind = "shapes")'
+            )
+        if self._full(case) == 0.0:
+            raise InputError(f"{self._of('nodes')}: the supports move these nodes by 0")
+
+    def factors(self, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.displacement / self._full(case)
+
+    def at(self, displacement: NDArray[np.float64]) -> ForceDisplacement:
+        """The same test at other displacements, at which no force is known."""
+        return replace(self, displacement=displacement, force=np.zeros(len(displacement)))
+
+    def _full(self, case: Case) -> float:
+        """Mean displacement of the nodes at the load factor 1."""
+        nodes, axis = self.where(case), AXES.index(self.axis)
+        return float(sum(np.mean(term[nodes, axis]) for term, _ in case.imposed_terms))
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        nodes = np.isin(result["support_node"].values, self.where(case))
+        chosen = nodes & (result["support_axis"].values == self.axis)
+        total = result["reaction"].values[:, chosen].sum(axis=1)
+        return total[_steps(result, self.factors(case))]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shapes(Measurement):
+    """Displacements or positions of nodes at load factors.
+
+    Parameters
+    ----------
+    load_factor : array_like, shape (s,)
+    values : array_like, shape (s, m, a)
+        Of each node along each axis (m); NaN where one was not seen.
+    axes : str
+        The axes measured, "xz" for a picture from the side.
+    quantity : {"displacement", "position"}
+    """
+
+    load_factor: Any = ()
+    values: Any = ()
+    axes: str = "xyz"
+    quantity: str = "displacement"
+    kind: ClassVar[str] = "shapes"
+    analysis: ClassVar[str] = "statics"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        choice(self._of("quantity"), self.quantity, QUANTITIES)
+        if not self.axes or set(self.axes) - set(AXES) or len(set(self.axes)) < len(self.axes):
+            raise InputError(f'{self._of("axes")} = {show(self.axes)}: must be letters of "xyz"')
+        factors = column(self._of("load_factor"), self.load_factor)
+        values = np.array(self.values, dtype=np.float64)
+        wanted = (len(factors), None, len(self.axes))
+        if values.ndim != 3 or values.shape[::2] != wanted[::2]:
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be (steps, nodes, axes), here "
+                f"({wanted[0]}, nodes, {wanted[2]})"
+            )
+        if not np.isfinite(values).any() or np.isinf(values).any():
+            raise InputError(f"{self._of('values')}: must be numbers, NaN where a node is not seen")
+        object.__setattr__(self, "load_factor", factors)
+        object.__setattr__(self, "values", values)
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.values[np.isfinite(self.values)]
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        nodes = self.where(case)
+        if len(nodes) != self.values.shape[1]:
+            raise InputError(
+                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
+            )
+
+    def factors(self, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.load_factor
+
+    def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """What a result says of all values, seen or not, shape (s, m, a)."""
+        nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
+        moved = result["displacement"].values[_steps(result, self.load_factor)][:, nodes][..., axes]
+        if self.quantity == "displacement":
+            return moved
+        return moved + case.structure.nodes[nodes][:, axes]
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.shapes(result, case)[np.isfinite(self.values)]
+
+
+def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Steps of a path at load factors that it has been asked for."""
+    return np.abs(result["load_factor"].values[None] - factors[:, None]).argmin(axis=1)

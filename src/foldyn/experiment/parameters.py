@@ -1,0 +1,161 @@
+"""The parameters of a fit: named values of a case file, with bounds and scales."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.values import number, show, suggest
+from foldyn.errors import InputError
+from foldyn.experiment.key_paths import number_keys, parts, value_at
+from foldyn.experiment.ties import Tie
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a case file that is to be found.
+
+    Parameters
+    ----------
+    key : str
+        Where it stands in the case file: "sheet.length_scale_ratio", "damping.alpha",
+        "model.fold_law.theta1" (degrees, as there), "loads[0].force[2]".
+    start : float, optional
+        Value to start from; that of the case file by default.
+    lower, upper : float
+        Bounds; none by default. Several starts need both.
+    scale : float, optional
+        A change that matters: the size of the start, or else of the bounds, by default.
+    """
+
+    key: str
+    start: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        parts(self.key)
+        for name in ("start", "scale"):
+            value = getattr(self, name)
+            if value is not None:
+                above = 0.0 if name == "scale" else None
+                object.__setattr__(self, name, number(f"{self.key}: {name}", value, above=above))
+        for name, without in (("lower", -math.inf), ("upper", math.inf)):
+            value = getattr(self, name)
+            if value != without:
+                object.__setattr__(self, name, number(f"{self.key}: {name}", value))
+        if not self.lower < self.upper:
+            raise InputError(
+                f"{self.key}: lower = {self.lower:g} is not below upper = {self.upper:g}; exchange "
+                "them, or leave one out"
+            )
+        if self.start is not None and not self.lower <= self.start <= self.upper:
+            raise InputError(
+                f"{self.key}: start = {self.start:g} is outside the bounds {self.lower:g} to "
+                f"{self.upper:g}"
+            )
+
+
+@dataclass(frozen=True)
+class Space:
+    """All parameters of a fit and what is tied to them.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        With start and scale filled in.
+    ties : tuple of Tie
+    """
+
+    parameters: tuple[Parameter, ...]
+    ties: tuple[Tie, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the parameters."""
+        return tuple(p.key for p in self.parameters)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """One of "start", "lower", "upper", "scale" of all parameters."""
+        return np.array([getattr(p, name) for p in self.parameters], dtype=np.float64)
+
+    def changes(self, values: Sequence[float] | NDArray) -> dict[str, float]:
+        """What a case file is to say at given values: parameters and what is tied to them."""
+        own = {key: float(value) for key, value in zip(self.keys, values, strict=True)}
+        return own | {tie.key: tie.value(own) for tie in self.ties}
+
+    def starts(self, count: int, seed: int) -> NDArray[np.float64]:
+        """Values to start from, shape (count, p): the given ones, then random ones.
+
+        The random ones are a Latin hypercube within the bounds: each parameter's range is cut
+        into as many pieces as there are starts, and each piece is used once.
+        """
+        low, high = self.column("lower"), self.column("upper")
+        if count > 1:
+            free = [p.key for p in self.parameters if not math.isfinite(p.upper - p.lower)]
+            if free:
+                raise InputError(
+                    f"starts = {count}: random starts are drawn between bounds; give {free[0]} "
+                    "both lower and upper"
+                )
+        drawn = np.random.default_rng(seed)
+        pieces = [drawn.permutation(count - 1) for _ in self.parameters]
+        places = (np.array(pieces).T + drawn.random((count - 1, len(pieces)))) / max(count - 1, 1)
+        if count == 1:
+            return self.column("start")[None]
+        return np.vstack([self.column("start"), low + places * (high - low)])
+
+
+def space(
+    document: Mapping[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
+) -> Space:
+    """Parameters of a case file, with what it says of them filled in.
+
+    Raises
+    ------
+    InputError
+        None or the same parameter twice, no start, a value that is no number, a tie to something
+        that is no parameter.
+    """
+    if not parameters:
+        raise InputError("parameters: none; name at least one key of the case file")
+    for number_, parameter in enumerate(parameters):
+        if not isinstance(parameter, Parameter):
+            raise InputError(f"parameters[{number_}]: got {show(parameter)}, give a Parameter")
+    keys = [p.key for p in parameters]
+    tied = tuple(Tie(key, text) for key, text in ties.items())
+    for key in (*keys, *(tie.key for tie in tied)):
+        if (keys + [tie.key for tie in tied]).count(key) > 1:
+            raise InputError(f"{key}: is given twice, as a parameter or as a tie")
+    filled = Space(tuple(_filled(p, document) for p in parameters), tied)
+    filled.changes(filled.column("start"))
+    return filled
+
+
+def _filled(parameter: Parameter, document: Mapping[str, Any]) -> Parameter:
+    start = parameter.start
+    if start is None:
+        said = value_at(document, parameter.key)
+        if said is None:
+            hint = suggest(parameter.key, number_keys(document))
+            raise InputError(
+                f"{parameter.key}: the case file has no value for it; {hint}give start if the key "
+                "is right"
+            )
+        if isinstance(said, bool) or not isinstance(said, int | float):
+            raise InputError(f"{parameter.key} = {show(said)}: is no number that could be fitted")
+        start = float(said)
+    scale = parameter.scale
+    if scale is None:
+        width = parameter.upper - parameter.lower
+        scale = abs(start) or (width if math.isfinite(width) else 0.0)
+    if scale == 0.0:
+        raise InputError(f"{parameter.key}: starts from 0; give scale, a change of it that matters")
+    return replace(parameter, start=start, scale=scale)

@@ -1,0 +1,239 @@
+"""Synthetic films and photographs of a simulated motion, with the true motion beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.experiment.camera import Camera
+from foldyn.experiment.opencv import opencv
+from foldyn.experiment.paper import Look
+from foldyn.experiment.picture import Sensor, Studio
+
+CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
+"""Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticFilm:
+    """A film that is made picture by picture when it is looked at.
+
+    Attributes
+    ----------
+    studio : Studio
+    time : ndarray, shape (nt,)
+        Middle of the exposure of each frame (s), 0 for the first one.
+    motion : callable
+        Positions of all nodes (m), shape (k, n, 3), at k times (s).
+    rate : float
+        Frames per second.
+    dropped : tuple of int
+        Frames in which the camera repeats the one before.
+    seed : int
+        Of paper, noise and all else by chance: the same seed, the same film.
+    """
+
+    studio: Studio
+    time: NDArray[np.float64]
+    motion: Any
+    rate: float
+    dropped: tuple[int, ...] = ()
+    seed: int = 0
+    _seen: dict[int, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+
+    def frames(self) -> Iterator[NDArray[np.uint8]]:
+        """The pictures one by one, shape (height, width)."""
+        last = None
+        for k in range(len(self.time)):
+            if last is None or k not in self.dropped:
+                last = self.frame(k)
+            yield last
+
+    def frame(self, k: int) -> NDArray[np.uint8]:
+        """Picture number k, were it not dropped."""
+        sensor = self.studio.sensor
+        times = self.time[k] + sensor.exposure * sensor.moments
+        positions = self.motion(times if sensor.exposure else self.time[k : k + 1])
+        rng = np.random.default_rng([self.seed, 1, k])
+        picture, self._seen[k] = self.studio.take(
+            positions if sensor.exposure else positions[0], rng
+        )
+        return picture
+
+    def truth(self) -> xr.Dataset:
+        """True motion at the times of the frames.
+
+        Returns
+        -------
+        xarray.Dataset
+            `position` (time, node, axis) in m, `position_px` (time, node, uv), and `seen` (node,
+            False where a panel hides it or it is outside of the image) for frames that have been
+            made, `dropped` (time).
+        """
+        positions = self.motion(self.time)
+        count = positions.shape[1]
+        seen = np.zeros((len(self.time), count), dtype=bool)
+        for k, one in self._seen.items():
+            seen[k] = one
+        dropped = np.isin(np.arange(len(self.time)), self.dropped)
+        return xr.Dataset(
+            {
+                "position": (("time", "node", "axis"), positions, {"units": "m"}),
+                "position_px": (("time", "node", "uv"), self.studio.camera.project(positions)),
+                "seen": (("time", "node"), seen),
+                "dropped": (("time",), dropped),
+            },
+            {
+                "time": ("time", self.time, {"units": "s"}),
+                "node": np.arange(count),
+                "axis": ["x", "y", "z"],
+                "uv": ["u", "v"],
+            },
+        )
+
+
+def film_of(
+    motion: xr.Dataset,
+    camera: Camera,
+    rate: float = 240.0,
+    duration: float | None = None,
+    start: float = 0.0,
+    look: Look | None = None,
+    sensor: Sensor | None = None,
+    dropped: Sequence[int] = (),
+    seed: int = 0,
+) -> SyntheticFilm:
+    """Film of a simulated motion.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        Result of `simulate`, stored finely enough to be interpolated between its samples.
+    camera : Camera
+    rate : float
+        Frames per second.
+    duration, start : float
+        Part of the motion (s) that is filmed; by default to its end. The film's time is 0 at
+        `start`.
+    look, sensor : Look, Sensor
+        What there is to be seen, and how it is seen.
+    dropped : sequence of int
+        Frames that repeat the one before.
+    seed : int
+
+    Returns
+    -------
+    SyntheticFilm
+
+    Raises
+    ------
+    InputError
+        Not a motion, a part that it does not have, or nodes behind the camera.
+    """
+    from scipy.interpolate import CubicSpline
+
+    from foldyn.results import case_of
+
+    structure = case_of(motion).structure
+    if "time" not in motion.dims or motion.sizes["time"] < 4:
+        raise InputError("motion: not a trajectory of at least four samples; use fd.simulate")
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise InputError(f"rate: {rate!r}; give a positive number of frames per second")
+    time = motion["time"].values
+    most = time[-1] - start
+    length = most if duration is None else duration
+    if start < time[0] or not 0.0 < length <= most * (1.0 + 1e-9):
+        raise InputError(
+            f"start, duration: {start:g} and {length:g} s, but the motion has {time[0]:g} to "
+            f"{time[-1]:g} s"
+        )
+    spline = CubicSpline(time, motion["rest_position"].values + motion["displacement"].values)
+
+    def positions(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return spline(np.clip(start + times, time[0], time[-1]))
+
+    count = int(np.floor(length * rate * (1.0 + 1e-12))) + 1
+    studio = Studio.of(structure, camera, look or Look(), sensor or Sensor(), seed)
+    return SyntheticFilm(studio, np.arange(count) / rate, positions, rate, tuple(dropped), seed)
+
+
+def photos_of(
+    path: xr.Dataset,
+    steps: Sequence[int],
+    camera: Camera,
+    look: Look | None = None,
+    sensor: Sensor | None = None,
+    seed: int = 0,
+) -> tuple[list[NDArray[np.uint8]], xr.Dataset]:
+    """Photographs of equilibria, each with other noise, and the truth as a film has it.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        Result of `trace`.
+    steps : sequence of int
+        Which of its states.
+    camera, look, sensor, seed
+        As for `film_of`; nothing moves during the exposure.
+
+    Returns
+    -------
+    photos : list of ndarray of uint8, shape (height, width)
+    truth : xarray.Dataset
+        `position`, `position_px` and `seen` along the dimension `photo`.
+    """
+    from foldyn.results import case_of
+
+    structure = case_of(path).structure
+    states = path["rest_position"].values + path["displacement"].values[list(steps)]
+    studio = Studio.of(structure, camera, look or Look(), sensor or Sensor(), seed)
+
+    def positions(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return states[np.rint(times).astype(int)]
+
+    still = SyntheticFilm(
+        studio, np.arange(len(states), dtype=np.float64), positions, 1.0, (), seed
+    )
+    photos = [
+        studio.take(state, np.random.default_rng([seed, 1, k]))[0] for k, state in enumerate(states)
+    ]
+    truth = still.truth().rename(time="photo").drop_vars(["seen", "dropped"])
+    return photos, truth
+
+
+def write_film(film: SyntheticFilm, path: str | os.PathLike[str]) -> None:
+    """Write a film to a file: .mkv or .avi without loss, .mp4 with.
+
+    Raises
+    ------
+    InputError
+        Another ending, or a file that cannot be written.
+    ComputationError
+        OpenCV's build lacks the codec.
+    """
+    cv2 = opencv()
+    path = Path(path)
+    if path.suffix not in CODECS:
+        raise InputError(f"{path}: films are written to {', '.join(CODECS)}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    codec = cv2.VideoWriter_fourcc(*CODECS[path.suffix])
+    writer = cv2.VideoWriter(str(path), codec, film.rate, film.studio.camera.size, isColor=False)
+    if not writer.isOpened():
+        raise ComputationError(
+            f"{path}: OpenCV cannot write {CODECS[path.suffix]} here; try another ending of "
+            f"{', '.join(CODECS)}"
+        )
+    try:
+        for picture in film.frames():
+            writer.write(picture)
+    finally:
+        writer.release()

@@ -1,0 +1,88 @@
+"""Ties: keys of a case file that follow the parameters of a fit, theta2 = 360 - theta1.
+
+A tie is a sum, difference, product or quotient of numbers and the keys of parameters. It is read
+by a small parser, never evaluated.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from foldyn.cases.values import suggest
+from foldyn.errors import InputError
+from foldyn.experiment.key_paths import parts
+
+_OPERATIONS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+_REMEDY = 'write for example "360 - model.fold_law.theta1"'
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A key of a case file that follows parameters.
+
+    Parameters
+    ----------
+    key : str
+        Key that is set.
+    expression : str
+        Its value, of numbers, ``+ - * /``, parentheses and keys of parameters.
+    """
+
+    key: str
+    expression: str
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        parts(self.key)
+        if not isinstance(self.expression, str) or len(self.expression) > 1000:
+            raise self._error("must be a short text")
+        self.value(_Anything())
+
+    def value(self, parameters: Mapping[str, float]) -> float:
+        """Value for given values of the parameters."""
+        try:
+            tree = ast.parse(self.expression.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise self._error("cannot be read") from None
+        return self._value(tree, parameters)
+
+    def _value(self, node: ast.expr, parameters: Mapping[str, float]) -> float:
+        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+            left, right = self._value(node.left, parameters), self._value(node.right, parameters)
+            try:
+                return _OPERATIONS[type(node.op)](left, right)
+            except ZeroDivisionError:
+                raise self._error("divides by zero") from None
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            return -self._value(node.operand, parameters)
+        number = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(number, int | float) and not isinstance(number, bool):
+            return float(number)
+        if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
+            key = ast.unparse(node)
+            if key not in parameters:
+                known = ", ".join(parameters)
+                raise self._error(f"{key} is no parameter; {suggest(key, parameters)}use {known}")
+            return parameters[key]
+        raise self._error(f"{ast.unparse(node)} is no number or key")
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f'tie {self.key} = "{self.expression}": {what}; {_REMEDY}')
+
+
+class _Anything(dict[str, float]):
+    """Parameters of any name: what a tie says can be read before the parameters are known."""
+
+    def __contains__(self, key: object) -> bool:
+        return True
+
+    def __getitem__(self, key: str) -> float:
+        return 0.7320508  # no number that a tie might subtract, then to divide by the difference

@@ -1,0 +1,249 @@
+"""The paper specimen calibrated: folds from the static test, damping from the release.
+
+The paper's raw data are not public: `static_data` and `release_data` are computed by the same
+model with the paper's parameters (no model error), to which `noisy` adds what a camera and scales
+would.
+`python -m foldyn.studies.herkal.calibration FOLDER` fits both and draws them (a few minutes).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from foldyn.cases.reading import case_of_document, read_document
+from foldyn.dynamics import initial_state, simulate
+from foldyn.experiment import (
+    Fit,
+    ForceDisplacement,
+    History,
+    Measurement,
+    Parameter,
+    Shapes,
+    Spectrum,
+    fit,
+)
+from foldyn.experiment.fit_page import write_fit
+from foldyn.experiment.key_paths import replaced
+from foldyn.results import load, save
+from foldyn.signals import matrix_pencil
+from foldyn.statics import Settings, trace
+from foldyn.studies import find_case
+
+FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
+DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
+"""What the paper found, the truth of the synthetic data."""
+MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
+FOLD_RANGES = (
+    Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
+    Parameter("model.fold_law.theta1", 65.0, 45.0, 100.0),
+)
+DAMPING_RANGES = (
+    Parameter("damping.alpha", 10.0, 0.0, 40.0),
+    Parameter("damping.beta", 2e-4, 0.0, 2e-3),
+)
+FULL = 0.056  # m, displacement of the top in the shipped case
+WEIGHTS = (0.125, 0.226, 0.312)  # N
+TOP = tuple(range(7))
+WATCHED = 8  # the paper's node 9
+FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
+"""Nodes that a camera before the specimen sees, but for the bottom row, which stands still."""
+SYNTHETIC = "synthetic"
+FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
+STATIC_ERROR = 5e-5  # m: a corner in a photograph
+FILM_ERROR = 1e-5  # m: 0.3 pixels, where 4032 of them see 0.13 m
+RATE = 240.0  # frames per second
+BAND = (2.0, 40.0)  # Hz, in which spectra are compared
+TURNED = 0.05  # s after the release, at the first turning point
+SEEN = 0.6  # s of the free vibration, in which it dies away
+STEP = 0.001  # s, of the simulation
+PRESSED = 0.005
+"""How far the top is pressed before the release (m).
+
+From the 20 mm of the smallest weight this damping lets nothing swing: K0 stays what it was at
+rest, and resists the large turns of the panels.
+"""
+
+
+def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
+    """Path of the specimen whose top is pressed down to fractions of 56 mm."""
+    path = find_case("herkal/specimen")
+    case = case_of_document(path, replaced(read_document(path), changes or {})).case()
+    return trace(case, load_factors=list(factors), settings=Settings(stability=False))
+
+
+def force_on_top(path: Any) -> NDArray[np.float64]:
+    """Force (N) that presses the top, at each step of a path."""
+    top = np.isin(path["support_node"].values, TOP) & (path["support_axis"].values == "x")
+    return path["reaction"].values[:, top].sum(axis=1)
+
+
+def weighed() -> NDArray[np.float64]:
+    """Load factors at which the paper's specimen carries the three weights."""
+    factors = np.linspace(0.0, 1.0, 29)
+    found = np.interp(WEIGHTS, force_on_top(pressed(factors)), factors)
+    for _ in range(3):  # secants
+        near = force_on_top(pressed(np.sort([*found, *(found + 1e-3)])))
+        slope = (near[1::2] - near[::2]) / 1e-3
+        found = found - (near[::2] - WEIGHTS) / slope
+    return found
+
+
+def static_data() -> list[Measurement]:
+    """Forces at the displacements under the three weights, and the shapes of the front nodes."""
+    factors = weighed()
+    path = pressed(factors)
+    free = FRONT[3:]  # the top is imposed
+    return [
+        ForceDisplacement(
+            nodes=TOP, displacement=FULL * factors, force=force_on_top(path),
+            sigma=FORCE_ERROR, name="weights", label=SYNTHETIC,
+        ),
+        Shapes(
+            nodes=free, load_factor=factors, values=path["displacement"].values[:, free],
+            sigma=STATIC_ERROR, name="front corners", label=SYNTHETIC,
+        ),
+    ]  # fmt: skip
+
+
+def released_case(
+    folder: Path, changes: Mapping[str, Any] | None = None, step: float = STEP
+) -> Path:
+    """Case file of the free vibration after the top was pressed down by `PRESSED`.
+
+    Parameters
+    ----------
+    folder : Path
+        Gets the case file and the state that it starts from.
+    changes : mapping, optional
+        Values of the static calibration, by key.
+    step : float
+        Of the simulation (s).
+    """
+    save(pressed([PRESSED / FULL], changes), folder / "pressed.nc")
+    document = replaced(read_document(find_case("herkal/specimen-release")), changes or {})
+    del document["loads"]
+    document |= {
+        "title": "The paper specimen released",
+        "initial": {"file": "pressed.nc"},
+        "damping": {"alpha": DAMPING["damping.alpha"], "beta": DAMPING["damping.beta"]},
+        "analysis": {
+            "kind": "dynamics",
+            "method": "generalized_alpha",
+            "dt": STEP,
+            "duration": SEEN,
+        },
+        "output": {"nodes": [WATCHED], "axis": "x", "every": step},
+    }
+    path = folder / "released.toml"
+    path.write_text(tomli_w.dumps(document), encoding="utf-8")
+    return path
+
+
+def release_data(case: Path) -> list[Measurement]:
+    """Histories of node 8, and of all other front nodes held out, as a film has them."""
+    case_file = case_of_document(case, read_document(case))
+    start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
+    motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
+    time = np.arange(0.0, SEEN, 1.0 / RATE)
+    along = motion["displacement"].sel(axis="x")
+    others = tuple(node for node in FRONT if node != WATCHED)
+    return [
+        History(
+            nodes=nodes, time=time, values=CubicSpline(motion["time"], along[:, list(nodes)])(time),
+            axis="x", name=name, label=SYNTHETIC, sigma=FILM_ERROR, held_out=nodes == others,
+        )
+        for name, nodes in (("node 8", (WATCHED,)), ("other front nodes", others))
+    ]  # fmt: skip
+
+
+def noisy(data: Sequence[Measurement], draw: np.random.Generator) -> list[Measurement]:
+    """Measurements with random errors of the size that they name."""
+    result = []
+    for one in data:
+        field = "force" if isinstance(one, ForceDisplacement) else "values"
+        true = getattr(one, field)
+        changed = true + one.sigma * draw.standard_normal(true.shape)
+        result.append(replace(one, **{field: changed}))
+    return result
+
+
+def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, float]:
+    """Frequency (Hz) and damping ratio of the strongest decaying cosine between 7 and 12 Hz."""
+    found = matrix_pencil(values, step)
+    near = (found.damped_frequency > 7.0) & (found.damped_frequency < 12.0)
+    best = int(np.argmax(np.where(near, found.amplitude, 0.0)))
+    return float(found.damped_frequency[best]), float(found.damping_ratio[best])
+
+
+def calibrate(
+    folder: Path,
+    static: Sequence[Measurement] | None = None,
+    film: Sequence[Measurement] | None = None,
+    seed: int = 1,
+    **how: Any,
+) -> tuple[Fit, Fit]:
+    """Fit the folds to the static test, then, with these folds, the damping to the release.
+
+    Parameters
+    ----------
+    folder : Path
+        Keeps the evaluations, and the case files of the release.
+    static, film : sequence of Measurement, optional
+        Measured data; synthetic ones by default.
+    seed : int
+        Of the noise of the synthetic data.
+    **how
+        Other arguments of `fit`.
+
+    Returns
+    -------
+    folds, damping : Fit
+    """
+    kept = folder / "evaluations"
+    draw = np.random.default_rng(seed)
+    if static is None:
+        static = noisy(static_data(), draw)
+    folds = fit(
+        find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, folder=kept, **how
+    )
+    if film is None:
+        film = noisy(release_data(released_case(_made(folder / "truth"))), draw)
+    found = folds.problem.space.changes([*folds.values.values()])
+    model = released_case(_made(folder / "fitted"), found)
+    spectra = [
+        Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
+        for one in film
+        if isinstance(one, History) and np.isfinite(one.values).all()
+    ]
+    return folds, fit(model, [*film, *spectra], DAMPING_RANGES, folder=kept, **how)
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+if __name__ == "__main__":
+    place = Path(sys.argv[1] if len(sys.argv) > 1 else "herkal-calibration")
+    folds, damping = calibrate(place)
+    for name, one in (("folds", folds), ("damping", damping)):
+        for estimate in one.estimates:
+            print(f"{estimate.key} = {estimate.value:.5g}, {estimate.lower:.5g} to "
+                  f"{estimate.upper:.5g}")  # fmt: skip
+        for score in one.scores:
+            print(f"  {score.name}: rms {score.rms:.3g} {score.unit}")
+        title = f"Paper specimen, synthetic data: {name}"
+        print("  ", write_fit(one, _made(place / name), title))
+    film = damping.problem.measurements[0].observed()
+    for name, values in (("film", film), ("model", damping.predicted[0])):
+        frequency, ratio = peak(values[round(TURNED * RATE) :])
+        print(f"{name}: {frequency:.2f} Hz, damping {100.0 * ratio:.1f} % (paper: 9.5 Hz, 16 %)")

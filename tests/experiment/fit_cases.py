@@ -1,0 +1,57 @@
+"""Case files of a simple fold that take milliseconds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+FOLD = """
+[pattern]
+kind = "simple_fold"
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+fold_law = {{ kind = "enhanced", theta1 = 45, theta2 = 290 }}
+[damping]
+alpha = 0.4
+[[supports]]
+nodes = [4, 5]
+[[supports]]
+nodes = [0, 1]
+axes = "z"
+{rest}
+"""
+PRESSED = FOLD.format(
+    rest="""
+[[supports]]
+nodes = [0, 1]
+axis = "x"
+displacement = -0.3
+[analysis]
+kind = "statics"
+"""
+)
+SWUNG = FOLD.format(
+    rest="""
+[[loads]]
+nodes = [0, 1]
+force = [-0.001, 0, 0]
+history = { kind = "half_sine", duration = 0.5 }
+[analysis]
+kind = "dynamics"
+method = "newmark"
+duration = 2.0
+[output]
+every = 0.02
+"""
+)
+
+
+def write(folder: Path, text: str = PRESSED, name: str = "case.toml") -> Path:
+    """Write a case file; returns its path."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,288 @@
+"""Fits to data that a case of known parameters has made."""
+
+from __future__ import annotations
+
+import json
+
+import fit_cases
+import numpy as np
+import pytest
+import xarray as xr
+
+import foldyn as fd
+from foldyn.errors import ComputationError, InputError
+from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes
+from foldyn.experiment.fit_problem import problem
+
+MOVED = -np.linspace(0.03, 0.3, 8)
+TIME = np.linspace(0.0, 2.0, 60)
+RATIO = Parameter("sheet.length_scale_ratio", 1.6, 0.2, 5.0)
+ALPHA = Parameter("damping.alpha", 1.0, 0.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    return fit_cases.write(tmp_path_factory.mktemp("pressed"))
+
+
+@pytest.fixture(scope="module")
+def swung(tmp_path_factory):
+    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
+
+
+def forces(path, noise=0.0, **known) -> ForceDisplacement:
+    """Forces that the case file itself gives, with noise."""
+    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8))
+    (true,) = problem(path, [blank], [RATIO], {}).predict([1.0])
+    draw = np.random.default_rng(4)
+    return ForceDisplacement(
+        displacement=MOVED, force=true + noise * draw.standard_normal(8), **known
+    )
+
+
+def histories(path, nodes, noise=0.0, **known) -> History:
+    """Histories that the case file itself gives, with noise."""
+    wave = np.tile(np.sin(TIME)[:, None], len(nodes))
+    blank = History(nodes=nodes, time=TIME, values=wave)
+    (true,) = problem(path, [blank], [ALPHA], {}).predict([0.4])
+    true = true.reshape(len(nodes), -1).T
+    draw = np.random.default_rng(4)
+    values = true + noise * draw.standard_normal(true.shape)
+    return History(nodes=nodes, time=TIME, values=values, **known)
+
+
+def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
+    found = fd.fit(
+        pressed,
+        [forces(pressed)],
+        [RATIO, Parameter("model.fold_law.theta2", 280.0, 240.0, 299.0)],
+    )
+    assert found["sheet.length_scale_ratio"].value == pytest.approx(1.0, rel=1e-5)
+    assert found["model.fold_law.theta2"].value == pytest.approx(290.0, rel=1e-5)
+    assert found.descents[0].converged
+    assert found.scores[0].relative < 1e-5
+
+
+def test_a_tie_follows_its_parameter(pressed) -> None:
+    found = fd.fit(
+        pressed,
+        [forces(pressed, 1e-5)],
+        [RATIO],
+        ties={"sheet.thickness": "0.01 * sheet.length_scale_ratio"},
+    )
+    document = found.document()
+    ratio = found["sheet.length_scale_ratio"].value
+    assert document["sheet"]["thickness"] == pytest.approx(0.01 * ratio, rel=1e-12)
+    assert document["sheet"]["length_scale_ratio"] == ratio
+
+
+def test_intervals_follow_the_noise(pressed) -> None:
+    small = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5)], [RATIO])
+    large = fd.fit(pressed, [forces(pressed, 1e-4, sigma=1e-4)], [RATIO])
+    one, other = small.estimates[0], large.estimates[0]
+    assert other.standard_error == pytest.approx(10.0 * one.standard_error, rel=0.05)
+    assert one.lower < 1.0 < one.upper
+    assert other.lower < 1.0 < other.upper
+    assert 0.5 < small.misfit < 1.6
+
+
+def test_what_the_data_cannot_tell_is_said(pressed) -> None:
+    density = Parameter("sheet.density", 2.0)
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO, density])
+    assert found["sheet.length_scale_ratio"].determined
+    assert not found["sheet.density"].determined
+    assert found["sheet.density"].standard_error == np.inf
+    assert found["sheet.density"].note == "the data do not determine it"
+
+
+def test_parameters_of_which_only_quotients_count(swung) -> None:
+    """Mass, stiffness and force times the same number make the same motion."""
+    data = histories(swung, [0], 1e-6)
+    three = [
+        Parameter("sheet.density", 1.0, 0.2, 5.0),
+        Parameter("sheet.youngs_modulus", 1e6, 2e5, 5e6),
+        Parameter("loads[0].force[0]", -1e-3, -5e-3, -2e-4),
+    ]
+    found = fd.fit(swung, [data], [*three, ALPHA])
+    assert [one.determined for one in found.estimates] == [False, False, False, True]
+    assert found.singular_values[3] < 1e-5 * found.singular_values[0]
+    scaled = np.abs(found.directions[3]) / [*found.values.values()] * [1.0, 1e6, -1e-3, 1.0]
+    np.testing.assert_allclose(scaled / scaled[0], [1, 1, 1, 0], atol=1e-3)
+    two = fd.fit(swung, [data], [*three[:2], ALPHA])
+    assert all(one.determined for one in two.estimates)
+    assert two["sheet.youngs_modulus"].value == pytest.approx(1e6, rel=0.01)
+
+
+def test_a_parameter_at_its_bound_is_said_to_be_there(pressed) -> None:
+    found = fd.fit(pressed, [forces(pressed)], [Parameter(RATIO.key, 2.0, 1.5, 5.0)])
+    assert found.estimates[0].at_bound
+    assert found.estimates[0].value == pytest.approx(1.5, rel=1e-3)
+    assert "at its bound" in found.estimates[0].note
+
+
+def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
+    fitted = histories(swung, [0], 1e-5, sigma=1e-5, name="edge")
+    kept = histories(swung, [2, 3], 1e-5, sigma=1e-5, name="ridge", held_out=True)
+    found = fd.fit(swung, [fitted, kept], [ALPHA])
+    alpha = found["damping.alpha"]
+    assert alpha.value == pytest.approx(0.4, abs=4.0 * alpha.standard_error)
+    assert alpha.standard_error < 0.02
+    assert [score.held_out for score in found.scores] == [False, True]
+    assert found.scores[1].rms == pytest.approx(1e-5, rel=0.3)
+    assert found.freedom == len(TIME) - 1
+
+
+def test_held_out_data_do_not_move_the_fit(swung) -> None:
+    fitted = histories(swung, [0], 1e-5)
+    wrong = History(nodes=[2], time=TIME, values=np.sin(9.0 * TIME), held_out=True)
+    alone, both = (fd.fit(swung, data, [ALPHA]) for data in ([fitted], [fitted, wrong]))
+    assert both.values == alone.values
+    assert both.scores[1].rms > 0.1
+
+
+def test_a_case_of_statics_and_one_of_dynamics_together(pressed, swung) -> None:
+    known = histories(swung, [0], 1e-5, sigma=1e-5, case=swung)
+    found = fd.fit(pressed, [forces(pressed, 1e-5, sigma=1e-5), known], [RATIO, ALPHA])
+    for one, truth in zip(found.estimates, (1.0, 0.4), strict=True):
+        assert one.value == pytest.approx(truth, abs=4.0 * one.standard_error)
+    assert len(found.problem.runs) == 2
+
+
+def test_each_measurement_may_change_the_case(pressed) -> None:
+    """Two specimens of one paper, the other with twice the thickness."""
+    blank = ForceDisplacement(displacement=MOVED, force=np.zeros(8), sigma=1e-5)
+    thick = ForceDisplacement(
+        displacement=MOVED, force=np.zeros(8), sigma=1e-5, changes={"sheet.thickness": 0.02}
+    )
+    one, other = problem(pressed, [blank, thick], [RATIO], {}).predict([1.0])
+    assert np.abs(other / one).min() > 4.0
+    data = [
+        ForceDisplacement(displacement=MOVED, force=one, sigma=1e-5),
+        ForceDisplacement(
+            displacement=MOVED, force=other, sigma=1e-5, changes={"sheet.thickness": 0.02}
+        ),
+    ]
+    found = fd.fit(pressed, data, [RATIO])
+    assert found.estimates[0].value == pytest.approx(1.0, rel=1e-5)
+
+
+def test_shapes_under_a_force_give_a_stiffness(tmp_path) -> None:
+    text = fit_cases.SWUNG.replace('history = { kind = "half_sine", duration = 0.5 }', "")
+    text = text[: text.index("[analysis]")] + '[analysis]\nkind = "statics"\n'
+    path = fit_cases.write(tmp_path, text)
+    state = fd.trace(fd.read_case(path).case(), load_factors=[0.5, 1.0])
+    seen = state.displacement.sel(node=[0, 2], axis=["x", "z"]).values
+    one = Shapes(nodes=[0, 2], load_factor=[0.5, 1.0], values=seen, axes="xz")
+    found = fd.fit(path, [one], [Parameter("sheet.youngs_modulus", 2e6, 1e5, 1e7)])
+    assert found.estimates[0].value == pytest.approx(1e6, rel=1e-4)
+
+
+def test_searches_from_several_starts_agree(pressed) -> None:
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO], starts=4, seed=2)
+    assert len(found.descents) == found.agreeing == 4
+    assert len({one.start for one in found.descents}) == 4
+    assert min(one.cost for one in found.descents) == pytest.approx(
+        0.5 * found.misfit**2 * found.freedom, rel=1e-6
+    )
+
+
+def test_a_fit_goes_on_where_it_was_cut_off(pressed, tmp_path) -> None:
+    data = [forces(pressed, 1e-5)]
+    seen: list[int] = []
+
+    def stop(course) -> None:
+        seen.append(course.computed)
+        if course.computed == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fd.fit(pressed, data, [RATIO], folder=tmp_path, progress=stop)
+    again: list[tuple[int, int]] = []
+    found = fd.fit(
+        pressed, data, [RATIO], folder=tmp_path,
+        progress=lambda course: again.append((course.computed, course.found)),
+    )  # fmt: skip
+    assert again[4] == (0, 5)
+    assert again[-1][0] > 0
+    whole = fd.fit(pressed, data, [RATIO])
+    assert found.values == whole.values
+    third = fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    assert third.evaluations == found.evaluations
+
+
+def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
+    data = [forces(pressed)]
+    fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    thick = fit_cases.write(
+        tmp_path, fit_cases.PRESSED.replace("thickness = 0.01", "thickness = 0.011")
+    )
+    found = fd.fit(thick, data, [RATIO], folder=tmp_path)
+    assert found.values == fd.fit(thick, data, [RATIO]).values
+    assert found.estimates[0].value > 1.01
+
+
+@pytest.mark.slow
+def test_processes_change_nothing(pressed) -> None:
+    data = [forces(pressed, 1e-5)]
+    alone = fd.fit(pressed, data, [RATIO], starts=2)
+    beside = fd.fit(pressed, data, [RATIO], starts=2, processes=2)
+    assert beside.values == alone.values
+    assert beside.descents == alone.descents
+
+
+def test_a_search_steps_back_where_the_model_fails(pressed) -> None:
+    """Beyond 180 degrees the law refuses theta1: the bounds let the search go there."""
+    data = [forces(pressed, 1e-5)]
+    theta = Parameter("model.fold_law.theta1", 170.0, 1.0, 400.0)
+    found = fd.fit(pressed, data, [theta])
+    assert np.isfinite(found.descents[0].cost)
+
+
+def test_a_start_at_which_nothing_can_be_computed(pressed) -> None:
+    with pytest.raises(InputError, match=r"model\.fold_law.*theta1"):
+        fd.fit(pressed, [forces(pressed)], [Parameter("model.fold_law.theta1", 390.0)])
+
+
+def test_a_model_that_fails_at_every_start(swung) -> None:
+    """The load is so large that panel passes through panel."""
+    bad = histories(swung, [0])
+    with pytest.raises(ComputationError, match="no search found an end: "):
+        fd.fit(swung, [bad], [Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
+
+
+def test_results_as_files(pressed, tmp_path) -> None:
+    found = fd.fit(pressed, [forces(pressed, 1e-5)], [RATIO, Parameter("sheet.density", 2.0)])
+    found.save(tmp_path / "fit.json")
+    told = json.loads((tmp_path / "fit.json").read_text())
+    assert told["parameters"][0]["value"] == found.estimates[0].value
+    assert told["parameters"][1]["standard_error"] is None
+    found.save(tmp_path / "fit.nc")
+    with xr.open_dataset(tmp_path / "fit.nc", engine="h5netcdf") as kept:
+        assert float(kept["value"].sel(parameter=RATIO.key)) == found.estimates[0].value
+        np.testing.assert_array_equal(kept["predicted_0"], found.predicted[0])
+    found.write_case(tmp_path / "fitted.toml")
+    again = fd.read_case(tmp_path / "fitted.toml")
+    assert again.sheet.length_scale_ratio == found.estimates[0].value
+    with pytest.raises(InputError, match=r"written as \.json or \.nc"):
+        found.save(tmp_path / "fit.csv")
+    with pytest.raises(InputError, match="was not fitted"):
+        found["sheet.thickness"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"starts": 0}, "starts = 0: must be a whole number, at least 1"),
+        ({"processes": 1.5}, "processes = 1.5: must be a whole number"),
+        ({"confidence": 95}, "confidence = 95: must be below 1"),
+    ],
+)
+def test_arguments_that_make_no_sense(pressed, changes, message) -> None:
+    with pytest.raises(InputError, match=message):
+        fd.fit(pressed, [forces(pressed)], [RATIO], **changes)
+
+
+def test_a_parameter_that_does_not_exist(pressed) -> None:
+    for parameter in (Parameter("sheet.lenght_scale_ratio"), Parameter("sheet.thicknes", 1.0)):
+        with pytest.raises(InputError, match="did you mean"):
+            fd.fit(pressed, [forces(pressed)], [parameter])

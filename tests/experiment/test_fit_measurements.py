@@ -1,0 +1,180 @@
+"""What measurements refuse, and what the model says of them."""
+
+from __future__ import annotations
+
+import fit_cases
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
+from foldyn.experiment.fit_problem import problem
+from foldyn.signals import spectrum
+
+TIME = np.arange(0.0, 2.0, 0.05)
+SWAY = np.sin(TIME)
+ALPHA = [Parameter("damping.alpha")]
+
+
+def history(**changes) -> History:
+    return History(**{"nodes": [0], "time": TIME, "values": SWAY, **changes})
+
+
+@pytest.fixture(scope="module")
+def swung(tmp_path_factory):
+    return fit_cases.write(tmp_path_factory.mktemp("swung"), fit_cases.SWUNG)
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    return fit_cases.write(tmp_path_factory.mktemp("pressed"), fit_cases.PRESSED)
+
+
+@pytest.fixture(scope="module")
+def motion(swung):
+    case_file = fd.read_case(swung)
+    return fd.simulate(case_file.case(), 2.0, "newmark", dt=0.02)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"values": np.full(40, 0.0031)}, "column 0 is constant (0.0031 m at all times)"),
+        ({"values": np.full(40, np.nan)}, "column 0 has 0 values that are numbers"),
+        ({"values": SWAY[:-1]}, "shape (39, 1): must be (40 times, nodes)"),
+        ({"values": np.where(TIME > 1, np.inf, SWAY)}, "infinite; give NaN where a node was lost"),
+        ({"time": TIME[::-1]}, "must be at least two increasing times"),
+        ({"time": np.where(TIME > 1, np.nan, TIME)}, "time[21] = nan: must be a finite number"),
+        ({"axis": "w"}, 'axis = "w": must be "x", "y" or "z"'),
+        ({"sigma": 0.0}, "sigma = 0.0: must be greater than 0"),
+        ({"detrend": "mean"}, 'detrend = "mean": choose'),
+        ({"nodes": []}, "nodes = []"),
+    ],
+)
+def test_histories_that_say_nothing(changes, message) -> None:
+    with pytest.raises(InputError) as caught:
+        history(**changes)
+    assert f"history: {message}" in str(caught.value) or message in str(caught.value)
+
+
+def test_forces_and_shapes_are_checked() -> None:
+    with pytest.raises(InputError, match=r"force: shape \(2,\): must be a list of 3 numbers"):
+        ForceDisplacement(displacement=[1, 2, 3], force=[1, 2])
+    with pytest.raises(InputError, match=r"force\[1\] = nan: must be a finite number"):
+        ForceDisplacement(displacement=[1, 2], force=[1, float("nan")])
+    with pytest.raises(InputError, match=r"must be \(steps, nodes, axes\), here \(1, nodes, 3\)"):
+        Shapes(nodes=[0], load_factor=[1.0], values=np.zeros((1, 1, 2)))
+    with pytest.raises(InputError, match="NaN where a node is not seen"):
+        Shapes(nodes=[0], load_factor=[1.0], values=np.full((1, 1, 3), np.nan))
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ([], "data: none; give at least one measurement"),
+        (["forces.csv"], "data[0]: got"),
+        ([history(nodes=[0, 1])], "values: are of 1 nodes, 2 are named"),
+        ([history(nodes=[99])], "node 99 is out of range"),
+        ([history(delay=0.1)], "time: 0.1 to 2.05 s, delay included, is not within the motion"),
+        ([history(), history()], "sigma: missing; several measurements are weighed"),
+        ([ForceDisplacement(displacement=[1], force=[1])], 'needs a case of kind "statics"'),
+        ([history(held_out=True)], "0 values that are not held out cannot give 1 parameters"),
+        ([history(case="none.toml")], "none.toml: there is no such file"),
+        ([history(changes={"sheet.thicknes": 1.0})], "did you mean 'thickness'"),
+        ([history(changes={"analysis.method": "dormand_prince"})], "chooses its steps by their er"),
+    ],
+)
+def test_data_that_do_not_fit_the_case(swung, data, message) -> None:
+    with pytest.raises(InputError) as caught:
+        problem(swung, data, ALPHA, {})
+    assert message in str(caught.value)
+
+
+def test_a_case_that_is_no_file(swung) -> None:
+    with pytest.raises(InputError, match="case: got CaseFile, give the path of a case file"):
+        problem(fd.read_case(swung), [history()], ALPHA, {})
+
+
+def test_warnings_of_a_case_are_told_once(tmp_path) -> None:
+    partly = fit_cases.SWUNG.replace("nodes = [0, 1]\nforce", "nodes = [0, 4]\nforce")
+    path = fit_cases.write(tmp_path, partly)
+    with pytest.warns(FoldynWarning, match="acts in part where supports hold") as told:
+        model = problem(path, [history()], ALPHA, {})
+    assert len(told) == 1
+    model.digest()
+    assert len(model.predict([0.4])[0]) == len(TIME)
+
+
+def test_forces_need_imposed_displacements(pressed) -> None:
+    with pytest.raises(InputError, match="no support of the case moves node 2 along x"):
+        problem(
+            pressed,
+            [ForceDisplacement(nodes=[2], displacement=[-0.1], force=[0.1])],
+            [Parameter("sheet.thickness")],
+            {},
+        )
+
+
+def test_forces_are_the_reactions_of_the_path(pressed) -> None:
+    moved = np.array([-0.3, -0.1, -0.15])
+    one = ForceDisplacement(displacement=moved, force=np.zeros(3))
+    (said,) = problem(pressed, [one], [Parameter("sheet.thickness")], {}).predict([0.01])
+    path = fd.trace(fd.read_case(pressed).case(), load_factors=[1 / 3, 0.5, 1.0])
+    loaded = path.reaction.values[
+        :, np.isin(path.support_node, [0, 1]) & (path.support_axis == "x")
+    ]
+    np.testing.assert_allclose(said, loaded.sum(axis=1)[[2, 0, 1]], rtol=1e-7)
+
+
+def test_shapes_are_displacements_or_positions_where_seen(pressed) -> None:
+    values = np.zeros((2, 3, 2))
+    values[0, 1] = np.nan
+    given = {"nodes": [2, 3, 0], "load_factor": [0.5, 1.0], "values": values, "axes": "xz"}
+    both = [Shapes(**given, sigma=1.0), Shapes(**given, quantity="position", sigma=1.0)]
+    moved, placed = problem(pressed, both, [Parameter("sheet.thickness")], {}).predict([0.01])
+    case = fd.read_case(pressed).case()
+    path = fd.trace(case, load_factors=[0.5, 1.0])
+    expected = path.displacement.sel(node=[2, 3, 0], axis=["x", "z"]).values
+    seen = np.isfinite(values)
+    np.testing.assert_allclose(moved, expected[seen], rtol=1e-7, atol=1e-12)
+    rest = case.structure.nodes[[2, 3, 0]][:, [0, 2]]
+    np.testing.assert_allclose(placed, (expected + rest)[seen], rtol=1e-7)
+
+
+def test_histories_are_the_motion_at_the_measured_times(swung, motion) -> None:
+    lost = np.stack([SWAY, np.where(TIME > 1.5, np.nan, SWAY)], axis=1)
+    time = TIME - 0.01
+    one = history(nodes=[2, 0], time=time, values=lost, delay=0.01)
+    (said,) = problem(swung, [one], ALPHA, {}).predict([0.4])
+    x = motion.displacement.sel(axis="x").interp(time=TIME, method="cubic")
+    expected = [*x.sel(node=2).values, *x.sel(node=0).values[TIME <= 1.5]]
+    np.testing.assert_allclose(said, expected, atol=1e-6)
+    assert len(one.observed()) == len(said)
+
+
+@pytest.mark.parametrize("detrend", ["constant", "linear"])
+def test_a_trend_in_the_data_does_not_matter_when_it_is_taken_off(swung, detrend) -> None:
+    drift = 3.0 if detrend == "constant" else 3.0 + 0.5 * TIME
+    one, other = (history(values=SWAY + d, detrend=detrend) for d in (0.0, drift))
+    np.testing.assert_allclose(one.observed(), other.observed(), atol=1e-12)
+    assert np.abs(other.observed()).max() < 1.0
+
+
+def test_spectra_of_the_motion_are_those_of_the_same_window(swung, motion) -> None:
+    seen = motion.displacement.sel(axis="x", node=[0, 2]).values
+    whole = history(nodes=[0, 2], time=motion.time.values, values=seen)
+    one = Spectrum.of(whole, (0.4, 4.0), taper="hann")
+    (said,) = problem(swung, [one], ALPHA, {}).predict([0.4])
+    np.testing.assert_allclose(said, one.observed(), rtol=1e-6)
+    frequency, amplitude = spectrum(seen, 0.02, window="hann", detrend="constant")
+    chosen = (frequency >= 0.4) & (frequency <= 4.0)
+    np.testing.assert_allclose(one.frequency, frequency[chosen])
+    np.testing.assert_allclose(one.observed(), amplitude[chosen].T.ravel())
+
+
+def test_spectra_need_whole_records() -> None:
+    with pytest.raises(InputError, match="needs every sample of a node"):
+        Spectrum.of(history(values=np.where(TIME > 1, np.nan, SWAY)), (0.1, 2.0))
+    with pytest.raises(InputError, match="holds none of the frequencies"):
+        Spectrum.of(history(), (3.02, 3.03))
