@@ -50,10 +50,13 @@ def test_half_the_mesh_changes_little(name):
     assert np.abs(frequency[:3]).max() < 0.005
 
 
-def test_half_the_step_changes_the_motion_of_case_1_little():
-    """Relative L2 over 10 s, below 0.5 %, with 8 divisions."""
-    step, shortest = (read_motion("case1", 8, dt) for dt in (0.005, 0.0025))
-    assert compare.motion_away(step, shortest) < 0.005
+@pytest.mark.parametrize(
+    ("coarse", "fine"), [((8, 0.005), (8, 0.0025)), ((12, 0.01), (24, 0.01))], ids=["step", "mesh"]
+)
+def test_half_the_step_or_mesh_changes_the_motion_of_case_1_little(coarse, fine):
+    """Relative L2 over 10 s: 0.08 % and 0.41 %."""
+    found = [read_motion("case1", *one) for one in (coarse, fine)]
+    assert compare.motion_away(*found) < 0.005
 
 
 def test_case_1_is_symmetric():
@@ -99,16 +102,68 @@ def test_a_coarse_shell_is_near(name):
 @pytest.mark.parametrize("divisions", [16, 32])
 @pytest.mark.parametrize("name", CASES)
 def test_a_fine_shell_agrees(name, divisions):
+    """At worst 0.73 % (case 3, statics) and 0.40 % (case 1, second frequency), 32 divisions."""
     moved, frequency = compare.away(ours(name, divisions), stored(name))
     assert moved < 0.01
     assert np.abs(frequency[:3]).max() < 0.01
 
 
 @pytest.mark.slow
-def test_the_motion_of_case_1_agrees():
-    """Relative L2 over 10 s, both with 10 divisions."""
-    motion = compare.our_motion("case1", 10, 0.005)
-    assert compare.motion_away(motion, read_motion("case1", 10, 0.005)) < 0.05
+@pytest.mark.parametrize("name", CASES)
+def test_half_our_mesh_changes_little(name):
+    """From 32 to 64 divisions, at worst 0.14 % (case 2, statics) and 0.10 % (case 1, third)."""
+    moved, frequency = compare.away(ours(name, 32), ours(name, 64))
+    assert moved < 0.002
+    assert np.abs(frequency[:3]).max() < 0.002
+
+
+def test_a_coarse_shell_moves_alike():
+    """Case 1 with 8 divisions, relative L2 over 10 s: 4.6 %; 16 change ours by 4.4 %."""
+    motion = compare.our_motion("case1", 8, 0.01)
+    assert compare.motion_away(motion, read_motion("case1", 8, 0.0025)) < 0.05
+
+
+@pytest.mark.slow
+def test_a_fine_shell_moves_alike():
+    """With 32 divisions 0.06 % from the finest of OpenSees; 64 change it by 0.29 %."""
+    motion = compare.our_motion("case1", 32, 0.01)
+    finest = read_motion("case1", *stored_motions("case1")[-1])
+    assert compare.motion_away(motion, finest) < 0.005
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if stored_motions(name)])
+def test_motions_of_all_cases_begin_alike(name):
+    """The first 2 s with 10 divisions: at worst 4.8 % (case 2); see docs/opensees.md for 10 s."""
+    motion = compare.our_motion(name, 10, 0.01, duration=2.0)
+    assert motion.time[-1] == pytest.approx(2.0)
+    assert compare.motion_away(motion, read_motion(name, 10, 0.005)) < 0.06
+
+
+# ------------------------------------------------------------------ tables
+def test_tables_of_what_is_stored(capsys):
+    assert compare.main(["--cases", "case1", "--divisions"]) == 0
+    lines = [line.split(" | ") for line in capsys.readouterr().out.splitlines()]
+    stills = [line for line in lines if len(line) == 7 and "case1" in line[0]]
+    assert [int(line[1]) for line in stills] == stored_divisions("case1")
+    moved, frequency = compare.away(stored("case1", 16), stored("case1"))
+    assert float(stills[-2][4]) == pytest.approx(100 * moved, abs=0.006)
+    assert float(stills[-2][5]) == pytest.approx(100 * np.abs(frequency[:3]).max(), abs=0.006)
+    assert float(stills[-2][3].split(", ")[0]) == pytest.approx(0.4477, abs=1e-4)
+    assert stills[-1][4] == ""
+    motions = [line for line in lines if len(line) == 4 and "case1" in line[0]]
+    found = [(int(line[1]), float(line[2])) for line in motions]
+    assert found == stored_motions("case1")
+    coarse, finest = read_motion("case1", *found[0]), read_motion("case1", *found[-1])
+    off = 100 * compare.motion_away(coarse, finest)
+    assert float(motions[0][3].removesuffix(" |")) == pytest.approx(off, abs=0.006)
+
+
+def test_rows_of_ours_have_two_references():
+    rows = compare.still_table([[ours("case1", 4)]], [[ours("case1", 2)], [stored("case1")]])
+    row = rows.splitlines()[-1].split(" | ")
+    assert len(row) == 10
+    moved, _ = compare.away(ours("case1", 4), stored("case1"))
+    assert float(row[7]) == pytest.approx(100 * moved, abs=0.006)
 
 
 # ------------------------------------------------------------------ the model

@@ -211,7 +211,7 @@ def _advance(
     if guide is not None:
         told = guide(np.where(good[:, np.newaxis], place, np.nan))
         stray, usual = _strays(place, told)
-        good &= ~(stray > _STRAY * reach + 4.0 * usual)
+        good &= ~(stray > _STRAY * reach + 2.5 * usual)
     good &= ~_crowded(place, good, junction.error, 0.4 * reach)
     error, status = junction.error.copy(), np.where(good, TRACKED, LOST).astype(np.int8)
 

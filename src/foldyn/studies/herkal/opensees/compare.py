@@ -1,16 +1,16 @@
 """Our shell beside the stored results of OpenSees, as tables in Markdown.
 
-    python -m foldyn.studies.herkal.opensees.compare --divisions 16 32 [--motion 16]
+    python -m foldyn.studies.herkal.opensees.compare --divisions 16 32 64 [--motion 16 32 64]
 
-prints how the results of OpenSees converge, and how far ours are from them.
+prints how the results of both converge, and how far ours are from those of OpenSees.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable
-from functools import partial
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, CaseFile, read_case
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
-from foldyn.shells import shell
 from foldyn.statics import trace
 from foldyn.studies import find_case
+from foldyn.studies.herkal.models import REFERENCE, case_with
+from foldyn.studies.herkal.opensees.run import DT, SAMPLES
 from foldyn.studies.herkal.opensees.stored import (
     CASES,
     Moved,
@@ -37,17 +38,14 @@ COUNT = 5  # frequencies
 def our_case(name: str, divisions: int) -> tuple[CaseFile, Case]:
     """A case study with our shell."""
     case_file = read_case(find_case(f"herkal/{name}"))
-    given = case_file.case()
-    law = given.structure.options.fold_law
-    structure = shell(case_file.pattern, case_file.sheet, divisions, fold_law=law)
-    return case_file, Case(structure, given.supports, given.loads, given.damping)
+    return case_file, case_with(case_file, REFERENCE, divisions=divisions)
 
 
 def our_still(name: str, divisions: int) -> Still:
     """Statics and frequencies of a case study with our shell."""
     case_file, case = our_case(name, divisions)
     path = trace(case, steps=4)
-    unloaded = Case(case.structure, case.supports)
+    unloaded = replace(case, loads=())
     return Still(
         node=case_file.output.nodes,
         load_factor=path.load_factor.values,
@@ -57,11 +55,14 @@ def our_still(name: str, divisions: int) -> Still:
     )
 
 
-def our_motion(name: str, divisions: int, dt: float, method: str = "newmark") -> Moved:
-    """Motion of a case study with our shell, sampled every 0.01 s."""
+def our_motion(name: str, divisions: int, dt: float, duration: float | None = None) -> Moved:
+    """Motion of a case study with our shell, sampled like those of OpenSees.
+
+    Its duration (s) is by default that of the case file.
+    """
     case_file, case = our_case(name, divisions)
-    duration = case_file.analysis.arguments["duration"]
-    motion = simulate(case, duration, method=method, dt=dt, every=0.01)
+    whole = case_file.analysis.arguments["duration"]
+    motion = simulate(case, duration or whole, method="newmark", dt=dt, every=SAMPLES)
     return Moved(
         node=case_file.output.nodes,
         time=motion.time.values,
@@ -102,74 +103,83 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.2f}"
 
 
-def still_row(name: str, still: Still, reference: Still | None) -> list[str]:
-    """Values and, in percent, how far they are from a reference."""
+def still_row(still: Still, references: Sequence[Still]) -> list[str]:
+    """Values and, in percent, how far they are from those of references.
+
+    Of frequencies, that is the difference of the worst of the first three and of all.
+    """
+    name = still.about["case"]
     axis = "xyz".index(read_case(find_case(f"herkal/{name}")).output.axis or "x")
     row = [name, str(still.about["divisions"])]
-    row.append(" ".join(f"{value:.5f}" for value in still.displacement[-1, :, axis]))
-    row.append(" ".join(f"{value:.4f}" for value in still.frequency))
-    if reference is None:
-        return [*row, "", ""]
-    moved, frequency = away(still, reference)
-    return [*row, percent(moved), " ".join(map(percent, frequency))]
+    row.append(", ".join(f"{value:.5f}" for value in still.displacement[-1, :, axis]))
+    row.append(", ".join(f"{value:.4f}" for value in still.frequency))
+    for reference in references:
+        if reference is still:
+            row += [""] * 3
+            continue
+        moved, frequency = away(still, reference)
+        worst = [float(np.abs(frequency[:count]).max()) for count in (3, COUNT)]
+        row += map(percent, (moved, *worst))
+    return row
 
 
-HEAD = ("case", "divisions", "displacement, m", "frequencies, Hz", "off, %", "off, %")
+def still_table(found: Iterable[Sequence[Still]], references: Sequence[Sequence[Still]]) -> str:
+    """Results of each case from coarse to fine, with their distances from the references.
+
+    A list of references has one for each case, in the same order.
+    """
+    head = ["case", "divisions", "displacement, m", "frequencies, Hz"]
+    head += ["static, %", "f1 to f3, %", "f1 to f5, %"] * len(references)
+    rows = [
+        still_row(still, [one[number] for one in references])
+        for number, stills in enumerate(found)
+        for still in stills
+    ]
+    return table(head, rows)
 
 
-def convergence() -> str:
-    """Results of OpenSees at all meshes, and their distances from those at the finest."""
-    rows = []
-    for name in CASES:
-        *coarse, finest = (read_still(name, divisions) for divisions in stored_divisions(name))
-        rows += [still_row(name, still, finest) for still in coarse]
-        rows.append(still_row(name, finest, None))
-    return table(HEAD, rows)
-
-
-def agreement(divisions: Iterable[int]) -> str:
-    """Our shell, and its distances from the finest results of OpenSees."""
-    rows = []
-    for name in CASES:
-        finest = read_still(name, stored_divisions(name)[-1])
-        rows += [still_row(name, our_still(name, n), finest) for n in divisions]
-    return table(HEAD, rows)
-
-
-def motion_convergence() -> str:
-    """Motions of OpenSees, with their distances from the best of the same case."""
-    rows = []
-    for name in CASES:
-        found = [read_motion(name, *one) for one in stored_motions(name)]
-        for motion in found:
-            about = motion.about
-            off = percent(motion_away(motion, found[-1])) if motion is not found[-1] else ""
-            row = [name, about["divisions"], about["dt"], f"{about['seconds']:.0f}", off]
-            rows.append(list(map(str, row)))
-    return table(("case", "divisions", "step, s", "processor time, s", "off, %"), rows)
-
-
-def motion_agreement(divisions: int) -> str:
-    """Motions of our shell, and their distances from the best of OpenSees."""
-    rows = []
-    for name in CASES:
-        best = read_motion(name, *stored_motions(name)[-1])
-        ours = our_motion(name, divisions, best.about["dt"])
-        rows.append([name, str(divisions), percent(motion_away(ours, best))])
-    return table(("case", "divisions", "off, %"), rows)
+def motion_table(found: Iterable[Sequence[Moved]], references: Sequence[Sequence[Moved]]) -> str:
+    """The same of motions."""
+    head = ["case", "divisions", "step, s", *["off, %"] * len(references)]
+    rows = [
+        [
+            *(f"{motion.about[key]}" for key in ("case", "divisions", "dt")),
+            *("" if motion is one[number] else percent(motion_away(motion, one[number]))
+              for one in references),
+        ]
+        for number, motions in enumerate(found)
+        for motion in motions
+    ]  # fmt: skip
+    return table(head, rows)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Print what the command line asks for."""
     parser = argparse.ArgumentParser(description="Our shell beside OpenSees.")
-    parser.add_argument("--divisions", type=int, nargs="*", default=[16])
-    parser.add_argument("--motion", type=int, help="divisions of motions of our shell")
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
+    parser.add_argument("--divisions", type=int, nargs="*", default=[16], help="of our shell")
+    parser.add_argument("--motion", type=int, nargs="*", default=[], help="the same for motions")
+    parser.add_argument("--dt", type=float, default=DT, help="time step of our motions, s")
     chosen = parser.parse_args(arguments)
-    parts = [convergence, partial(agreement, chosen.divisions), motion_convergence]
+    cases = chosen.cases
+    theirs = [[read_still(name, n) for n in stored_divisions(name)] for name in cases]
+    finest = [stills[-1] for stills in theirs]
+    print("OpenSees, and its distance from its finest mesh\n")
+    print(still_table(theirs, [finest]), end="\n\n", flush=True)
+    ours = [[our_still(name, n) for n in chosen.divisions] for name in cases]
+    if chosen.divisions:
+        print("Our shell, its distance from its finest mesh and from the finest of OpenSees\n")
+        print(still_table(ours, [[s[-1] for s in ours], finest]), end="\n\n", flush=True)
+
+    cases = [name for name in cases if stored_motions(name)]
+    moved = [[read_motion(name, *one) for one in stored_motions(name)] for name in cases]
+    print("Motions of OpenSees, and their distance from the finest\n")
+    best = [motions[-1] for motions in moved]
+    print(motion_table(moved, [best]), end="\n\n", flush=True)
     if chosen.motion:
-        parts.append(partial(motion_agreement, chosen.motion))
-    for part in parts:
-        print(part(), end="\n\n", flush=True)
+        found = [[our_motion(name, n, chosen.dt) for n in chosen.motion] for name in cases]
+        print("Motions of our shell, their distance from the finest and from that of OpenSees\n")
+        print(motion_table(found, [[m[-1] for m in found], best]))
     return 0
 
 
