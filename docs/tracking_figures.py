@@ -15,7 +15,7 @@ import foldyn as fd
 from foldyn import experiment, plots, signals
 
 IMAGES = Path(__file__).with_name("images")
-NODE, START = 8, 0.13  # s: before, the film is too blurred where this node is
+NODE, START = 8, 0.14  # s: before, the film is too blurred where this node is
 
 
 def steps(tracks: xr.Dataset) -> dict:

@@ -22,7 +22,9 @@ LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 _MARGIN = 220  # pixels around all points that are searched
 _NEIGHBORS = 8  # whose motion tells where a point should be
 _STRAY = 0.4  # of the reach, by which a point may miss the place that a guide tells
-_MOST_MISSES = 3  # frames without a junction for which the flow alone leads on
+_SURE = 0.3  # the same of its neighbors, for a guide to be believed about a lost point
+_CLEAR = 0.55  # of the error that is allowed, for a corner of few edges to be found again
+_MOST_MISSES = 3  # frames after which a corner of two edges is not found again without a guide
 
 
 Guide = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -157,8 +159,7 @@ class _State:
     step : ndarray, shape (p, 2)
         Motion since the frame before.
     misses : ndarray of int, shape (p,)
-        Frames since the junction was last seen.
-    lost : ndarray of bool, shape (p,)
+        Frames since the corner was last measured.
     anchor : ndarray, shape (p, p, 2)
         For each corner the places of all when it was last seen, NaN where these were not: from
         there its neighbors' motion is counted, so that errors do not add up while it is lost.
@@ -167,7 +168,6 @@ class _State:
     here: NDArray[np.float64]
     step: NDArray[np.float64]
     misses: NDArray[np.int64]
-    lost: NDArray[np.bool_]
     anchor: NDArray[np.float64]
 
     @classmethod
@@ -176,14 +176,14 @@ class _State:
         misses = np.where(kept, 0, _MOST_MISSES + 1)
         anchor = np.repeat(np.where(kept[:, np.newaxis], here, np.nan)[np.newaxis], count, axis=0)
         anchor[np.arange(count), np.arange(count)] = here
-        return cls(here, np.zeros((count, 2)), misses, ~kept, anchor)
+        return cls(here, np.zeros((count, 2)), misses, anchor)
 
     def moved(self, here: NDArray[np.float64], kept: NDArray[np.bool_]) -> _State:
         misses = np.where(kept, 0, self.misses + 1)
         step = np.where(kept[:, np.newaxis], here - self.here, self.step)
         anchor = self.anchor.copy()
         anchor[kept] = np.where(kept[:, np.newaxis], here, np.nan)
-        return _State(here, step, misses, misses > _MOST_MISSES, anchor)
+        return _State(here, step, misses, anchor)
 
     def shown(self) -> NDArray[np.float64]:
         """Measured places: NaN where the junction was not seen in this very frame."""
@@ -198,7 +198,7 @@ def _advance(
     how: FollowSettings,
     guide: Guide | None,
 ) -> tuple[_State, NDArray[np.float64], NDArray[np.int8]]:
-    led = ~state.lost
+    led = state.misses == 0
     flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, how)
     # a junction near the place to which the flow leads
     moved = np.where(there[:, np.newaxis], flown, np.nan)
@@ -211,7 +211,7 @@ def _advance(
     if guide is not None:
         told = guide(np.where(good[:, np.newaxis], place, np.nan))
         stray, usual = _strays(place, told)
-        good &= ~(stray > _STRAY * reach + 2.5 * usual)
+        good &= ~(stray > _STRAY * reach + 4.0 * usual)
     good &= ~_crowded(place, good, junction.error, 0.4 * reach)
     error, status = junction.error.copy(), np.where(good, TRACKED, LOST).astype(np.int8)
 
@@ -221,17 +221,18 @@ def _advance(
     if guide is not None:
         told = guide(np.where(good[:, np.newaxis], place, np.nan))
         _, usual = _strays(np.where(good[:, np.newaxis], place, np.nan), told)
-        barred = np.isinf(told[:, 0])
-        told[~(usual < _STRAY * reach)] = np.nan  # the guide itself has lost its way there
-        expected = np.where(np.isfinite(told), told, expected)
-    guided = np.isfinite(told[:, 0])
+        # where the guide itself has lost its way, neighbors do no better
+        barred = ~(np.isfinite(told[:, 0]) & (usual < _SURE * reach))
+        expected = np.where(barred[:, np.newaxis], expected, told)
     guess = np.where(np.isfinite(expected), expected, state.here)
     again = refine(
         frame, np.where((good | barred)[:, np.newaxis], np.nan, guess), reach, 0.35 * reach
     )
-    found = ~good & np.isfinite(again.position[:, 0]) & (again.error < how.error)
-    # without a model no doubt may be left about which corner it is
-    found &= (again.edges >= 3) | guided
+    # where fewer edges meet, the end of a stain on an edge may be taken for the corner
+    allowed = how.error * np.where(again.edges >= 4, 1.0, _CLEAR)
+    found = ~good & np.isfinite(again.position[:, 0]) & (again.error < allowed)
+    if guide is None:  # after some frames no doubt may be left about which corner it is
+        found &= (again.edges >= 3) | (state.misses < _MOST_MISSES)
     merged = np.where(found[:, np.newaxis], again.position, place)
     found &= ~_taken(merged, good, found, 0.6 * reach)
     status[found], error[found] = FOUND_AGAIN, again.error[found]
