@@ -74,9 +74,9 @@ def test_a_film_becomes_histories(inside, capsys):
     assert np.abs((moved - moved[0]) - expected).max() < 6e-5
     with open("a/run.csv", encoding="utf-8") as file:
         rows = list(csv.reader(file))
-    assert rows[0][0] == "time (s)" and "node 11 x (m)" in rows[0]
-    assert not any(name.endswith("z (m)") for name in rows[0])  # along the line of sight
-    column = rows[0].index("node 11 x (m)")
+    assert rows[0][0] == "time [s]" and "node 11 x [m]" in rows[0]
+    assert not any(name.endswith("z [m]") for name in rows[0])  # along the line of sight
+    column = rows[0].index("node 11 x [m]")
     assert float(rows[4][column]) == pytest.approx(moved[3], rel=1e-6)
     for name in ("run-overlay.png", "run-history.png"):
         assert (inside / "a" / name).stat().st_size > 10_000
@@ -88,7 +88,7 @@ def test_photographs_with_loads(inside):
     tracks = fd.experiment.load_tracks("photos.nc")
     moved = tracks["displacement"].sel(axis="x", node=[6, 8, 11, 13]).values
     assert np.nanmedian(moved[1] - moved[0]) == pytest.approx(0.003, abs=1e-4)
-    assert (inside / "photos.csv").read_text("utf-8").startswith("photo,load (N),node")
+    assert (inside / "photos.csv").read_text("utf-8").startswith("photo,load [N],node")
     assert not list(inside.glob("photos*.png"))
 
 
@@ -97,7 +97,7 @@ def test_without_a_model_there_are_pixels(inside):
     assert main(given) == 0
     tracks = fd.experiment.load_tracks("pixels.nc")
     assert tracks.attrs["metres_per_pixel"] == 1.7e-4
-    assert (inside / "pixels.csv").read_text("utf-8").startswith("time (s),point 0 u (px)")
+    assert (inside / "pixels.csv").read_text("utf-8").startswith("time [s],point 0 u [px]")
     assert (inside / "pixels-overlay.png").exists()
 
 

@@ -62,14 +62,14 @@ def load_tracks(path: str | os.PathLike[str]) -> xr.Dataset:
 def write_csv(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write histories to a CSV file: one row for each frame or photograph.
 
-    With a model the columns are the measured displacements of the nodes in m ("node 8 x (m)"),
-    else the pixels of the points ("point 3 u (px)"). What is lost is left empty.
+    With a model the columns are the measured displacements of the nodes in m ("node 8 x [m]"),
+    else the pixels of the points ("point 3 u [px]"). What is lost is left empty.
     """
     along = "photo" if "photo" in ds.dims else "time"
-    names = ["time (s)"] if along == "time" else ["photo"]
+    names = ["time [s]"] if along == "time" else ["photo"]
     columns = [ds[along].values]
     if "load" in ds.coords:
-        names.append("load (N)")
+        names.append("load [N]")
         columns.append(ds["load"].values)
     if "displacement" in ds:
         moved = ds["displacement"]
@@ -77,12 +77,12 @@ def write_csv(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
             for axis in ds["axis"].values:
                 values = moved.sel(node=node, axis=axis).values
                 if np.isfinite(values).any():
-                    names.append(f"node {node} {axis} (m)")
+                    names.append(f"node {node} {axis} [m]")
                     columns.append(values)
     else:
         for point in ds["point"].values:
             for k, axis in enumerate("uv"):
-                names.append(f"point {point} {axis} (px)")
+                names.append(f"point {point} {axis} [px]")
                 columns.append(ds["position_px"].values[:, point, k])
     with open(path, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
