@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import check_folder
+from foldyn.cli.speech import speech
 from foldyn.errors import ComputationError, InputError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def run_fit(given: argparse.Namespace) -> Path:
     plan = plan_of(given)
     folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
     check_folder(folder, given.out, [*WRITTEN, *([] if given.no_figures else ["report.html"])])
-    say: Callable[[str], None] = (lambda text: None) if given.quiet else print
+    say = speech(given.quiet)
     hidden = given.quiet or not sys.stderr.isatty()
     layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
     with tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=hidden) as bar:

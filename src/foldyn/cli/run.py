@@ -14,6 +14,7 @@ from foldyn.cli.folder import check_folder, remove_drawn, save_result
 from foldyn.cli.motions import Motions
 from foldyn.cli.paths import Paths
 from foldyn.cli.runs import Task
+from foldyn.cli.speech import speech
 from foldyn.cli.vibrations import Modes, Responses
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.studies import find_case
@@ -56,7 +57,7 @@ def run(
             _check_video(case_file)
         names = [run.file for run in task.runs.values()]
         check_folder(folder, out, [*names, *(["report.html"] if figures else [])])
-    say = _nothing if quiet else _say
+    say = speech(quiet)
     progress = not quiet and sys.stderr.isatty()
     introduction = _Introduction(case_file, task, told, say)
     done: dict[str, xarray.Dataset] = {}
@@ -140,11 +141,3 @@ def _failed(
 ) -> ComputationError:
     told = f"\nfoldyn: kept what was computed: {', '.join(kept)}" if kept else ""
     return ComputationError(f"{place}{reason}{told}", partial)
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
-
-
-def _nothing(text: str) -> None:
-    pass

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.cli.folder import check_folder
+from foldyn.cli.speech import silence
 from foldyn.errors import ComputationError
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def study(
 
     folder = Path(out or (f"{name}-quick" if quick else f"{name}-study"))
     check_folder(folder, out, ["sensitivity.html" if sensitivity else "report.html"])
-    say = _nothing if quiet else tqdm.write
+    say = silence if quiet else tqdm.write
     hidden = quiet or not sys.stderr.isatty()
     page, ended = (_vary if sensitivity else _study)(quick, folder, say, hidden)
     say(f"wrote {page}")
@@ -120,7 +121,3 @@ def _told(
     if skipped:
         say(f"skipped {skipped} of {len(ended)} runs: their results are in {folder}")
     return ended
-
-
-def _nothing(text: str) -> None:
-    pass

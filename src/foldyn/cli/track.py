@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from foldyn.cli.folder import check_folder
+from foldyn.cli.speech import speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.studies import find_case
 
@@ -89,7 +89,7 @@ def track(given: Namespace) -> Path:
             "--model: photographs need one: from one to the next points move too far to be "
             "followed, and only a model tells which is which"
         )
-    say = _nothing if given.quiet else _say
+    say = speech(given.quiet)
     tell, close = _progress(given, None if film is None else film.path)
     try:
         if film is None:
@@ -117,7 +117,7 @@ def numbers(name: str, text: str, count: int | None = None) -> list[float]:
         raise InputError(f"{name} {text}: give numbers separated by commas") from None
     if count is not None and len(values) != count:
         raise InputError(f"{name} {text}: {len(values)} numbers; {count} are needed")
-    if not np.isfinite(values).all():
+    if not all(map(math.isfinite, values)):
         raise InputError(f"{name} {text}: every number must be finite")
     return values
 
@@ -138,6 +138,8 @@ def model_of(name: str) -> Model:
 
 def summary(ds: xarray.Dataset) -> str:
     """What was tracked, in a few words."""
+    import numpy as np
+
     along = "photo" if "photo" in ds.dims else "time"
     known = np.isfinite(ds["position_px"].values[..., 0])
     what = "photographs" if along == "photo" else "frames"
@@ -239,6 +241,8 @@ def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) ->
 
 def _best(ds: xarray.Dataset) -> list[int]:
     """Nodes that move most among those that were measured most of the time."""
+    import numpy as np
+
     moved = ds["displacement"].values
     known = np.isfinite(moved)
     high = np.where(known, moved, -np.inf).max(axis=0)
@@ -246,11 +250,3 @@ def _best(ds: xarray.Dataset) -> list[int]:
     span = np.where(np.isfinite(high - low), high - low, 0.0).max(axis=1)
     span[ds["tracked"].values < 0.9 * ds["tracked"].values.max()] = -1.0
     return sorted(int(node) for node in np.argsort(-span)[:_SHOWN])
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
-
-
-def _nothing(text: str) -> None:
-    pass

@@ -17,6 +17,7 @@ import foldyn
 from foldyn.errors import InputError
 from foldyn.experiment.fit_problem import Problem
 from foldyn.experiment.key_paths import replaced
+from foldyn.results import netcdf
 
 
 @dataclass(frozen=True)
@@ -233,7 +234,7 @@ class Fit:
             text = json.dumps(self.summary(), indent=2, allow_nan=False)
             path.write_text(text + "\n", encoding="utf-8")
         elif path.suffix == ".nc":
-            self.dataset().to_netcdf(path, engine="h5netcdf")
+            netcdf.write(self.dataset(), path)
         else:
             raise InputError(f"{path}: a fit is written as .json or .nc; choose one of them")
 

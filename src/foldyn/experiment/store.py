@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import csv
 import os
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from foldyn.errors import InputError
-
-ENGINE = "h5netcdf"
+from foldyn.results import netcdf
 
 
 def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -24,19 +22,7 @@ def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """
     if "foldyn_tracks" not in ds.attrs:
         raise InputError("cannot save: these are no tracks; use foldyn.save for results")
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give the name of a file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        ds.to_netcdf(partial, engine=ENGINE)
-        os.replace(partial, path)
-    except PermissionError:
-        raise InputError(f"{path}: may not be written; choose another folder") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    netcdf.write(ds, path)
 
 
 def load_tracks(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -47,13 +33,7 @@ def load_tracks(path: str | os.PathLike[str]) -> xr.Dataset:
     InputError
         There is no such file, or it holds no tracks.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    try:
-        ds = xr.load_dataset(path, engine=ENGINE, decode_times=False)
-    except (OSError, ValueError, KeyError):
-        raise InputError(f"{path}: cannot be read as NetCDF") from None
+    ds = netcdf.read(path, "cannot be read as NetCDF")
     if "foldyn_tracks" not in ds.attrs:
         raise InputError(f"{path}: holds no tracks; foldyn track writes them")
     return ds

@@ -15,6 +15,8 @@ from foldyn.plots import style
 if TYPE_CHECKING:
     import xarray as xr
 
+_LABELS = {"time": "time (s)", "photo": "photo", "load": "load (N)"}
+
 
 def plot_tracks(
     tracks: xr.Dataset,
@@ -59,16 +61,8 @@ def plot_tracks(
     if axis not in ("x", "y", "z"):
         raise InputError(f'axis: {axis!r} is no direction; use "x", "y" or "z"')
     along = "photo" if "photo" in tracks.dims else "time"
-    across, label = tracks[along].values, "time (s)"
-    if along == "photo":
-        across, label = (
-            (across, "photo")
-            if "load" not in tracks.coords
-            else (
-                tracks["load"].values,
-                "load (N)",
-            )
-        )
+    shown = "load" if along == "photo" and "load" in tracks.coords else along
+    across, label = tracks[shown].values, _LABELS[shown]
     figure = style.new_figure(8.0, 1.1 + 1.6 * len(nodes))
     style.title_above(figure, title)
     grid = figure.subplots(len(nodes), 1, squeeze=False, sharex="col")[:, 0]

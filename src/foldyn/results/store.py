@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from foldyn.errors import InputError
+from foldyn.results import netcdf
 from foldyn.results.dataset import FORMAT
 from foldyn.results.origin import check_result
 
-ENGINE = "h5netcdf"
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 
@@ -39,19 +39,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         Not a result, or the path cannot be written.
     """
     check_result(ds, "cannot save: the dataset ")
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give the name of a file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        _split(ds).to_netcdf(partial, engine=ENGINE)
-        os.replace(partial, path)
-    except PermissionError:
-        raise InputError(f"{path}: may not be written; choose another folder") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    netcdf.write(_split(ds), path)
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -72,12 +60,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         There is no such file, or it is not a Foldyn result.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    try:
-        ds = xr.load_dataset(path, engine=ENGINE, decode_times=False)
-    except (OSError, ValueError, KeyError):
-        raise InputError(f"{path}: is not a Foldyn result (it cannot be read as NetCDF)") from None
+    ds = netcdf.read(path, "is not a Foldyn result (it cannot be read as NetCDF)")
     check_result(ds, f"{path}: ")
     if int(ds.attrs.get("foldyn_format", 0)) > FORMAT:
         raise InputError(

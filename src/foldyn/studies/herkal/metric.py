@@ -44,7 +44,14 @@ def content(
         m.
     """
     record = motion["displacement"].sel(node=list(nodes), axis=axis).transpose("time", "node")
-    frequency, amplitude = spectrum(record.values, sampling_interval(motion["time"].values))
+    return content_of(motion["time"].values, record.values, up_to)
+
+
+def content_of(
+    time: NDArray[np.float64], record: NDArray[np.float64], up_to: float = UP_TO
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The same of a record (time, nodes) in m at evenly spaced times (s)."""
+    frequency, amplitude = spectrum(record, sampling_interval(time))
     kept = frequency <= up_to * (1.0 + 1e-9)
     return frequency[kept], amplitude[kept]
 

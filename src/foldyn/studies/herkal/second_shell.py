@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.signals import sampling_interval, spectrum
-from foldyn.studies.herkal.metric import AXES, UP_TO, content, deviation
+from foldyn.studies.herkal.metric import AXES, UP_TO, content, content_of, deviation
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.study import Study
 
@@ -32,8 +31,7 @@ def _row(study: Study, case: str, divisions: int, dt: float) -> dict[str, float]
         return {}
     up_to = study.case_file(case).output.max_frequency or UP_TO
     moved = theirs.displacement[:, :, AXES.index(axis)]
-    frequency, amplitude = spectrum(moved, sampling_interval(theirs.time))
-    reference = amplitude[frequency <= up_to * (1.0 + 1e-9)]
+    reference = content_of(theirs.time, moved, up_to)[1]
     row = {}
     for model in study.plan.models:
         motion = study.result(case, model, "motion")
