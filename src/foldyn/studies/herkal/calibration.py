@@ -138,7 +138,7 @@ def released_case(
         "analysis": {
             "kind": "dynamics",
             "method": "generalized_alpha",
-            "dt": STEP,
+            "dt": step,
             "duration": SEEN,
         },
         "output": {"nodes": [WATCHED], "axis": "x", "every": step},
