@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 from miura_film import cv2, model
 
-from foldyn.errors import InputError
+from foldyn.cli.main import main
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment import (
     CornerSettings,
     FollowSettings,
@@ -19,6 +21,7 @@ from foldyn.experiment import (
     open_film,
     read_photo,
     track_film,
+    track_photos,
 )
 
 
@@ -98,3 +101,85 @@ def test_more_nodes_than_points(sharp):
 def test_settings_that_cannot_be(make, match):
     with pytest.raises(InputError, match=match):
         make()
+
+
+def copied(sharp, path, frames: int):
+    """The first frames of a film in a file of their own."""
+    code = cv2.VideoWriter_fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(path), code, 240.0, sharp.film.studio.camera.size, False)
+    for _, picture in zip(range(frames), open_film(sharp.path).frames(), strict=False):
+        writer.write(picture[1])
+    writer.release()
+    return path
+
+
+def test_a_film_that_breaks_off_is_tracked_and_named(sharp, tmp_path):
+    whole = copied(sharp, tmp_path / "whole.mkv", 12)
+    half = tmp_path / "half.mkv"
+    half.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    with pytest.warns(FoldynWarning, match=r"half\.mkv: breaks off: \d frames can be read.* 12;"):
+        tracks = track_film(str(half), sharp.model)
+    assert 2 <= tracks.sizes["time"] <= 7
+    assert track_film(str(whole)).sizes["time"] == 12  # without a warning
+
+
+def test_one_frame_shows_no_motion(sharp, tmp_path):
+    with pytest.raises(InputError, match=r"one\.mkv: one frame alone shows no motion"):
+        track_film(str(copied(sharp, tmp_path / "one.mkv", 1)))
+
+
+def test_photographs_have_one_size(sharp, tmp_path):
+    picture = sharp.film.frame(0)
+    for name, part in (("a.png", picture), ("b.png", picture[:500])):
+        cv2.imwrite(str(tmp_path / name), part)
+    files = [tmp_path / "a.png", tmp_path / "b.png"]
+    with pytest.raises(InputError, match=r"b\.png: is of 580 x 500 pixels, .*a\.png of 580 x 620"):
+        track_photos(files, sharp.model)
+    with pytest.raises(InputError, match="--roi 0,0,700,500: must lie in the image"):
+        track_photos(files, sharp.model, roi=(0, 0, 700, 500))
+
+
+def test_a_reach_longer_than_the_picture(sharp):
+    long = Tracking(corners=CornerSettings(reach=1e9))
+    with pytest.raises(InputError, match=r"--reach 1e\+09: at most 145 pixels"):
+        track_film(str(sharp.path), sharp.model, long)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--roi", "1.5,2,300,300"], "--roi 1.5,2,300,300: 1.5 is not a whole number"),
+        (["--model", "herkal/specimen", "--nodes", "1,2.5"], "--nodes 1,2.5: 2.5 is not a whole"),
+        (["--reach", "-1"], "reach: -1.0; give a positive number"),
+        (["--rate", "nan"], "--rate nan: every number must be finite"),
+        (["--distance", "0"], "--distance 0.0: give a positive number"),
+        (["--match", "middle"], "--match 'middle'"),
+        (["--model", "film.mkv"], "film.mkv: is not a text file in UTF-8; give a case file"),
+    ],
+)
+def test_options_that_cannot_be(sharp, tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "film.mkv").write_bytes(sharp.path.read_bytes())
+    assert main(["track", "film.mkv", *arguments, "--out", "never/bad.nc"]) == 2
+    said = capsys.readouterr()
+    assert message in said.err
+    assert (said.out, len(said.err.splitlines())) == ("", 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["film.mkv"]
+
+
+@pytest.mark.parametrize("kind", ["text", "cut", "folder"])
+def test_a_broken_film_gets_one_line_decoders_included(sharp, tmp_path, kind):
+    film = tmp_path / "film.mp4"
+    if kind == "folder":
+        film.mkdir()
+    else:
+        film.write_bytes(b"hello" if kind == "text" else sharp.path.read_bytes()[:200])
+    done = subprocess.run(
+        [sys.executable, "-m", "foldyn.cli.main", "track", "film.mp4"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    message = "is a folder" if kind == "folder" else "no frame can be read: it is not a film"
+    assert done.stderr.startswith(f"foldyn: film.mp4: {message}")
+    assert (done.stdout, len(done.stderr.splitlines())) == ("", 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]

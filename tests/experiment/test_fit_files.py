@@ -127,8 +127,14 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ("nodes = [0, 2]", 'nodes = "xmin"', "give the numbers of the nodes in sway.csv"),
         ("band = [1, 6]", "band = [6, 1]", "data[3]: band = [6, 1]: give two frequencies"),
         ("band = [1, 6]\n", "", "data[3]: band = None: give two frequencies"),
+        ("band = [1, 6]", 'band = [1, "b"]', 'data[3]: band = [1, "b"]: must be numbers'),
+        ("nodes = [0, 2]", "nodes = [0.5]", "data[2]: nodes = [0.5]: 0.5 is not a node number"),
+        ("nodes = [0, 2]", "nodes = [0]\nwindow = 5", "data[2]: window = 5: give two times (s)"),
+        ("nodes = [0, 2]", "nodes = [0]\ncolumns = 3", "columns = 3: give a list of 1 headings"),
+        ("nodes = [0, 2]", 'nodes = [0]\naxis = "w"', 'axis = "w": must be "x", "y" or "z"'),
+        ("sigma = 1e-5", 'columns = { "f" = "x" }', "give the headings of displacement and force"),
         ("band = [1, 6]", "band = [1, 6]\nwindw = [0, 1]", "data[3]: windw: unknown key; did you"),
-        ("sigma = 1e-5", "sigma = -1", "data[0]: forces: sigma = -1: must be greater than 0"),
+        ("sigma = 1e-5", "sigma = -1", "forces.csv: forces: sigma = -1: must be greater than 0"),
         ("335 - ", "335 -* ", 'tie model.fold_law.theta2 = "335 -* '),
     ],
 )
@@ -155,6 +161,83 @@ def test_tables_with_mistakes(folder, old, new, message) -> None:
     with pytest.raises(InputError) as caught:
         read_fit(folder / "fit.toml")
     assert f"{folder / 'forces.csv'}: {message}" in str(caught.value)
+
+
+@pytest.mark.parametrize("lost", ["", " ", '""'])
+def test_an_empty_cell_is_a_lost_node(folder, lost) -> None:
+    edit(folder, "200;0;1", f"200;{lost};1", "sway.csv")
+    edit(folder, "1,0,20,2", f"1,0,{lost},2", "shapes.csv")
+    edit(folder, 'kind = "spectrum"', 'kind = "history"')
+    edit(folder, "band = [1, 6]\n", "")
+    data = read_fit(folder / "fit.toml").data[1:]
+    seen, sway, other = (getattr(one, "values", np.zeros(0)) for one in data)
+    np.testing.assert_array_equal(np.isnan(sway), [[k == 2, False] for k in range(5)])
+    assert np.isfinite(other).all()
+    np.testing.assert_allclose(seen[1], [[np.nan, 0.002], [0.011, 0.003]])
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("sway.csv", "200;0;1", "200;nan;1", '4, column "node 0 x [mm]": "nan" is not a finite'),
+        ("sway.csv", "200;0;1", "200;NaN;1", '4, column "node 0 x [mm]": "NaN" is not a finite'),
+        ("sway.csv", "200;0;1", "200;0;-inf", '4, column "node 2 x [mm]": "-inf" is not a finite'),
+        ("sway.csv", "200;0;1", "200;lost;1", '4, column "node 0 x [mm]": "lost" is not a number'),
+        ("sway.csv", "200;0;1", ";0;1", '4, column "time [ms]": is empty; every line needs a'),
+        ("shapes.csv", "1,0,20,2", "1,0,20,nan", '3, column "z [mm]": "nan" is not a finite'),
+        ("shapes.csv", "1,0,20,2", "1,,20,2", '3, column "node": is empty'),
+        ("shapes.csv", "1,0,20,2", ",0,20,2", '3, column "load_factor": is empty'),
+    ],
+)
+def test_a_cell_is_a_number_or_empty(folder, name, old, new, message) -> None:
+    edit(folder, old, new, name)
+    with pytest.raises(InputError) as caught:
+        read_fit(folder / "fit.toml")
+    assert f"{folder / name}: line {message}" in str(caught.value)
+    remedy = "; leave the cell empty where a node was lost"
+    assert str(caught.value).endswith(remedy) == ("is empty" not in message)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("0,,0\n1,,1\n2,,0\n", "node 0 has 0 values that are numbers; give at least two"),
+        ("0,1,0\n1,,1\n2,,0\n", "node 0 has 1 values that are numbers; give at least two"),
+        ("0,1,0\n1,,1\n2,1,0\n", "node 0 is constant"),
+    ],
+)
+def test_histories_that_say_nothing(folder, lines, message) -> None:
+    (folder / "sway.csv").write_text(f"time [s],node 0 x [m],node 2 x [m]\n{lines}")
+    with pytest.raises(InputError) as caught:
+        read_fit(folder / "fit.toml")
+    assert "data[2]: " in str(caught.value)
+    assert message in str(caught.value)
+    if "1 values" in message:  # nobody has asked for this node
+        assert recognize(folder / "sway.csv").nodes == (2,)
+    else:
+        with pytest.raises(InputError, match=message):
+            recognize(folder / "sway.csv")
+
+
+def test_shapes_are_told_once(folder) -> None:
+    edit(folder, "1,2,11,3", "1,0,11,3", "shapes.csv")
+    with pytest.raises(InputError, match="has two lines for node 0 at the load factor 1"):
+        shapes(folder / "shapes.csv")
+    edit(folder, "1,0,11,3", "1,2.5,11,3", "shapes.csv")
+    with pytest.raises(InputError, match=r"node = 2\.5: must be a whole number"):
+        shapes(folder / "shapes.csv")
+    with pytest.raises(InputError, match="leave it out, the file has a column of that name"):
+        shapes(folder / "shapes.csv", load_factor=[0.5, 1.0])
+
+
+def test_of_many_columns_a_message_names_some(folder) -> None:
+    names = ",".join(f"node {k} x [m]" for k in range(40))
+    (folder / "sway.csv").write_text(f"time [s],{names}\n" + "0" + ",0" * 40 + "\n")
+    edit(folder, "nodes = [0, 2]", "nodes = [70]")
+    with pytest.raises(InputError, match=r"did you mean 'node 7 x'\? .* \(41 in all\)$"):
+        read_fit(folder / "fit.toml")
+    with pytest.raises(InputError, match=r"\(41 in all\); needed are"):
+        recognize(folder / "sway.csv", axis="y")
 
 
 def test_a_constant_history_is_named_with_its_file(folder) -> None:

@@ -40,14 +40,15 @@ def motion(swung):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"values": np.full(40, 0.0031)}, "column 0 is constant (0.0031 m at all times)"),
-        ({"values": np.full(40, np.nan)}, "column 0 has 0 values that are numbers"),
+        ({"values": np.full(40, 0.0031)}, "node 0 is constant (0.0031 m at all times)"),
+        ({"values": np.full(40, np.nan)}, "node 0 has 0 values that are numbers"),
         ({"values": SWAY[:-1]}, "shape (39, 1): must be (40 times, nodes)"),
         ({"values": np.where(TIME > 1, np.inf, SWAY)}, "infinite; give NaN where a node was lost"),
         ({"time": TIME[::-1]}, "must be at least two increasing times"),
         ({"time": np.where(TIME > 1, np.nan, TIME)}, "time[21] = nan: must be a finite number"),
         ({"axis": "w"}, 'axis = "w": must be "x", "y" or "z"'),
         ({"sigma": 0.0}, "sigma = 0.0: must be greater than 0"),
+        ({"align": -0.01}, "align = -0.01: must be at least 0"),
         ({"detrend": "mean"}, 'detrend = "mean": choose'),
         ({"nodes": []}, "nodes = []"),
     ],
@@ -178,3 +179,32 @@ def test_spectra_need_whole_records() -> None:
         Spectrum.of(history(values=np.where(TIME > 1, np.nan, SWAY)), (0.1, 2.0))
     with pytest.raises(InputError, match="holds none of the frequencies"):
         Spectrum.of(history(), (3.02, 3.03))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0131, -0.0272])
+def test_an_unknown_start_is_found(motion, swung, late) -> None:
+    """A record of the model itself that counts its time from another instant."""
+    case = fd.read_case(swung).case()
+    time = np.arange(0.4, 1.2, 0.02)
+    exact = history(time=time, values=np.ones((40, 1)) * np.arange(40)[:, None])
+    values = exact.curves(motion, case)
+    shifted = history(time=time - late, values=values, align=0.05)
+    assert shifted.shift(motion, case) == pytest.approx(late, abs=1e-9)
+    np.testing.assert_allclose(shifted.predicted(motion, case), values.ravel(), atol=1e-9)
+    bounded = history(time=time - late, values=values, align=0.01)
+    assert abs(bounded.shift(motion, case)) <= 0.01
+    outside = history(time=time + 0.79, values=values, align=0.05)
+    with pytest.raises(InputError, match="is not within the motion"):
+        outside.check(case, {"duration": 2.0})
+
+
+def test_what_was_measured_counts_where_the_start_is_unknown(swung) -> None:
+    """Predictions then depend on the values; kept evaluations must not be mixed up."""
+    time = np.arange(0.4, 1.2, 0.02)
+    digests = {}
+    for align in (0.0, 0.05):
+        for k, scale in enumerate((1.0, 2.0)):
+            one = history(time=time, values=scale * np.sin(9.0 * time)[:, None], align=align)
+            digests[align, k] = problem(swung, [one], ALPHA, {}).digest()
+    assert digests[0.0, 0] == digests[0.0, 1]
+    assert len(set(digests.values())) == 3

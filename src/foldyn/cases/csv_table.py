@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -35,6 +35,7 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
 _NUMBER = "number without unit"
 _SPELLINGS = {"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"}
 _DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
+_MANY = 10  # names listed in a message
 _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
 
@@ -86,7 +87,9 @@ def _text(file: Path) -> str:
 
 
 def read_numbers(
-    path: str | os.PathLike[str], wanted: Mapping[str, tuple[str, str]]
+    path: str | os.PathLike[str],
+    wanted: Mapping[str, tuple[str, str]],
+    gaps: Collection[str] = (),
 ) -> dict[str, NDArray[np.float64]]:
     """Numbers of several columns of a CSV file, of any quantities, in lines of any order.
 
@@ -97,10 +100,13 @@ def read_numbers(
     wanted : mapping of str to (str, str)
         By field, for messages and the result: the heading of its column, with or without the
         unit, and the unit that its numbers become.
+    gaps : collection of str
+        Fields whose cells may be empty.
 
     Returns
     -------
     dict of str to ndarray, shape (lines,)
+        NaN where a cell is empty.
 
     Raises
     ------
@@ -115,7 +121,9 @@ def read_numbers(
             _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
             for item, (_, unit) in zip(found, wanted.values(), strict=True)
         ]
-        values = np.array([[_number(n, row, c, r) for c, r in zip(found, ratios, strict=True)]
+        empty = [field in gaps for field in wanted]
+        values = np.array([[_number(n, row, c, r, gap)
+                            for c, r, gap in zip(found, ratios, empty, strict=True)]
                            for n, row in rows])  # fmt: skip
         if not len(values):
             raise InputError("holds no lines of numbers below the names of the columns")
@@ -131,6 +139,13 @@ def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
         return [(column.name, column.unit) for column in _lines(_text(file))[0]]
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
+
+
+def some(names: Sequence[str]) -> str:
+    """Names for a message, of many only the first ones."""
+    if len(names) <= _MANY:
+        return ", ".join(names)
+    return f"{', '.join(names[: _MANY - 2])}, ... ({len(names)} in all)"
 
 
 def _lines(text: str) -> tuple[list[_Column], list[tuple[int, list[str]]]]:
@@ -213,7 +228,7 @@ def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: i
     found = [column for column in columns if wanted.strip() in (column.heading, column.name)]
     if len(found) == 1:
         return found[0]
-    listed = ", ".join(f'"{column.heading}"' for column in columns)
+    listed = some([f'"{column.heading}"' for column in columns])
     if found:
         raise InputError(f'{field} = "{wanted}": names {len(found)} of the columns {listed}')
     hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
@@ -278,16 +293,22 @@ def _is_number(cell: str) -> bool:
     return "_" not in cell  # 1_000 is a number to Python only
 
 
-def _number(number: int, cells: Sequence[str], column: _Column, ratio: Fraction) -> float:
+def _number(
+    number: int, cells: Sequence[str], column: _Column, ratio: Fraction, gap: bool = False
+) -> float:
+    """Number in a cell; NaN for an empty one where there may be gaps."""
     cell = cells[column.place]
     place = f'line {number}, column "{column.heading}"'
+    remedy = "; leave the cell empty where a node was lost" if gap else ""
+    if not cell and gap:
+        return np.nan
     if not cell:
         raise InputError(f"{place}: is empty; every line needs a number there")
     if not _is_number(cell):
         hint = " (decimals are written with a point)" if "," in cell else ""
-        raise InputError(f'{place}: "{cell}" is not a number{hint}')
+        raise InputError(f'{place}: "{cell}" is not a number{hint}{remedy}')
     # an exact ratio of whole numbers: 5 ms become the double nearest to 0.005 s
     value = float(cell) * ratio.numerator / ratio.denominator
     if not np.isfinite(value):
-        raise InputError(f'{place}: "{cell}" is not a finite number')
+        raise InputError(f'{place}: "{cell}" is not a finite number{remedy}')
     return value

@@ -80,6 +80,13 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="instead: the same under other pulses, loads, bends and calibrations",
     )
+    study.add_argument(
+        "--data",
+        nargs="+",
+        metavar="FILE",
+        help="measurements of the specimen instead of synthetic ones: a film of its release, "
+        "tracks (NetCDF), or tables (CSV)",
+    )
     study.add_argument("--out", help="folder of the results (default: NAME-study or NAME-quick)")
     study.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
@@ -174,7 +181,7 @@ def _call(given: argparse.Namespace) -> None:
     if given.command == "study":
         from foldyn.cli.study import study
 
-        study(given.name, given.quick, given.out, given.quiet, given.sensitivity)
+        study(given.name, given.quick, given.out, given.quiet, given.sensitivity, given.data)
         return
     from foldyn.cases.reading import read_case
     from foldyn.cli.run import run

@@ -9,17 +9,23 @@ from typing import TYPE_CHECKING
 
 from foldyn.cli.folder import check_folder
 from foldyn.cli.speech import silence
-from foldyn.errors import ComputationError
+from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:
     from foldyn.studies.herkal.pool import Done
+    from foldyn.studies.herkal.specimen.measured import Data
 
 Say = Callable[[str], None]
 PROCESSES = 2
 
 
 def study(
-    name: str, quick: bool, out: str | None, quiet: bool = False, sensitivity: bool = False
+    name: str,
+    quick: bool,
+    out: str | None,
+    quiet: bool = False,
+    sensitivity: bool = False,
+    data: Sequence[str] | None = None,
 ) -> Path:
     """Compute what a study has not computed yet and write its page; returns its path.
 
@@ -33,11 +39,13 @@ def study(
     quiet : bool
     sensitivity : bool
         The combinations of what the paper leaves unsaid, instead of the study itself.
+    data : sequence of str, optional
+        Files with measurements of the specimen; synthetic ones by default.
 
     Raises
     ------
     InputError
-        The folder cannot be written.
+        The folder cannot be written, or the data cannot be used.
     ComputationError
         Computations failed; the page is that of the others.
     """
@@ -47,7 +55,12 @@ def study(
     check_folder(folder, out, ["sensitivity.html" if sensitivity else "report.html"])
     say = silence if quiet else tqdm.write
     hidden = quiet or not sys.stderr.isatty()
-    page, ended = (_vary if sensitivity else _study)(quick, folder, say, hidden)
+    if sensitivity:
+        if data:
+            raise InputError("--data: belongs to the study; leave out --sensitivity")
+        page, ended = _vary(quick, folder, say, hidden)
+    else:
+        page, ended = _study(quick, folder, _data(data, say), say, hidden)
     say(f"wrote {page}")
     failed = [done for done in ended if done.failure]
     if failed:
@@ -58,17 +71,37 @@ def study(
     return page
 
 
-def _study(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
+def _data(names: Sequence[str] | None, say: Say) -> Data | None:
+    """What was measured of the specimen; None where it must be left out."""
+    from foldyn.experiment import opencv
+    from foldyn.studies.herkal.specimen.measured import data_of
+
+    if names:
+        return data_of(names)
+    try:
+        opencv()
+    except FoldynError as error:
+        say(f"the specimen's synthetic film is left out: {error}")
+        return None
+    return data_of([])
+
+
+def _study(
+    quick: bool, folder: Path, data: Data | None, say: Say, hidden: bool
+) -> tuple[Path, Sequence[Done]]:
     from foldyn.studies.herkal import report
     from foldyn.studies.herkal.study import FULL, QUICK, Study
 
-    one = Study(QUICK if quick else FULL, folder)
+    one = Study(QUICK if quick else FULL, folder, data)
     n = one.plan.numerics
     say(
         f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} mass "
         f"distributions, {n.duration:g} s of motion"
     )
-    ended = _told(one.compute, len(one.plan.jobs()), folder, say, hidden)
+    if data is not None:
+        given = "a synthetic film" if data.synthetic else ", ".join(data.names)
+        say(f"the specimen: calibrated to {given}")
+    ended = _told(one.compute, one.count, folder, say, hidden)
     say("drawing figures")
     return report.write(one), ended
 

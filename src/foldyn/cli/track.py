@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -70,6 +71,9 @@ def track(given: Namespace) -> Path:
     """Run the command; returns the path of the tracks."""
     from foldyn import experiment
 
+    # what decoders would say of a broken film is ours to say
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     experiment.opencv()  # nothing else is worth a look without it
     out = Path(given.out)
     if out.suffix != ".nc":
@@ -77,7 +81,7 @@ def track(given: Namespace) -> Path:
     check_folder(out.parent, given.out, [out.name, out.with_suffix(".csv").name])
     photos = _are_photos(given.inputs)
     how = _tracking(given)
-    roi = None if given.roi is None else tuple(int(v) for v in numbers("--roi", given.roi, 4))
+    roi = None if given.roi is None else tuple(wholes("--roi", given.roi, 4))
     rate = None if given.rate is None else numbers("--rate", given.rate, 1)[0]
     loads = None if given.loads is None else numbers("--loads", given.loads)
     if loads is not None and not photos:
@@ -122,6 +126,15 @@ def numbers(name: str, text: str, count: int | None = None) -> list[float]:
     return values
 
 
+def wholes(name: str, text: str, count: int | None = None) -> list[int]:
+    """Whole numbers that a person gave, separated by commas."""
+    values = numbers(name, text, count)
+    for value in values:
+        if not value.is_integer():
+            raise InputError(f"{name} {text}: {value:g} is not a whole number")
+    return [int(value) for value in values]
+
+
 def model_of(name: str) -> Model:
     """Model of a result, of a case at rest, or with all states of the path of a static case."""
     import foldyn as fd
@@ -164,6 +177,8 @@ def _are_photos(inputs: Sequence[str]) -> bool:
     if not any(photos) and len(inputs) > 1:
         raise InputError(f"{inputs[1]}: one film at a time")
     for name in inputs:
+        if Path(name).is_dir():
+            raise InputError(f"{name}: is a folder; give a film, or all photographs in it")
         if not Path(name).is_file():
             raise InputError(f"{name}: there is no such file")
     if photos == [True]:
@@ -186,7 +201,7 @@ def _tracking(given: Namespace) -> Tracking:
         lengths = [numbers("--reference", one, 5) for one in given.reference]
         scale = scale_of_lengths(lengths).metres_per_pixel
     distance = None if given.distance is None else numbers("--distance", given.distance, 1)[0]
-    nodes = None if given.nodes is None else tuple(int(n) for n in numbers("--nodes", given.nodes))
+    nodes = None if given.nodes is None else tuple(wholes("--nodes", given.nodes))
     if nodes is not None and given.model is None:
         raise InputError("--nodes: which nodes there are is known with a --model only")
     reach = None if given.reach is None else numbers("--reach", given.reach, 1)[0]

@@ -15,7 +15,7 @@ from foldyn.cases.decode import unknown_key
 from foldyn.cases.messages import describe
 from foldyn.cases.reading import read_document
 from foldyn.cases.schema import Section
-from foldyn.cases.values import choice, show
+from foldyn.cases.values import choice
 from foldyn.errors import InputError
 from foldyn.experiment.measured_files import READERS, read_measurement
 from foldyn.experiment.measured_motions import History, Spectrum
@@ -171,8 +171,6 @@ def _measurement(
             raise InputError(f"{key}: {unknown_key(key, (*own, *known))}")
     if "nodes" not in given and section.kind in (History.kind, Spectrum.kind):
         raise InputError("nodes: missing; name the nodes that were measured")
-    if section.kind == Spectrum.kind:
-        _check_band(given.get("band"))
     return read_measurement(
         section.kind,
         path.parent / section.file,
@@ -195,11 +193,6 @@ def _known(kind: str) -> list[str]:
         for item in fields(CLASSES[kind])
         if item.name not in made and item.name not in own
     ]
-
-
-def _check_band(band: Any) -> None:
-    if not isinstance(band, list) or len(band) != 2 or not band[0] < band[1]:
-        raise InputError(f"band = {show(band)}: give two frequencies (Hz), as in [2, 30]")
 
 
 def _checked(path: Path, place: str, shape: Any, table: Mapping[str, Any]) -> Any:

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
@@ -22,6 +23,7 @@ from foldyn.experiment.fitted import Fit
 from foldyn.experiment.measured_motions import History, Spectrum
 from foldyn.experiment.measured_paths import ForceDisplacement, Shapes
 from foldyn.experiment.measurement import Measurement
+from foldyn.plots import style
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
 
@@ -29,13 +31,13 @@ POINTS = 25
 """Points of the curve that is drawn through measured forces."""
 
 
-def write_fit(fit: Fit, folder: str | Path, title: str = "") -> Path:
-    """Draw a fit into a folder that exists; returns the path of report.html."""
+def write_fit(fit: Fit, folder: str | Path, title: str = "", note: str = "") -> Path:
+    """Draw a fit into a folder that exists, a note on every figure; returns the page's path."""
     folder = Path(folder)
     sections: list[Section] = [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
     if len(fit.estimates) > 1:
         picture = folder / "correlation.png"
-        plot_correlation(fit).savefig(picture)
+        _save(plot_correlation(fit), picture, note)
         sections.append(
             Picture(
                 picture,
@@ -47,7 +49,7 @@ def write_fit(fit: Fit, folder: str | Path, title: str = "") -> Path:
         sections.append(Text(_blind(fit)))
     sections += [Heading("Measured and model"), _scores(fit)]
     for i, one in enumerate(fit.problem.measurements):
-        picture = _draw(fit, i, one, folder)
+        picture = _draw(fit, i, one, folder, note)
         if picture is not None:
             sections.append(Picture(picture, _caption(one)))
     sections += [Heading("The search"), _searches(fit)]
@@ -130,7 +132,7 @@ def _caption(one: Measurement) -> str:
     return f"{told} Held out: the fit did not use it." if one.held_out else told
 
 
-def _draw(fit: Fit, number: int, one: Measurement, folder: Path) -> Path | None:
+def _draw(fit: Fit, number: int, one: Measurement, folder: Path, note: str) -> Path | None:
     """Draw one measurement; returns its picture's path, None where there is nothing to draw."""
     run = next(run for run in fit.problem.runs if number in run.members)
     values = [*fit.values.values()]
@@ -148,8 +150,13 @@ def _draw(fit: Fit, number: int, one: Measurement, folder: Path) -> Path | None:
     else:
         return None
     picture = folder / f"data-{number}.png"
-    figure.savefig(picture)
+    _save(figure, picture, note)
     return picture
+
+
+def _save(figure: Figure, picture: Path, note: str) -> None:
+    style.title_above(figure, note)
+    style.finish(figure).savefig(picture)
 
 
 def _curve(

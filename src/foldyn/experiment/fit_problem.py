@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import foldyn
 from foldyn.cases import State
 from foldyn.cases.casefile import CaseFile
 from foldyn.cases.reading import case_of_document, read_document, validated
@@ -24,6 +23,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.key_paths import replaced, value_at
 from foldyn.experiment.measurement import Measurement
 from foldyn.experiment.parameters import Parameter, Space, space
+from foldyn.program import program
 from foldyn.results import load
 from foldyn.statics import Settings, trace
 
@@ -115,7 +115,7 @@ class Problem:
 
     def digest(self) -> str:
         """Digest of all that predictions depend on but for the parameters' values."""
-        found = hashlib.sha256(foldyn.__version__.encode())
+        found = hashlib.sha256(program("experiment").encode())
         told = [self.space.keys, [(tie.key, tie.expression) for tie in self.space.ties]]
         found.update(json.dumps(told).encode())
         for run in self.runs:
@@ -131,7 +131,8 @@ class Problem:
                 if item.name in ASIDE:
                     continue
                 value = getattr(one, item.name)
-                value = np.isfinite(value) if item.name == "values" else value
+                if item.name == "values" and not getattr(one, "align", 0.0):
+                    value = np.isfinite(value)
                 array = isinstance(value, np.ndarray)
                 found.update(value.tobytes() if array else repr(value).encode())
         return found.hexdigest()

@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases.csv_table import read_headings, read_numbers
+from foldyn.cases.csv_table import read_headings, read_numbers, some
+from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import show
+from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.measured_motions import History, Spectrum
 from foldyn.experiment.measured_paths import IMPOSED, ForceDisplacement, Shapes
-from foldyn.experiment.measurement import Measurement
+from foldyn.experiment.measurement import Measurement, axis_number
 from foldyn.experiment.store import load_tracks
 
 
@@ -33,12 +35,19 @@ def force_displacement(
     **known
         Other arguments of `ForceDisplacement`.
     """
-    headings = {"displacement": "displacement", "force": "force"} | dict(columns or {})
     units = {"displacement": "m", "force": "N"}
-    return ForceDisplacement(
-        **read_numbers(file, {name: (headings[name], unit) for name, unit in units.items()}),
-        **known,
-    )
+    headings = {name: name for name in units} if columns is None else columns
+    if (
+        not isinstance(headings, Mapping)
+        or not {*headings} <= {*units}
+        or not _texts(list(headings.values()))
+    ):
+        raise InputError(
+            f"columns = {show(columns)}: give the headings of displacement and force, as in "
+            '{ displacement = "way", force = "load" }'
+        )
+    wanted = {name: (headings.get(name, name), unit) for name, unit in units.items()}
+    return _made(ForceDisplacement, file, **read_numbers(file, wanted), **known)
 
 
 def shapes(
@@ -49,8 +58,8 @@ def shapes(
     Parameters
     ----------
     file : Path
-        CSV with the columns load_factor, node, and x, y, z as far as they were measured; or tracks
-        of photographs (``*.nc``).
+        CSV with the columns load_factor, node, and x, y, z as far as they were measured, empty
+        where a node was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
     nodes : sequence of int, optional
         Those to take; all in the file by default.
     load_factor : sequence of float, optional
@@ -58,26 +67,36 @@ def shapes(
     **known
         Other arguments of `Shapes`.
     """
-    if file.suffix == ".nc":
+    names = _names(file)
+    if file.suffix == ".nc" or "photo" in names:
         return _shapes_of_tracks(file, nodes, load_factor, **known)
-    names = [name for name, _ in read_headings(file)]
+    if load_factor is not None:
+        raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
     axes = "".join(axis for axis in AXES if axis in names)
     if not axes:
         raise InputError(f'{file}: has no column "x", "y" or "z"; shapes need at least one')
     wanted = {"load_factor": ("load_factor", "-"), "node": ("node", "-")}
-    table = read_numbers(file, wanted | {axis: (axis, "m") for axis in axes})
-    numbers, steps = table["node"].astype(int), np.unique(table["load_factor"])
-    chosen = np.unique(numbers).tolist() if nodes is None else _listed(file, nodes)
-    missing = sorted(set(chosen) - set(numbers.tolist()))
+    table = read_numbers(file, wanted | {axis: (axis, "m") for axis in axes}, gaps=axes)
+    listed, steps = table["node"].astype(int), np.unique(table["load_factor"])
+    broken = np.flatnonzero(table["node"] != listed)
+    if broken.size:
+        raise InputError(f"{file}: node = {table['node'][broken[0]]:g}: must be a whole number")
+    chosen = np.unique(listed).tolist() if nodes is None else _listed(file, nodes)
+    missing = sorted(set(chosen) - set(listed.tolist()))
     if missing:
         raise InputError(f"{file}: has no line for node {missing[0]}")
     values = np.full((len(steps), len(chosen), len(axes)), np.nan)
     places = {node: k for k, node in enumerate(chosen)}
-    for line, node in enumerate(numbers.tolist()):
+    told: set[tuple[int, float]] = set()
+    for line, node in enumerate(listed.tolist()):
+        factor = table["load_factor"][line]
+        if (node, factor) in told:
+            raise InputError(f"{file}: has two lines for node {node} at the load factor {factor:g}")
+        told.add((node, factor))
         if node in places:
-            step = np.searchsorted(steps, table["load_factor"][line])
+            step = np.searchsorted(steps, factor)
             values[step, places[node]] = [table[axis][line] for axis in axes]
-    return Shapes(nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
+    return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
 
 
 def history(
@@ -93,8 +112,8 @@ def history(
     Parameters
     ----------
     file : Path
-        CSV with a first column of times and columns "node 8 x", ...; or tracks of a film
-        (``*.nc``).
+        CSV with a first column of times and columns "node 8 x", ..., empty where a node was lost;
+        or tracks of a film (``*.nc``).
     nodes : sequence of int
     axis : {"x", "y", "z"}
     columns : sequence of str, optional
@@ -104,37 +123,27 @@ def history(
     **known
         Other arguments of `History`.
     """
-    numbers = _listed(file, nodes)
-    if file.suffix == ".nc":
-        tracks = _tracks(file, "time")
-        time, values = tracks["time"].values, _moved(file, tracks, numbers, [axis])[..., 0]
-    else:
-        headings = [f"node {n} {axis}" for n in numbers] if columns is None else list(columns)
-        if len(headings) != len(numbers):
-            raise InputError(f"columns: names {len(headings)} columns for {len(numbers)} nodes")
-        first = read_headings(file)[0][0]
-        wanted = {"time": (first, "s")} | {name: (name, "m") for name in headings}
-        table = read_numbers(file, wanted)
-        time, values = table["time"], np.stack([table[name] for name in headings], axis=1)
+    chosen = _listed(file, nodes)
+    time, values = _motions(file, chosen, axis, columns)
     if window is not None:
-        chosen = (time >= window[0]) & (time <= window[1])
-        if chosen.sum() < 2:
+        first, last = _range("window", window, "times (s)")
+        within = (time >= first) & (time <= last)
+        if within.sum() < 2:
             raise InputError(
-                f"{file}: window = {show(list(window))}: holds {chosen.sum()} of the times "
+                f"{file}: window = {show(list(window))}: holds {within.sum()} of the times "
                 f"{time[0]:.6g} to {time[-1]:.6g} s"
             )
-        time, values = time[chosen], values[chosen]
-    try:
-        return History(nodes=numbers, time=time, values=values, axis=axis, **known)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
+        time, values = time[within], values[within]
+    return _made(History, file, nodes=chosen, time=time, values=values, axis=axis, **known)
 
 
-def spectrum(file: Path, band: Sequence[float], taper: str | None = None, **known: Any) -> Spectrum:
-    """Spectra of histories within a band (Hz); other arguments as for `history`."""
+def spectrum(
+    file: Path, band: Sequence[float] | None = None, taper: str | None = None, **known: Any
+) -> Spectrum:
+    """Spectra of histories within a band (Hz), which must be given; the rest as for `history`."""
+    chosen = _range("band", band, "frequencies (Hz)")
     detrend = known.pop("detrend", "constant")
-    first, last = band
-    return Spectrum.of(history(file, **known), (first, last), detrend, taper)
+    return Spectrum.of(history(file, **known), chosen, detrend, taper)
 
 
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
@@ -142,46 +151,105 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
 
     Columns displacement and force are forces on all nodes that supports move along the axis; a
     column load_factor makes shapes; a first column of times, histories of the nodes along the
-    axis, "node 8 x"; as do the tracks of a film, of all nodes that were seen.
+    axis, "node 8 x"; as do the tracks of a film, of all nodes that were seen. A node that was seen
+    once only shows no motion and is left out.
     """
-    if file.suffix == ".nc":
-        moved = _tracks(file, "time")["displacement"].sel(axis=axis)
-        seen = moved["node"].values[np.isfinite(moved.values).sum(axis=0) > 1]
-        return history(file, seen.tolist(), axis, **known)
-    headings = read_headings(file)
-    names = [name for name, _ in headings]
-    if "displacement" in names and "force" in names:
-        return force_displacement(file, nodes=IMPOSED, axis=axis, **known)
-    if "load_factor" in names:
-        return shapes(file, **known)
-    nodes = [
-        int(found[1]) for name in names if (found := re.fullmatch(rf"node (\d+) {axis}", name))
-    ]
-    if not nodes:
+    names = _names(file)
+    if "photo" in names:
         raise InputError(
-            f'{file}: the columns are {", ".join(names)}; needed are "displacement" and "force", '
-            f'or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
+            f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
+            'kind = "shapes", load_factor = [...]'
         )
-    return history(file, nodes, axis, **known)
+    if file.suffix == ".nc":
+        moved = _along(file, _tracks(file, "time")["displacement"], [axis])[..., 0]
+        nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
+        if not nodes:
+            raise InputError(f"{file}: no node was measured along {axis}; choose another axis")
+    elif "displacement" in names and "force" in names:
+        return force_displacement(file, nodes=IMPOSED, axis=axis, **known)
+    elif "load_factor" in names:
+        return shapes(file, **known)
+    else:
+        nodes = [node for node, other in _columns(names) if other == axis]
+        if not nodes:
+            raise InputError(
+                f'{file}: the columns are {some(names)}; needed are "displacement" and '
+                f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
+            )
+    counts = np.isfinite(_motions(file, nodes, axis)[1]).sum(axis=0)
+    shown = [node for node, count in zip(nodes, counts, strict=True) if count != 1]
+    return history(file, shown or nodes, axis, **known)
+
+
+def _names(file: Path) -> list[str]:
+    """Names of the columns of a CSV file, or of the dimensions of tracks."""
+    if file.suffix == ".nc":
+        return [str(name) for name in load_tracks(file).sizes]
+    return [name for name, _ in read_headings(file)]
+
+
+def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
+    """Nodes and axes of the columns "node 8 x", ..."""
+    found = [re.fullmatch(rf"node (\d+) ([{AXES}])", name) for name in names]
+    return [(int(one[1]), one[2]) for one in found if one]
+
+
+def _motions(
+    file: Path, nodes: Sequence[int], axis: str, columns: Sequence[str] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times, and displacements of nodes along an axis, shape (t, m)."""
+    names = _names(file)
+    if "photo" in names:
+        raise InputError(f'{file}: holds photographs, which have no times; use kind = "shapes"')
+    if file.suffix == ".nc":
+        moved = _along(file, _tracks(file, "time")["displacement"], [axis], nodes)
+        return moved["time"].values, moved.values[..., 0]
+    axis_number(f"{file}: axis", axis)
+    headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
+    if not _texts(headings) or len(headings) != len(nodes):
+        raise InputError(
+            f"columns = {show(columns)}: give a list of {len(nodes)} headings, one for each node"
+        )
+    fields = [f"node {n}" for n in nodes]
+    wanted = {"time": (names[0], "s")}
+    wanted |= {name: (heading, "m") for name, heading in zip(fields, headings, strict=True)}
+    table = read_numbers(file, wanted, gaps=fields)
+    return table["time"], np.stack([table[name] for name in fields], axis=1)
 
 
 def _shapes_of_tracks(
     file: Path, nodes: Any, load_factor: Sequence[float] | None, **known: Any
 ) -> Shapes:
-    tracks = _tracks(file, "photo")
-    numbers = tracks["node"].values.tolist() if nodes is None else _listed(file, nodes)
-    if load_factor is None or len(load_factor) != tracks.sizes["photo"]:
+    moved = _tracks(file, "photo")["displacement"] if file.suffix == ".nc" else _table(file)
+    count = moved.sizes["photo"]
+    if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(
-            f"{file}: load_factor: give the load factor of each of its {tracks.sizes['photo']} "
-            "photographs"
+            f"{file}: load_factor: give the load factor of each of its {count} photographs"
         )
-    axes = [str(axis) for axis in tracks["axis"].values]
-    values = _moved(file, tracks, numbers, axes)
-    seen = [k for k in range(len(axes)) if np.isfinite(values[..., k]).any()]
-    kept = "".join(axes[k] for k in seen)
-    return Shapes(
-        nodes=numbers, load_factor=load_factor, values=values[..., seen], axes=kept, **known
-    )
+    moved = moved.dropna("node", how="all")
+    if not moved.size:
+        raise InputError(f"{file}: no node was measured in any photograph")
+    chosen = None if nodes is None else _listed(file, nodes)
+    moved = _along(file, moved, moved["axis"].values.tolist(), chosen).dropna("axis", how="all")
+    return _made(
+        Shapes, file, nodes=moved["node"].values.tolist(), load_factor=load_factor,
+        values=moved.values, axes="".join(moved["axis"].values), **known,
+    )  # fmt: skip
+
+
+def _table(file: Path) -> xr.DataArray:
+    """Displacements in a CSV file with a line for each photograph, as tracks have them."""
+    columns = _columns(_names(file))
+    if not columns:
+        raise InputError(f'{file}: has no columns "node 8 x", ... of displacements')
+    headings = [f"node {node} {axis}" for node, axis in columns]
+    table = read_numbers(file, {name: (name, "m") for name in headings}, gaps=headings)
+    nodes = sorted({node for node, _ in columns})
+    values = np.full((len(table[headings[0]]), len(nodes), len(AXES)), np.nan)
+    for heading, (node, axis) in zip(headings, columns, strict=True):
+        values[:, nodes.index(node), AXES.index(axis)] = table[heading]
+    axes = {"node": nodes, "axis": list(AXES)}
+    return xr.DataArray(values, axes, ("photo", "node", "axis"))
 
 
 def _tracks(file: Path, along: str) -> Any:
@@ -194,23 +262,46 @@ def _tracks(file: Path, along: str) -> Any:
     return tracks
 
 
-def _moved(
-    file: Path, tracks: Any, nodes: Sequence[int], axes: Sequence[str]
-) -> NDArray[np.float64]:
-    """Displacements of nodes along axes, shape (times or photographs, m, a)."""
-    missing = sorted(set(nodes) - set(tracks["node"].values.tolist()))
+def _along(
+    file: Path, moved: xr.DataArray, axes: Sequence[str], nodes: Sequence[int] | None = None
+) -> xr.DataArray:
+    """Displacements in tracks of nodes, all by default, along axes."""
+    for axis in axes:
+        axis_number(f"{file}: axis", axis)
+    known = moved["node"].values.tolist()
+    missing = sorted(set(nodes or ()) - set(known))
     if missing:
         raise InputError(f"{file}: node {missing[0]} was not tracked")
-    return tracks["displacement"].sel(node=list(nodes), axis=list(axes)).values
+    return moved.sel(node=known if nodes is None else list(nodes), axis=list(axes))
 
 
 def _listed(file: Path, nodes: Any) -> list[int]:
     """Numbers of nodes: a file knows nothing of a pattern, so that no expression can be read."""
-    if isinstance(nodes, int) and not isinstance(nodes, bool):
-        return [nodes]
-    if not isinstance(nodes, Sequence) or isinstance(nodes, str) or not nodes:
+    chosen = check_nodes(nodes) if np.size(nodes) else ""
+    if isinstance(chosen, str):
         raise InputError(f"nodes = {show(nodes)}: give the numbers of the nodes in {file.name}")
-    return list(nodes)
+    return list(chosen)
+
+
+def _texts(given: Any) -> bool:
+    """Whether this is a list of texts."""
+    return isinstance(given, list | tuple) and all(isinstance(one, str) for one in given)
+
+
+def _range(name: str, given: Any, what: str) -> tuple[float, float]:
+    """Two increasing numbers."""
+    pair = isinstance(given, list | tuple) and len(given) == 2
+    if not pair or not numbers(name, given)[0] < given[1]:
+        raise InputError(f"{name} = {show(given)}: give two {what}, as in [2, 30]")
+    return given[0], given[1]
+
+
+def _made(kind: Any, file: Path, **known: Any) -> Any:
+    """A measurement; what is wrong with it is told with the file."""
+    try:
+        return kind(**known)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
 
 
 READERS: Mapping[str, Any] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -12,12 +13,14 @@ from scipy.interpolate import CubicSpline
 
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import numbers, show
+from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.measurement import Measurement, axis_number, column
 from foldyn.signals import sampling_interval, spectrum
 
 DETRENDS = (None, "constant", "linear")
+REFINED = 8
+"""Steps by which the best place in time is refined: they converge quadratically."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,6 +36,9 @@ class History(Measurement):
     axis : {"x", "y", "z"}
     delay : float
         Time of the model minus that of the measurement (s).
+    align : float
+        How far (s) the model may be moved beyond `delay`, to where the misfit is least: the instant
+        of a release is rarely known to a part of a frame. Not moved by default.
     detrend : {None, "constant", "linear"}
         What is taken off the misfit: nothing, its mean, or the straight line of best fit. The mean
         where the zero of the measured displacements means nothing.
@@ -42,6 +48,7 @@ class History(Measurement):
     values: Any = ()
     axis: str = "x"
     delay: float = 0.0
+    align: float = 0.0
     detrend: str | None = None
     kind: ClassVar[str] = "history"
     analysis: ClassVar[str] = "dynamics"
@@ -50,6 +57,7 @@ class History(Measurement):
         """Check the arguments."""
         super().__post_init__()
         axis_number(self._of("axis"), self.axis)
+        number(self._of("align"), self.align, least=0.0)
         time = column(self._of("time"), self.time)
         if len(time) < 2 or not (np.diff(time) > 0.0).all():
             raise InputError(f"{self._of('time')}: must be at least two increasing times (s)")
@@ -73,7 +81,9 @@ class History(Measurement):
     def _refuse_constant(self, node: int) -> None:
         """Refuse a history that says nothing of a motion."""
         seen = self.values[:, node][np.isfinite(self.values[:, node])]
-        which = f"{self._of('values')}: column {node}"
+        named = np.ravel(self.nodes)
+        one = f"node {named[node]}" if len(named) == self.values.shape[1] else f"column {node}"
+        which = f"{self._of('values')}: {one}"
         if seen.size < 2:
             raise InputError(f"{which} has {seen.size} values that are numbers; give at least two")
         if np.ptp(seen) == 0.0:
@@ -93,11 +103,30 @@ class History(Measurement):
             raise InputError(
                 f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
             )
-        _within(self._of("time"), self.time + self.delay, arguments)
+        early, late = self.time[0] + self.delay, self.time[-1] + self.delay
+        _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
     def curves(self, result: Any, case: Case) -> NDArray[np.float64]:
         """What a motion says at the measured times, shape (t, m), nothing taken off."""
-        return _sampled(result, self.where(case), self.axis, self.time + self.delay)
+        return self._along(result, case)(self.time + self.delay + self.shift(result, case))
+
+    def shift(self, result: Any, case: Case) -> float:
+        """How far (s) the model is moved, beyond `delay` and at most by `align`, to fit best."""
+        if self.align == 0.0:
+            return 0.0
+        along, there, observed = self._along(result, case), self.time + self.delay, self.observed()
+        speed = along.derivative()
+
+        def misfit(by: float) -> NDArray[np.float64]:
+            return self._reduced(along(there + by)) - observed
+
+        step = 0.25 * float(np.diff(self.time).min())
+        tried = np.linspace(-self.align, self.align, 2 * math.ceil(self.align / step) + 1)
+        by = float(tried[np.argmin([float(r @ r) for r in map(misfit, tried)])])
+        for _ in range(REFINED):  # Gauss and Newton's steps, from a place that is close
+            slope = self._reduced(speed(there + by))
+            by = float(np.clip(by - slope @ misfit(by) / (slope @ slope), *tried[[0, -1]]))
+        return by
 
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
         """See `Measurement`."""
@@ -114,6 +143,9 @@ class History(Measurement):
             line = np.polynomial.Polynomial.fit(self.time[seen], curve[seen], degree)
             lines.append(line(self.time))
         return np.stack(lines, axis=1)
+
+    def _along(self, result: Any, case: Case) -> CubicSpline:
+        return _spline(result, self.where(case), self.axis)
 
     def _reduced(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
         """Curves where the nodes were seen, with the trend taken off, flat: node after node."""
@@ -216,7 +248,7 @@ class Spectrum(Measurement):
 
     def spectra(self, result: Any, case: Case) -> NDArray[np.float64]:
         """Amplitudes of the model at the measured frequencies, shape (f, m)."""
-        along = _sampled(result, self.where(case), self.axis, self.time)
+        along = _spline(result, self.where(case), self.axis)(self.time)
         step = sampling_interval(self.time)
         frequency, amplitude = spectrum(along, step, window=self.taper, detrend=self.detrend)
         return np.stack([np.interp(self.frequency, frequency, one) for one in amplitude.T], axis=1)
@@ -226,12 +258,10 @@ class Spectrum(Measurement):
         return self.spectra(result, case).T.ravel()
 
 
-def _sampled(
-    result: Any, nodes: NDArray[np.int64], axis: str, time: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Displacement of nodes along an axis at other times than a motion's samples."""
+def _spline(result: Any, nodes: NDArray[np.int64], axis: str) -> CubicSpline:
+    """Displacement of nodes along an axis between a motion's samples."""
     along = result["displacement"].values[:, nodes, AXES.index(axis)]
-    return CubicSpline(result["time"].values, along)(time)
+    return CubicSpline(result["time"].values, along)
 
 
 def _within(name: str, times: NDArray[np.float64], arguments: Mapping[str, Any]) -> None:

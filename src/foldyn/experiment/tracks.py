@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,15 +11,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.corners import CornerSettings, find_corners
-from foldyn.experiment.films import Film, open_film, read_photo
+from foldyn.experiment.films import Film, checked_box, open_film, read_photo
 from foldyn.experiment.follow import FollowSettings, Step, follow
 from foldyn.experiment.guide import guide_of
 from foldyn.experiment.matching import Match, Placing, match_nodes
 from foldyn.experiment.models import Model
+from foldyn.experiment.opencv import opencv
 
 Tell = Callable[[int], None]
+
+_WHOLE = 0.95  # share of the frames told that a whole film has at least
 
 
 @dataclass(frozen=True)
@@ -78,13 +82,19 @@ def track_film(
     Raises
     ------
     InputError
-        No corners, a model that does not fit them, or fewer points than the nodes asked for.
+        No corners, a model that does not fit them, fewer points than the nodes asked for, or a film
+        of one frame.
+
+    Warns
+    -----
+    FoldynWarning
+        The film breaks off before the end that it tells.
     """
     how = tracking or Tracking()
     film = film if isinstance(film, Film) else open_film(film)
     how = replace(how, placing=_centered(how.placing, film.size, film.box))
     first = next(film.frames())[1]
-    reach = how.corners.reach_in(first.shape)
+    reach = _reach(how, first.shape)
     corners = find_corners(first, how.corners, f"{film.path}, first frame")
     match: Match | None = None
     unseen = np.zeros(len(corners), bool)
@@ -102,6 +112,7 @@ def track_film(
         steps.append(step)
         if tell is not None:
             tell(number + 1)
+    _check_length(film, len(steps))
     last = keep[0]
     if model is not None and match is None:
         place = f"{film.path}, last frame"
@@ -151,7 +162,8 @@ def track_photos(
     Raises
     ------
     InputError
-        One photograph alone, no corners, a model that does not fit.
+        One photograph alone, photographs of several sizes, no corners, a model that does not
+        fit.
     """
     how = tracking or Tracking()
     if len(paths) < 2:
@@ -162,10 +174,19 @@ def track_photos(
     if loads is not None and np.shape(loads) != (len(paths),):
         raise InputError(f"--loads: {np.size(loads)} loads for {len(paths)} photographs")
     whole = read_photo(paths[0])
-    how = replace(how, placing=_centered(how.placing, whole.shape[::-1], roi or (0, 0, 0, 0)))
+    x, y, width, height = box = checked_box(roi, *whole.shape[::-1])
+    _reach(how, (height, width))
+    how = replace(how, placing=_centered(how.placing, whole.shape[::-1], box))
     steps, matches = [], []
     for number, path in enumerate(paths):
-        photo = read_photo(path, roi)
+        photo = read_photo(path)
+        if photo.shape != whole.shape:
+            sizes = [f"{one.shape[1]} x {one.shape[0]}" for one in (photo, whole)]
+            raise InputError(
+                f"{path}: is of {sizes[0]} pixels, {paths[0]} of {sizes[1]}: the camera must not "
+                "move between photographs; give all uncut, of one size"
+            )
+        photo = np.ascontiguousarray(photo[y : y + height, x : x + width])
         corners = find_corners(photo, how.corners, str(path))
         match = _matched(photo, corners, model, how, str(path))
         position = np.full((model.vertices, 2), np.nan)
@@ -176,16 +197,43 @@ def track_photos(
         matches.append(match)
         if tell is not None:
             tell(number + 1)
-    origin = np.zeros(2) if roi is None else np.array(roi[:2], dtype=np.float64)
-    ds = _dataset(steps, origin, np.arange(model.vertices)).rename(time="photo")
+    ds = _dataset(steps, np.array([x, y], dtype=np.float64), np.arange(model.vertices)).rename(
+        time="photo"
+    )
     ds = ds.drop_vars(["repeated", "error_px"])
     ds["photo"] = ("photo", np.arange(len(steps)))
     if loads is not None:
         ds = ds.assign_coords(load=("photo", np.asarray(loads, dtype=np.float64), {"units": "N"}))
     ds.attrs |= {"source": ", ".join(str(getattr(path, "name", path)) for path in paths)}
-    size = whole.shape[::-1]
-    ds.attrs |= {"size": np.array(size), "roi": np.array(roi or (0, 0, *size))}
+    ds.attrs |= {"size": np.array(whole.shape[::-1]), "roi": np.array(box)}
     return _in_metres(ds, model, matches, how)
+
+
+def _reach(how: Tracking, shape: tuple[int, ...]) -> float:
+    """Length of the edges that make a corner (pixels); one that is given must fit the picture."""
+    reach, most = how.corners.reach_in(shape), 0.25 * min(shape)
+    if how.corners.reach is not None and reach > most:
+        raise InputError(
+            f"--reach {reach:g}: at most {most:g} pixels, a quarter of the picture, are possible; "
+            "about a quarter of the distance between corners is right"
+        )
+    return reach
+
+
+def _check_length(film: Film, frames: int) -> None:
+    """Refuse a film of one frame, and warn of one that breaks off."""
+    if frames < 2:
+        raise InputError(f"{film.path}: one frame alone shows no motion; give a longer film")
+    cv2 = opencv()
+    file = cv2.VideoCapture(str(film.path))
+    told = file.get(cv2.CAP_PROP_FRAME_COUNT)  # often the rate times the duration: an estimate
+    file.release()
+    if frames < _WHOLE * told:
+        message = (
+            f"{film.path}: breaks off: {frames} frames can be read, it should have {told:.0f}; "
+            "the tracks end there. Copy it from the camera again"
+        )
+        warnings.warn(message, FoldynWarning, stacklevel=3)
 
 
 def _centered(placing: Placing, size: tuple[int, ...], box: tuple[int, ...]) -> Placing:

@@ -65,6 +65,18 @@ BAND = (2.0, 40.0)  # Hz, in which spectra are compared
 TURNED = 0.05  # s after the release, at the first turning point
 SEEN = 0.6  # s of the free vibration, in which it dies away
 STEP = 0.001  # s, of the simulation
+BOTTOM = list(range(56, 63))
+SUPPORTS: Mapping[str, list[dict[str, Any]]] = {
+    "plate": [
+        {"nodes": BOTTOM, "axes": "x"},
+        {"nodes": [59], "axes": "y"},
+        {"nodes": [57, 59, 61], "axes": "z"},
+    ],
+    "glued": [{"nodes": BOTTOM, "axes": "x"}, {"nodes": [59], "axes": "yz"}],
+    "glue alone": [{"nodes": [59], "axes": "xyz"}],
+}
+"""How the bottom is held: by a smooth plate (the static test's, ideal); on the plate with node 59
+glued to it, as the paper's text has it; by the glue alone, as if there were no plate."""
 PRESSED = 0.005
 """How far the top is pressed before the release (m).
 
@@ -86,12 +98,12 @@ def force_on_top(path: Any) -> NDArray[np.float64]:
     return path["reaction"].values[:, top].sum(axis=1)
 
 
-def weighed() -> NDArray[np.float64]:
-    """Load factors at which the paper's specimen carries the three weights."""
+def weighed(changes: Mapping[str, Any] | None = None) -> NDArray[np.float64]:
+    """Load factors at which the specimen carries the three weights."""
     factors = np.linspace(0.0, 1.0, 29)
-    found = np.interp(WEIGHTS, force_on_top(pressed(factors)), factors)
+    found = np.interp(WEIGHTS, force_on_top(pressed(factors, changes)), factors)
     for _ in range(3):  # secants
-        near = force_on_top(pressed(np.sort([*found, *(found + 1e-3)])))
+        near = force_on_top(pressed(np.sort([*found, *(found + 1e-3)]), changes))
         slope = (near[1::2] - near[::2]) / 1e-3
         found = found - (near[::2] - WEIGHTS) / slope
     return found
@@ -115,9 +127,16 @@ def static_data() -> list[Measurement]:
 
 
 def released_case(
-    folder: Path, changes: Mapping[str, Any] | None = None, step: float = STEP
+    folder: Path,
+    changes: Mapping[str, Any] | None = None,
+    step: float = STEP,
+    press: float = PRESSED,
+    support: str = "plate",
+    duration: float = SEEN,
 ) -> Path:
-    """Case file of the free vibration after the top was pressed down by `PRESSED`.
+    """Case file of the free vibration after the top was pressed down.
+
+    It starts from the equilibrium, on the smooth plate, under that displacement of the top.
 
     Parameters
     ----------
@@ -127,19 +146,26 @@ def released_case(
         Values of the static calibration, by key.
     step : float
         Of the simulation (s).
+    press : float
+        Displacement of the top (m).
+    support : str
+        One of `SUPPORTS`.
+    duration : float
+        Of the motion (s).
     """
-    save(pressed([PRESSED / FULL], changes), folder / "pressed.nc")
+    save(pressed([press / FULL], changes), folder / "pressed.nc")
     document = replaced(read_document(find_case("herkal/specimen-release")), changes or {})
     del document["loads"]
     document |= {
         "title": "The paper specimen released",
+        "supports": SUPPORTS[support],
         "initial": {"file": "pressed.nc"},
         "damping": {"alpha": DAMPING["damping.alpha"], "beta": DAMPING["damping.beta"]},
         "analysis": {
             "kind": "dynamics",
             "method": "generalized_alpha",
             "dt": step,
-            "duration": SEEN,
+            "duration": duration,
         },
         "output": {"nodes": [WATCHED], "axis": "x", "every": step},
     }
@@ -176,10 +202,14 @@ def noisy(data: Sequence[Measurement], draw: np.random.Generator) -> list[Measur
     return result
 
 
-def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, float]:
-    """Frequency (Hz) and damping ratio of the strongest decaying cosine between 7 and 12 Hz."""
+def peak(
+    values: NDArray[np.float64],
+    step: float = 1.0 / RATE,
+    band: tuple[float, float] = (7.0, 12.0),
+) -> tuple[float, float]:
+    """Frequency (Hz) and damping ratio of the strongest decaying cosine within a band (Hz)."""
     found = matrix_pencil(values, step)
-    near = (found.damped_frequency > 7.0) & (found.damped_frequency < 12.0)
+    near = (found.damped_frequency > band[0]) & (found.damped_frequency < band[1])
     best = int(np.argmax(np.where(near, found.amplitude, 0.0)))
     return float(found.damped_frequency[best]), float(found.damping_ratio[best])
 
@@ -212,19 +242,35 @@ def calibrate(
     draw = np.random.default_rng(seed)
     if static is None:
         static = noisy(static_data(), draw)
-    folds = fit(
-        find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, folder=kept, **how
-    )
+    folds = fit_folds(static, folder=kept, **how)
     if film is None:
         film = noisy(release_data(released_case(_made(folder / "truth"))), draw)
-    found = folds.problem.space.changes([*folds.values.values()])
-    model = released_case(_made(folder / "fitted"), found)
-    spectra = [
+    model = released_case(_made(folder / "fitted"), changes_of(folds))
+    return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept, **how)
+
+
+def fit_folds(static: Sequence[Measurement], **how: Any) -> Fit:
+    """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
+    return fit(find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **how)
+
+
+def changes_of(folds: Fit) -> dict[str, Any]:
+    """What a fit of the folds changes in a case file, by key."""
+    return folds.problem.space.changes([*folds.values.values()])
+
+
+def fit_damping(case: Path, film: Sequence[Measurement], **how: Any) -> Fit:
+    """Fit alpha and beta to a release."""
+    return fit(case, film, DAMPING_RANGES, **how)
+
+
+def spectra_of(film: Sequence[Measurement]) -> list[Spectrum]:
+    """Spectra of the histories in which no sample is missing, held out."""
+    return [
         Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
         for one in film
         if isinstance(one, History) and np.isfinite(one.values).all()
     ]
-    return folds, fit(model, [*film, *spectra], DAMPING_RANGES, folder=kept, **how)
 
 
 def _made(folder: Path) -> Path:

@@ -16,7 +16,8 @@ from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import best
 from foldyn.studies.herkal.models import MODELS, REFERENCE, label, model_of
 from foldyn.studies.herkal.second_shell import second_table
-from foldyn.studies.herkal.study import FULL, Study, mean_ranks
+from foldyn.studies.herkal.specimen import page as specimen_page
+from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks
 from foldyn.studies.herkal.variations import Variations, likeness, rank_correlation
 from foldyn.studies.targets import Verdict
 
@@ -36,6 +37,8 @@ def write(study: Study) -> Path:
         sections += sensitivity_page.sections(varied, album, tolerance())
     for case in study.plan.cases:
         sections += case_page.sections(study, case, album)
+    if study.data is not None:
+        sections += specimen_page.sections(study.folder / RESULTS, study.parts[1], album)
     sections += [Heading("How it was computed"), Text(_how(study))]
     return write_report(study.folder / "report.html", TITLE, sections)
 

@@ -18,6 +18,9 @@ from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of,
 from foldyn.studies.herkal.partners import Partners, partners
 from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, stored
+from foldyn.studies.herkal.specimen.measured import Data
+from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
+from foldyn.studies.herkal.specimen.tasks import Part, parts
 
 if TYPE_CHECKING:
     import xarray
@@ -37,11 +40,14 @@ class Plan:
     cases : tuple of str
     models : tuple of str
         Without the reference, which is always there.
+    shot : Shot
+        How the synthetic film of the specimen is taken.
     """
 
     numerics: Numerics = field(default_factory=Numerics)
     cases: tuple[str, ...] = CASES
     models: tuple[str, ...] = field(default_factory=rules)
+    shot: Shot = PAPERS
 
     def jobs(self) -> list[Job]:
         """All computations, the longest first."""
@@ -66,7 +72,7 @@ class Plan:
 
 
 FULL = Plan()
-QUICK = Plan(Numerics(divisions=8, dt=0.01))
+QUICK = Plan(Numerics(divisions=8, dt=0.01), shot=COARSE)
 VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
 
 
@@ -79,10 +85,23 @@ class Study:
     plan : Plan
     folder : Path
         Of the study; results are in its folder `runs`.
+    data : Data or None
+        What was measured of the specimen; None leaves it out.
     """
 
     plan: Plan
     folder: Path
+    data: Data | None = None
+
+    @property
+    def parts(self) -> tuple[list[Part], list[Part]]:
+        """Computations of the specimen: those that need nothing else, and those after them."""
+        return ([], []) if self.data is None else parts(self.plan.shot, self.data)
+
+    @property
+    def count(self) -> int:
+        """Number of computations."""
+        return len(self.plan.jobs()) + sum(map(len, self.parts))
 
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
@@ -90,7 +109,9 @@ class Study:
         """Compute what is not there yet; see `foldyn.studies.herkal.pool.run`."""
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
-        return run(self.plan.jobs(), results, tell, processes)
+        first, then = self.parts
+        ended = run([*first, *self.plan.jobs()], results, tell, processes)
+        return ended + run(then, results, tell, processes=1)
 
     @cached_property
     def _read(self) -> dict[Job, xarray.Dataset | None]:

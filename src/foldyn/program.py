@@ -1,0 +1,42 @@
+"""Which program computes: a digest of the sources that results depend on.
+
+What is kept to go on with later is known by it, so that what another program computed is not taken.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+COMPUTING = (
+    "patterns", "materials", "mechanics", "structures", "shells", "cases", "statics", "dynamics",
+    "linear", "signals",
+)  # fmt: skip
+"""Folders of the package whose changes make stored results outdated."""
+
+
+@cache
+def program(*more: str) -> str:
+    """Digest of the program, "1f0c6a2b9d3e4f58".
+
+    Parameters
+    ----------
+    *more : str
+        Further files and folders of the package on which a result depends.
+    """
+    return digest(Path(__file__).parent, *more)
+
+
+def digest(package: Path, *more: str) -> str:
+    """Digest of the sources of a package that compute."""
+    sources = [path for part in (*COMPUTING, *more) for path in _sources(package / part)]
+    found = hashlib.sha256()
+    for path in sorted(sources):
+        found.update(path.relative_to(package).as_posix().encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def _sources(part: Path) -> list[Path]:
+    return [part] if part.is_file() else list(part.rglob("*.py"))

@@ -1,0 +1,210 @@
+"""From what was measured of the specimen to its parameters, and back to what the model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
+
+from foldyn.cases.reading import case_of_document, read_document
+from foldyn.dynamics import initial_state, simulate
+from foldyn.errors import InputError
+from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
+from foldyn.experiment.key_paths import replaced
+from foldyn.results import load
+from foldyn.studies.herkal import calibration
+from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
+from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
+
+FILM_SUPPORT = "glued"
+FACTORS = np.linspace(0.0, 1.0, 29)  # of the path on which measured shapes are sought
+
+
+def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float64]) -> float:
+    """Where on a path nodes have moved along x as they were measured to.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        Of `foldyn.studies.herkal.calibration.pressed`.
+    nodes : sequence of int
+    moved : ndarray, shape (m,)
+        Displacement along x (m), NaN of nodes that were not seen.
+    """
+    known = np.isfinite(moved)
+    if not known.any():
+        raise InputError("no front node was measured; the displacement of the top is unknown")
+    there = [node for node, seen in zip(nodes, known, strict=True) if seen]
+    along = path["displacement"].sel(node=there, axis="x").values
+    shape = CubicSpline(path["load_factor"].values, along)
+
+    def misfit(factor: float) -> float:
+        return float(np.sum((shape(factor) - moved[known]) ** 2))
+
+    factors = path["load_factor"].values
+    near = int(np.argmin([misfit(f) for f in factors]))
+    span = factors[max(0, near - 1)], factors[min(len(factors) - 1, near + 1)]
+    return float(minimize_scalar(misfit, bounds=span, method="bounded", options={"xatol": 1e-9}).x)
+
+
+def static_test(photos: xr.Dataset, label: str) -> list[Measurement]:
+    """Forces over displacements of the top, and shapes of the front, from tracked photographs.
+
+    The straight edge of the top has no corners once it is loaded: its displacement is that of the
+    model's state in which the corners below fit best.
+
+    Parameters
+    ----------
+    photos : xarray.Dataset
+        Of `foldyn.experiment.track_photos`, with the coordinate `load` (N).
+    label : str
+        What the data are called.
+    """
+    if "load" not in photos.coords:
+        raise InputError("the tracks of photographs have no loads: track them with --loads")
+    loaded = photos.isel(photo=np.flatnonzero(photos["load"].values > 0.0))
+    moved = loaded["displacement"].sel(node=list(FRONT))
+    path = calibration.pressed(FACTORS)
+    factors = [load_factor(path, FRONT, along) for along in moved.sel(axis="x").values]
+    rms = np.asarray(photos.attrs["match_rms_px"]) * float(photos.attrs["metres_per_pixel"])
+    seen = np.isfinite(moved.values).any(axis=(0, 2))
+    return [
+        ForceDisplacement(
+            nodes=calibration.TOP, displacement=FULL * np.array(factors),
+            force=loaded["load"].values, sigma=calibration.FORCE_ERROR, name="weights", label=label,
+        ),
+        Shapes(
+            nodes=np.array(FRONT)[seen].tolist(), load_factor=factors, axes="xy",
+            values=moved.sel(axis=["x", "y"]).values[:, seen],
+            sigma=float(np.sqrt(np.mean(rms**2) / 2.0)), name="front corners", label=label,
+        ),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Released:
+    """A release as it was filmed, and the damping that was found in it.
+
+    Attributes
+    ----------
+    free : FreeVibration
+    press : float
+        Displacement of the top before the release (m).
+    cases : mapping of str to Path
+        Case files of the model with each support.
+    fits : mapping of str to Fit
+        Damping fitted with some of the supports.
+    """
+
+    free: FreeVibration
+    press: float
+    cases: Mapping[str, Path]
+    fits: Mapping[str, Fit]
+
+
+def fit_release(
+    measured: History,
+    models: Path,
+    changes: Mapping[str, Any],
+    step: float = calibration.STEP,
+    **how: Any,
+) -> Released:
+    """Fit the damping to node 8 alone, on the plate with node 59 glued and without the glue.
+
+    Parameters
+    ----------
+    measured : History
+        Of the tracked nodes along x, from before the release on.
+    models : Path
+        Gets the case files of the models, a folder for each support.
+    changes : mapping
+        What the static test has changed in the case, by key.
+    step : float
+        Of the simulations (s).
+    **how
+        Arguments of `foldyn.experiment.fit`.
+    """
+    free = prepare(measured)
+    path = calibration.pressed(FACTORS, changes)
+    front = np.where(np.isin(free.nodes, FRONT), free.before, np.nan)
+    press = FULL * load_factor(path, free.nodes, front)
+    duration = float(free.history.time[-1]) + 2.0 * free.history.align
+    cases = {
+        support: calibration.released_case(
+            _made(models / support.replace(" ", "-")), changes, step, press, support, duration
+        )
+        for support in SUPPORTS
+    }
+    others = [node for node in free.nodes if node in FRONT and node != WATCHED]
+    film = [free.of([WATCHED], "node 8")]
+    if others:
+        film.append(replace(free.of(others, "other front nodes"), held_out=True))
+    whole = [found for one in film if (found := free.whole_of(one)) is not None]
+    data = [*film, *calibration.spectra_of(whole)]
+    fits = {s: calibration.fit_damping(cases[s], data, **how) for s in (FILM_SUPPORT, "plate")}
+    return Released(free, press, cases, fits)
+
+
+def motions(released: Released) -> dict[str, xr.Dataset]:
+    """What the model does with every support; the damping is that of the film's where no other is.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+        Motions of `foldyn.simulate`.
+    """
+    found = {}
+    for support, case in released.cases.items():
+        damping = released.fits.get(support, released.fits[FILM_SUPPORT]).values
+        document = replaced(read_document(case), damping)
+        case.with_name("fitted.toml").write_text(tomli_w.dumps(document), encoding="utf-8")
+        case_file = case_of_document(case, document)
+        start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
+        motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
+        found[support] = motion
+    return found
+
+
+def compared(released: Released, motions: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Front nodes of the film and of the models at the same times, without trend.
+
+    Returns
+    -------
+    xarray.Dataset
+        `measured` (time, node), NaN where a node was lost, `whole` (time, node), short gaps
+        filled and NaN throughout where there are longer ones, and `model` (support, time, node), m.
+    """
+    front = [node for node in released.free.nodes if node in FRONT]
+    one = released.free.of(front, "front nodes")
+    curves = []
+    for support, motion in motions.items():
+        case = case_of_document(*_read(released.cases[support])).case()
+        curve = one.curves(motion, case)
+        curves.append(curve - one.trend(curve))
+    places = [released.free.nodes.index(node) for node in front]
+    whole, line = released.free.whole[:, places], one.trend(one.values)
+    return xr.Dataset(
+        {
+            "whole": (("time", "node"), whole - line, {"units": "m"}),
+            "measured": (("time", "node"), one.values - line, {"units": "m"}),
+            "model": (("support", "time", "node"), np.array(curves), {"units": "m"}),
+        },
+        {"time": ("time", one.time, {"units": "s"}), "node": front, "support": list(motions)},
+    )
+
+
+def _read(case: Path) -> tuple[Path, dict[str, Any]]:
+    return case, read_document(case)
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,331 @@
+"""Sections of the study's page on the specimen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from foldyn import plots
+from foldyn.errors import InputError
+from foldyn.linear import character, peaks_of
+from foldyn.report import Heading, Picture, Section, Table, Text
+from foldyn.report.album import Album
+from foldyn.results import case_of, load, netcdf
+from foldyn.signals import log_decrement, sampling_interval
+from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED, peak
+from foldyn.studies.herkal.case_page import NO_BREAK
+from foldyn.studies.herkal.metric import deviation
+from foldyn.studies.herkal.specimen import figures, synthetic, tasks
+from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
+from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES, content
+from foldyn.studies.herkal.specimen.measured import Data
+from foldyn.studies.herkal.specimen.tasks import Part
+from foldyn.studies.targets import Target, read_targets
+
+TITLE = "The paper specimen: from photographs and a film to a calibrated model"
+TARGETS = Path(__file__).parents[1] / "targets.toml"
+NEAR = (4.0, 14.0)  # Hz, where the axial vibration is sought
+CORNER = 0  # top node at which the frequency response is read
+HIGHEST = 22.0  # Hz, of the peaks in the table
+SYMBOLS = {
+    "sheet.length_scale_ratio": "length-scale ratio",
+    "model.fold_law.theta1": "theta1 (degrees)",
+    "damping.alpha": "alpha (1/s)",
+    "damping.beta": "beta (s)",
+}
+
+
+def sections(folder: Path, parts: Sequence[Part], album: Album) -> list[Section]:
+    """What has been computed of the specimen; nothing where nothing has.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    parts : sequence of Part
+        The fit, and the response after it.
+    album : Album
+        Gets the figures.
+    """
+    fit, response = parts
+    if not fit.there(folder):
+        return []
+    inside, data, note = folder / tasks.FOLDER, fit.data, fit.note
+    found = tasks.read_found(inside)
+    told: list[Section] = [Heading(TITLE), Text(_opening(data))]
+    if "folds" in found:
+        told += _static(inside, found, data)
+    if "damping" in found:
+        told += _release(inside, found, data, album, note)
+    if response.there(folder):
+        told += _vibration(inside, album, note)
+    return told
+
+
+def _opening(data: Data) -> str:
+    if not data.synthetic:
+        named = [f"{what}: {file.name}" for what, file in data.files.items()]
+        return f"Measured data were given. {'; '.join(named)}."
+    return (
+        "The paper's raw data are not public. Everything in this part is SYNTHETIC: photographs "
+        "and a film that Foldyn rendered of a simulated sheet with the paper's parameters. So that "
+        "the model that is fitted is wrong, as models are, that sheet is 3 % softer than the "
+        "model's, has a consistent mass where the model has circumcenter masses, and creeps: "
+        f"{synthetic.CREEP:.0%} of its displacement returns with a time constant of "
+        f"{synthetic.CREEP_TIME:g} s. Lens, blur and noise are a camera's. What comes out shows "
+        "how well the method works, and nothing about the paper's sheet. A film, its tracks, or "
+        "tables of one's own take its place: foldyn study herkal --data FILE ..."
+    )
+
+
+# ---------------------------------------------------------------------- static test
+def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
+    parts: list[Section] = [Heading("Static test: the creases", 3)]
+    if data.synthetic:
+        parts.append(
+            Picture(
+                folder / "photograph.png",
+                "The synthetic photograph under 0.312 N, the nodes that were recognized, and the "
+                "model over it.",
+            )
+        )
+    weights = found["weights"]
+    rows = [[1e3 * u, f] for u, f in zip(weights["displacement"], weights["force"], strict=True)]
+    parts += [
+        Table(
+            ["displacement of the top (mm)", "weight (N)"], rows,
+            "What is fitted, with the shapes: displacements of the top, imposed on the model, and "
+            "the weights that its reaction must equal.",
+        ),
+        _estimates({"": found["folds"]}, FOLDS, data),
+        Picture(folder / "folds" / "data-0.png", "Forces, and the fitted model."),
+    ]  # fmt: skip
+    shapes = folder / "folds" / "data-1.png"
+    if shapes.is_file():
+        parts.append(
+            Picture(shapes, "Deformed shapes of the model over the corners in the photographs.")
+        )
+    if data.synthetic:
+        parts.append(
+            Text(
+                "The intervals know of noise only. That the sheet is softer than the model, which "
+                "the fit cannot know, goes into both numbers: they need not contain the truth."
+            )
+        )
+    return parts
+
+
+def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], data: Data) -> Table:
+    """Fitted parameters with their intervals, beside the paper's."""
+    rows = []
+    for name, fit in fits.items():
+        for one in fit["parameters"]:
+            first = [SUPPORT_NAMES[name]] if name else []
+            rows.append(
+                [*first, SYMBOLS[one["key"]], one["value"], one["lower"], one["upper"],
+                 truth[one["key"]], one["note"]]
+            )  # fmt: skip
+    beside = "paper, and truth here" if data.synthetic else "paper"
+    header = ["model stands on"] if any(fits) else []
+    header += ["parameter", "fitted", "95 % from", "to", beside, ""]
+    return Table(header, rows, "Fitted parameters.", digits=4)
+
+
+# ---------------------------------------------------------------------- release
+def _release(
+    folder: Path, found: dict[str, Any], data: Data, album: Album, note: str
+) -> list[Section]:
+    front = netcdf.read(folder / tasks.FRONT, "cannot be read as NetCDF")
+    parts: list[Section] = [Heading("Release: the damping", 3)]
+    if (folder / "film.png").is_file():
+        parts.append(
+            Picture(folder / "film.png", "The frame of the film in which the model was recognized.")
+        )
+    label = f"{data.label} film" if (folder / tasks.FILM).is_file() else data.label
+    parts += [
+        Picture(
+            folder / "steps.png",
+            f"Node {WATCHED} (the paper's node 9) as it is prepared: window, first turning point, "
+            "final position, trend.",
+        ),
+        Text(
+            f"Before the release the top stands {1e3 * found['press']:.2f} mm below its rest: that "
+            "much is imposed on the model, on the smooth plate, for the state from which it is "
+            f"released. Alpha and beta are fitted to node {WATCHED} along x alone; all other front "
+            "nodes are held out."
+        ),
+        _estimates(found["damping"], DAMPING, data),
+        album.figure(
+            "specimen-supports",
+            f"Node {WATCHED}: the film, and the model on three supports (left), and their spectra "
+            "(right). The model by the glue alone has the damping of the first.",
+            lambda: figures.plot_supports(front, label, note),
+        ),
+        _peaks(front, data),
+        Text(_glue(front)),
+        album.figure(
+            "specimen-front",
+            f"All front nodes that were tracked, the model on the {SUPPORT_NAMES[FILM_SUPPORT]}. "
+            f"Only node {WATCHED} was fitted.",
+            lambda: figures.plot_front(front, FILM_SUPPORT, label, note),
+        ),
+        album.figure(
+            "specimen-front-frequency",
+            "Their amplitude spectra. Nodes that were lost for long have none.",
+            lambda: figures.plot_front_content(front, FILM_SUPPORT, label, note),
+        ),
+        _agreement(front),
+    ]
+    return parts
+
+
+def vibration_of(x: np.ndarray, step: float) -> tuple[float, float, float]:
+    """Frequency (Hz) and damping ratio of the axial vibration, and that of its decrement."""
+    if not np.isfinite(x).all():
+        return math.nan, math.nan, math.nan
+    frequency, ratio = peak(x, step, NEAR)
+    try:
+        decrement = log_decrement(x, step, rest=0.0, frequency=frequency).damping_ratio
+    except InputError:  # fewer than two maxima
+        decrement = math.nan
+    return frequency, ratio, decrement
+
+
+def _peaks(front: xr.Dataset, data: Data) -> Table:
+    step = sampling_interval(front["time"].values)
+    curves = {f"{data.label}, filmed": front["whole"].sel(node=WATCHED).values}
+    for support, name in SUPPORT_NAMES.items():
+        curves[f"model: {name}"] = front["model"].sel(node=WATCHED, support=support).values
+    paper = _targets()
+    rows: list[list[Any]] = [
+        ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
+    ]
+    for name, x in curves.items():
+        frequency, ratio, decrement = vibration_of(x, step)
+        rows.append([name, *map(_cell, (frequency, 100.0 * ratio, 100.0 * decrement))])
+    return Table(
+        ["", "frequency (Hz)", "damping (%)", "damping by the decrement (%)"],
+        rows,
+        f"Vibration of node {WATCHED} along x: the strongest decaying cosine between {NEAR[0]:g} "
+        f"and {NEAR[1]:g} Hz, and the logarithmic decrement of the maxima, as the paper has it.",
+        digits=3,
+    )
+
+
+def _glue(front: xr.Dataset) -> str:
+    step = sampling_interval(front["time"].values)
+    held, alone = (
+        vibration_of(front["model"].sel(node=WATCHED, support=support).values, step)[0]
+        for support in (FILM_SUPPORT, "glue alone")
+    )
+    paper = _targets()["release_frequency"].value
+    return (
+        "The paper glued node 59 and let the specimen stand on the plate. Held at node 59 alone, "
+        "with nothing below the other nodes of the bottom, the model vibrates at "
+        f"{alone:.1f} Hz; with the row kept in x by the plate at {held:.1f} Hz, beside the paper's "
+        f"{paper:g} Hz. It is the plate that makes the frequency. Glue instead of a smooth plate "
+        "changes the damping that one finds, as the table above says: a wrong support is paid for "
+        "in alpha and beta."
+    )
+
+
+def _agreement(front: xr.Dataset) -> Table:
+    step = sampling_interval(front["time"].values)
+    shown = (FILM_SUPPORT, "plate")
+    rows = []
+    for node in front["node"].values.tolist():
+        film = front["measured"].sel(node=node).values
+        whole = front["whole"].sel(node=node).values
+        both = [front["model"].sel(node=node, support=support).values for support in shown]
+        rows.append(
+            [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
+             *[100.0 * _misfit(film, x) for x in both],
+             *[_cell(100.0 * _content_misfit(whole, x, step)) for x in both]]
+        )  # fmt: skip
+    return Table(
+        ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
+         "frequency: ideal (%)"],
+        rows,
+        "Misfit of the front nodes, as a part of what was measured (root mean squares), over time "
+        f"and of the amplitude spectra up to {BAND[1]:g} Hz: on the plate with node 59 glued, and "
+        "on the plate alone (ideal), each with its own damping.",
+        digits=3,
+    )  # fmt: skip
+
+
+def _misfit(film: np.ndarray, model: np.ndarray) -> float:
+    known = np.isfinite(film)
+    return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
+
+
+def _content_misfit(film: np.ndarray, model: np.ndarray, step: float) -> float:
+    """The paper's metric; nan where the node was lost for long."""
+    measured, said = content(film, step), content(model, step)
+    if measured is None or said is None:
+        return math.nan
+    return float(deviation(said[1][:, None], measured[1][:, None])[0])
+
+
+# ---------------------------------------------------------------------- vibration
+def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
+    responses = {name: load(folder / file) for name, file in tasks.RESPONSES.items()}
+    labels = {"published": "the paper's parameters", "fitted": "fitted parameters"}
+    paper = _targets()
+    peaks = [paper[f"frf_{which}_peak"].value for which in ("first", "second", "third")]
+    modes = load(folder / tasks.MODES)
+    named = character(modes, "x")
+    shown = [k + 1 for k in range(min(6, modes.sizes["mode"]))]
+    return [
+        Heading("Frequency response and modes", 3),
+        album.figure(
+            "specimen-response",
+            "Response of a corner of the top to a sine of 1 mN on each of its nodes.",
+            lambda: figures.plot_responses(
+                {labels[name]: one for name, one in responses.items()}, CORNER, peaks, note
+            ),
+        ),
+        _response_table(responses, paper),
+        album.figure(
+            "specimen-modes",
+            "Modes of the model with the fitted folds. "
+            + "; ".join(f"{k}: {named['name'].values[k - 1]}" for k in shown)
+            + ".",
+            lambda: plots.draw_modes(case_of(modes), modes, shown, title=note),
+        ),
+    ]
+
+
+def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Target]) -> Table:
+    found = {
+        name: [p for p in peaks_of(one, CORNER, "x", prominence=0.02) if p.frequency < HIGHEST]
+        for name, one in responses.items()
+    }
+    rows: list[list[Any]] = []
+    for k, which in enumerate(("first", "second", "third")):
+        target = paper[f"frf_{which}_peak"]
+        row: list[Any] = [f"{target.what} (Hz)", target.value]
+        rows.append(row + [p[k].frequency if k < len(p) else None for p in found.values()])
+    for k, which in ((1, "second"), (2, "third")):
+        target = paper[f"half_power_{which}"]
+        row = [f"{target.what} (%)", target.value]
+        rows.append(
+            row + [_cell(100.0 * p[k].textbook) if k < len(p) else None for p in found.values()]
+        )
+    return Table(
+        ["", "paper", "the paper's parameters, here", "fitted parameters"], rows,
+        "Peaks of the response, and damping by the half-power points as the paper has it.",
+        digits=3,
+    )  # fmt: skip
+
+
+def _targets() -> Mapping[str, Target]:
+    return read_targets(TARGETS, "specimen")
+
+
+def _cell(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,175 @@
+"""From tracked histories to the free vibration that a model is held against.
+
+The steps are the paper's: the window, the start at the first turning point, the final position
+taken off, and the trend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.experiment import History
+from foldyn.signals import (
+    fill_gaps,
+    first_turning_point,
+    remove_trend,
+    sampling_interval,
+    subtract_final,
+)
+from foldyn.studies.herkal.calibration import SEEN, WATCHED
+
+LONGEST = 8  # frames of a gap that is filled: a third of a period
+MOVED = 0.03  # part of its way by which the watched node has moved when it counts as released
+SLACK = 0.015  # s, by which the instant of the release may be wrong
+SETTLED = 0.1  # part of the record over which the final position is averaged
+FEWEST = 0.5  # part of the frames in which a node must have been measured
+
+
+@dataclass(frozen=True, eq=False)
+class FreeVibration:
+    """Histories of a release from the first turning point on.
+
+    Attributes
+    ----------
+    history : History
+        All nodes relative to their final positions, NaN where they were lost; time is 0 at the
+        release, as far as it is known.
+    whole : ndarray, shape (t, m)
+        The same with short gaps filled; NaN throughout where a node was lost for longer.
+    before : ndarray, shape (m,)
+        Displacement of the same nodes before the release (m), relative to the final position.
+    steps : mapping of str to (time, values)
+        The watched node after each step (s, m).
+    """
+
+    history: History
+    whole: NDArray[np.float64]
+    before: NDArray[np.float64]
+    steps: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+
+    @property
+    def nodes(self) -> list[int]:
+        """Numbers of the nodes."""
+        return numbers_of(self.history)
+
+    def of(self, nodes: list[int], name: str) -> History:
+        """History of some of the nodes."""
+        columns = [self.nodes.index(node) for node in nodes]
+        return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
+
+    def whole_of(self, one: History) -> History | None:
+        """The nodes of a history that were never lost for long, gaps filled; None: there are none.
+
+        The model is not moved in time to fit it: spectra do not depend on that.
+        """
+        columns = [self.nodes.index(node) for node in numbers_of(one)]
+        kept = [k for k in columns if np.isfinite(self.whole[:, k]).all()]
+        if not kept:
+            return None
+        nodes = [self.nodes[k] for k in kept]
+        return replace(one, nodes=nodes, values=self.whole[:, kept], align=0.0)
+
+
+def numbers_of(history: History) -> list[int]:
+    """Numbers of the nodes of a history."""
+    return np.ravel(history.nodes).astype(int).tolist()
+
+
+def _filled(x: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
+    """Part of a record with short gaps filled; NaN where it was lost for longer."""
+    known = np.flatnonzero(np.isfinite(x))
+    before, after = known[known <= start], known[known >= stop - 1]
+    if not before.size or not after.size:
+        return np.full(stop - start, np.nan)
+    first, last = int(before[-1]), int(after[0])
+    inside = known[(known >= first) & (known <= last)]
+    if np.diff(inside).max() - 1 > LONGEST:
+        return np.full(stop - start, np.nan)
+    return fill_gaps(x[first : last + 1], LONGEST)[start - first : stop - first]
+
+
+def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
+    """Prepare the histories of a film in which a specimen is held and released.
+
+    Parameters
+    ----------
+    measured : History
+        Of all nodes that were tracked, along the axis; the watched one among them.
+    watched : int
+        Node by which the release is found.
+
+    Raises
+    ------
+    InputError
+        The watched node was not measured, or lost for long while it swings, or does not swing.
+    """
+    nodes = numbers_of(measured)
+    if watched not in nodes:
+        raise InputError(f"{measured.name}: node {watched} was not measured; it tells the release")
+    column, time = nodes.index(watched), measured.time
+    step = sampling_interval(time)
+    released = _release(measured.values[:, column])
+    stop = min(len(time), released + 1 + round(SEEN / step))
+    window = measured.values[released:stop]
+    first, swing = _known(window[:, column], measured.name, watched)
+    stop = released + first + len(swing)
+    turn = first + first_turning_point(swing)
+    x = measured.values[released + turn : stop]
+    last = _mean(x[-max(1, round(SETTLED * len(x))) :])
+    seen = np.isfinite(last) & (np.isfinite(x).mean(axis=0) >= FEWEST)
+    final = last[seen]
+    times = time[released + turn : stop] - time[released]
+    kept = [node for node, there in zip(nodes, seen, strict=True) if there]
+    history = replace(
+        measured, nodes=kept, time=times, values=x[:, seen] - final, align=SLACK,
+        detrend="linear", delay=0.0,
+    )  # fmt: skip
+    records = measured.values[:, seen].T
+    whole = np.stack([_filled(one, released + turn, stop) for one in records], axis=1) - final
+    before = _mean(measured.values[: released + 1, seen]) - final
+    shown = swing[turn - first :]
+    resting = subtract_final(shown, SETTLED)
+    since = time - time[released]
+    steps = {
+        "as tracked": (since, measured.values[:, column]),
+        "from the release on": (since[released:stop], window[:, column]),
+        "from the first turning point on": (times, shown),
+        "less its final position": (times, resting),
+        "without the line of best fit": (times, remove_trend(resting)),
+    }
+    return FreeVibration(history, whole, before, steps)
+
+
+def _release(x: NDArray[np.float64]) -> int:
+    """Index of the last sample before a record leaves its first level for good."""
+    known = np.flatnonzero(np.isfinite(x))
+    if known.size < 4:
+        raise InputError("the watched node was measured in fewer than four frames")
+    moved = np.abs(x[known] - x[known[0]])
+    left = int(np.argmax(moved > MOVED * moved.max()))
+    return int(known[max(0, left - 1)])
+
+
+def _known(x: NDArray[np.float64], name: str, node: int) -> tuple[int, NDArray[np.float64]]:
+    """Record of the watched node behind its last long gap, and where that begins."""
+    known = np.flatnonzero(np.isfinite(x))
+    long = np.flatnonzero(np.diff(known) - 1 > LONGEST)
+    first, last = (int(known[long[-1] + 1]) if len(long) else int(known[0])), int(known[-1])
+    if last + 1 - first < len(x) // 2:
+        raise InputError(
+            f"{name}: node {node} was lost for more than {LONGEST} frames while it swings; light "
+            "the specimen better, or film it from nearer"
+        )
+    return first, fill_gaps(x[first : last + 1], LONGEST)
+
+
+def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean over time of what was measured, shape (m,); NaN of nodes that were not."""
+    known = np.isfinite(x)
+    count = known.sum(axis=0)
+    return np.where(count > 0, np.where(known, x, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -1,0 +1,145 @@
+"""A synthetic test of the paper specimen, whose raw data are not public.
+
+The sheet that is photographed and filmed is not the model that is fitted to it: it is softer, its
+mass is distributed otherwise, and after the release it creeps back.
+
+`python -m foldyn.studies.herkal.specimen.synthetic FOLDER` writes photographs and the film.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn import experiment
+from foldyn.cases.reading import case_of_document, read_document
+from foldyn.dynamics import initial_state, simulate
+from foldyn.results import load
+from foldyn.studies.herkal import calibration
+
+if TYPE_CHECKING:
+    import xarray
+
+SOFTER = {"sheet.youngs_modulus": 0.97 * 1.219e9}  # Pa: 3 % softer than the model
+OTHERWISE: Mapping[str, Any] = {**SOFTER, "model.mass": "consistent"}  # the model: circumcenter
+SUPPORT = "glued"
+CREEP = 0.04  # share of the displacement that returns slowly,
+CREEP_TIME = 0.5  # and its time constant (s)
+TRACKED = "film.mkv"
+
+
+@dataclass(frozen=True)
+class Shot:
+    """How the specimen is photographed and filmed.
+
+    Attributes
+    ----------
+    size : tuple of int
+        Width and height (pixels); the paper's by default.
+    metres_per_pixel : float
+        In the plane through the front of the specimen.
+    distance : float
+        Of the camera from that plane (m).
+    rate : float
+        Frames per second.
+    held, free : float
+        Time before and after the release (s).
+    seed : int
+    """
+
+    size: tuple[int, int] = (2268, 4032)
+    metres_per_pixel: float = 8e-5
+    distance: float = 0.5
+    rate: float = 240.0
+    held: float = 0.05
+    free: float = 0.8
+    seed: int = 7
+
+    def camera(self, rest: NDArray[np.float64]) -> experiment.Camera:
+        """Camera before the middle of the specimen, a little turned, with a lens that distorts."""
+        middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
+        middle[2] = rest[:, 2].max()
+        return experiment.Camera.looking_at(
+            middle, self.distance, self.metres_per_pixel, self.size,
+            k1=0.02, k2=-0.01, turned=(-1.5, 2.0, -0.8),
+        )  # fmt: skip
+
+    def sensor(self, exposure: float) -> experiment.Sensor:
+        """Sensor with noise, open for some time (s)."""
+        return experiment.Sensor(exposure=exposure, read_noise=1.5, shot_noise=3.0, samples=10)
+
+
+PAPERS, COARSE = Shot(), Shot(size=(1010, 1070), metres_per_pixel=1.2e-4, free=0.6)
+EXPOSURE = 1 / 2000  # s, of a frame
+
+
+def photograph(folder: Path, shot: Shot) -> list[Path]:
+    """Photographs of the softer sheet, without load and under the three weights.
+
+    Returns
+    -------
+    list of Path
+        load0.png to load3.png, in a folder that exists.
+    """
+    path = calibration.pressed([0.0, *calibration.weighed(SOFTER)], SOFTER)
+    photos, _ = experiment.photos_of(
+        path, range(4), shot.camera(path["rest_position"].values),
+        sensor=shot.sensor(0.0), seed=shot.seed,
+    )  # fmt: skip
+    files = [folder / f"load{k}.png" for k in range(len(photos))]
+    cv2 = experiment.opencv()
+    for file, photo in zip(files, photos, strict=True):
+        cv2.imwrite(str(file), photo)
+    return files
+
+
+def film(folder: Path, shot: Shot) -> experiment.SyntheticFilm:
+    """Film of the softer sheet, held and released; its case file is written to the folder."""
+    moved = released(folder, shot)
+    return experiment.film_of(
+        moved, shot.camera(moved["rest_position"].values), shot.rate,
+        sensor=shot.sensor(EXPOSURE), seed=shot.seed,
+    )  # fmt: skip
+
+
+def released(folder: Path, shot: Shot) -> xarray.Dataset:
+    """The true motion; the release is at `shot.held`."""
+    case = calibration.released_case(folder, OTHERWISE, support=SUPPORT, duration=shot.free)
+    case_file = case_of_document(case, read_document(case))
+    start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
+    motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
+    return held_and_creeping(motion, shot.held)
+
+
+def held_and_creeping(motion: xarray.Dataset, held: float) -> xarray.Dataset:
+    """A motion that is held before its start, and a share of which returns slowly.
+
+    A share c of the displacement is that of a dashpot and a spring in parallel, in series with the
+    structure: x(t) = (1 - c) u(t) + c u(0) exp(-t/tau).
+    """
+    u, time = motion["displacement"].values, motion["time"].values
+    slow = np.exp(-time / CREEP_TIME)[:, None, None] * u[0]
+    moved = (1.0 - CREEP) * u + CREEP * slow
+    step = time[1] - time[0]
+    count = round(held / step)
+    before = np.repeat(u[:1], count, axis=0)
+    times = np.arange(count + len(time)) * step
+    kept = motion.drop_dims("time").assign_coords(time=("time", times, motion["time"].attrs))
+    along = ("time", "node", "axis")
+    return kept.assign(
+        displacement=(along, np.concatenate([before, moved]), motion["displacement"].attrs)
+    )
+
+
+if __name__ == "__main__":
+    place = Path(sys.argv[1] if len(sys.argv) > 1 else "herkal-specimen")
+    place.mkdir(parents=True, exist_ok=True)
+    print(*photograph(place, PAPERS))
+    experiment.write_film(film(place, PAPERS), place / TRACKED)
+    print(place / TRACKED)

@@ -1,0 +1,238 @@
+"""The computations of the specimen's study, each kept, so that it goes on where it was stopped."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from foldyn import experiment, plots
+from foldyn.cases.reading import case_of_document, read_document
+from foldyn.errors import ComputationError
+from foldyn.experiment import Fit, History, Measurement
+from foldyn.experiment.fit_page import write_fit
+from foldyn.experiment.key_paths import replaced
+from foldyn.linear import frf, modes
+from foldyn.results import netcdf, save
+from foldyn.studies import find_case
+from foldyn.studies.herkal import calibration
+from foldyn.studies.herkal.program import specimen_program
+from foldyn.studies.herkal.specimen import evaluation, synthetic
+from foldyn.studies.herkal.specimen.measured import Data, measurement
+from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
+
+if TYPE_CHECKING:
+    import xarray
+
+FOLDER = "specimen"
+NOTE = "synthetic data: the specimen's own are not public"
+PHOTOS, FILM, FOUND, FRONT = "photographs.nc", "film.nc", "found.json", "front.nc"
+RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
+MASS = "circumcenter"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the study.
+
+    Attributes
+    ----------
+    part : str
+        One of `PARTS`.
+    shot : Shot
+        How the synthetic film is taken; photographs are always the paper's.
+    data : Data
+    """
+
+    part: str
+    shot: Shot = PAPERS
+    data: Data = field(default_factory=Data)
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return f"specimen-{self.part}"
+
+    @property
+    def note(self) -> str:
+        """What is said on every figure."""
+        return NOTE if self.data.synthetic else ""
+
+    def settings(self) -> dict[str, Any]:
+        """All that its result depends on."""
+        shot = asdict(self.shot) if self.data.synthetic else {}
+        return {"program": specimen_program(), "data": self.data.digests(), "shot": shot}
+
+    def there(self, folder: Path) -> bool:
+        """Whether its result is in a folder."""
+        stamp = self._stamp(folder)
+        return stamp.is_file() and stamp.read_text(encoding="utf-8") == self._text()
+
+    def make(self, folder: Path) -> None:
+        """Compute its result into a folder.
+
+        Raises
+        ------
+        ComputationError
+            What it needs has not been computed.
+        """
+        inside = folder / FOLDER
+        inside.mkdir(parents=True, exist_ok=True)
+        missing = [one for one in self._needed() if not one.there(folder)]
+        if missing:
+            raise ComputationError(f"it needs {missing[0].name}, which failed")
+        self._stamp(folder).unlink(missing_ok=True)
+        PARTS[self.part](self, inside)
+        self._stamp(folder).write_text(self._text(), encoding="utf-8")
+
+    def _needed(self) -> list[Part]:
+        seen, then = parts(self.shot, self.data)
+        return {"fit": seen, "response": then[:1]}.get(self.part, [])
+
+    def _text(self) -> str:
+        return json.dumps(self.settings(), sort_keys=True)
+
+    def _stamp(self, folder: Path) -> Path:
+        return folder / FOLDER / f".{self.part}.done"
+
+
+def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
+    """What needs nothing else, and what comes after it, in order."""
+    seen = []
+    if data.synthetic:
+        seen.append("photographs")
+    if data.synthetic or data.film is not None:
+        seen.append("film")
+    return [Part(p, shot, data) for p in seen], [Part(p, shot, data) for p in ("fit", "response")]
+
+
+def _model() -> experiment.Model:
+    return experiment.Model.of(calibration.pressed(evaluation.FACTORS))
+
+
+def _photographs(part: Part, folder: Path) -> None:
+    loads = [0.0, *calibration.WEIGHTS]
+    with tempfile.TemporaryDirectory(dir=folder) as there:
+        files = synthetic.photograph(Path(there), PAPERS)
+        tracks = experiment.track_photos(files, _model(), loads=loads)
+        picture = experiment.read_photo(files[-1])
+    last = len(loads) - 1
+    plots.draw_overlay(picture, tracks, last, part.note).savefig(folder / "photograph.png")
+    experiment.save_tracks(tracks, folder / PHOTOS)
+
+
+def _film(part: Part, folder: Path) -> None:
+    if part.data.film is not None:
+        _tracked(part, part.data.film, folder)
+        return
+    with tempfile.TemporaryDirectory(dir=folder) as there:  # it takes most of a gigabyte
+        film = Path(there) / synthetic.TRACKED
+        experiment.write_film(synthetic.film(Path(there), part.shot), film)
+        _tracked(part, film, folder)
+
+
+def _tracked(part: Part, file: Path, folder: Path) -> None:
+    film = experiment.open_film(str(file))
+    tracks = experiment.track_film(film, _model())
+    at = int(tracks.attrs["match_frame"])
+    picture = plots.draw_overlay(film.picture(at), tracks, at, part.note)
+    picture.savefig(folder / "film.png")
+    experiment.save_tracks(tracks, folder / FILM)
+
+
+def _static(part: Part, folder: Path) -> list[Measurement]:
+    """The static test, empty where only a release was measured."""
+    file = part.data.static
+    if file is not None and file.suffix == ".csv":
+        return [measurement(file, part.data.label)]
+    if file is None and not part.data.synthetic:
+        return []
+    return evaluation.static_test(experiment.load_tracks(file or folder / PHOTOS), part.data.label)
+
+
+def _history(part: Part, folder: Path) -> History | None:
+    """The release, where there is one."""
+    file = part.data.release
+    if file is None and not part.data.synthetic:
+        return None
+    tracked = file is None or part.data.film is not None
+    found = measurement(folder / FILM if tracked else file, part.data.label)  # type: ignore[arg-type]
+    assert isinstance(found, History)
+    return replace(found, name="film" if tracked else found.name)
+
+
+def _fit(part: Part, folder: Path) -> None:
+    kept = {"folder": folder / "evaluations"}
+    found: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
+    static = _static(part, folder)
+    if static:
+        folds = calibration.fit_folds(static, **kept)
+        changes = calibration.changes_of(folds)
+        _write(folds, folder / "folds", part.note)
+        found |= {"folds": folds.summary(), "weights": _weights(static)}
+    measured = _history(part, folder)
+    if measured is not None:
+        released = evaluation.fit_release(measured, folder / "models", changes, **kept)
+        _write(released.fits[evaluation.FILM_SUPPORT], folder / "damping", part.note)
+        front = evaluation.compared(released, evaluation.motions(released))
+        netcdf.write(front, folder / FRONT)
+        plots.plot_steps(released.free.steps, title=part.note).savefig(folder / "steps.png")
+        found |= {
+            "press": released.press,
+            "damping": {support: one.summary() for support, one in released.fits.items()},
+        }
+        changes |= released.fits[evaluation.FILM_SUPPORT].values
+    found["changes"] = changes
+    (folder / FOUND).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+def _weights(static: list[Measurement]) -> dict[str, list[float]]:
+    one = next(one for one in static if isinstance(one, experiment.ForceDisplacement))
+    return {"displacement": np.asarray(one.displacement).tolist(), "force": one.force.tolist()}
+
+
+def _write(one: Fit, folder: Path, note: str) -> None:
+    folder.mkdir(exist_ok=True)
+    write_fit(one, folder, f"Paper specimen: {folder.name}", note)
+    one.save(folder / "fit.json")
+
+
+def _response(part: Part, folder: Path) -> None:
+    changes = read_found(folder)["changes"]
+    for name, given in (("published", {}), ("fitted", changes)):
+        save(_frequency_response(given), folder / RESPONSES[name])
+    save(modes(_case("modes", changes), **_arguments("modes")), folder / MODES)
+
+
+def _frequency_response(changes: Mapping[str, Any]) -> xarray.Dataset:
+    return frf(_case("frf", changes), **_arguments("frf"))
+
+
+def _case(name: str, changes: Mapping[str, Any]) -> Any:
+    path = find_case(f"herkal/specimen-{name}")
+    kept = {k: v for k, v in changes.items() if name == "frf" or not k.startswith("damping.")}
+    return case_of_document(path, replaced(read_document(path), kept)).case(MASS)
+
+
+def _arguments(name: str) -> dict[str, Any]:
+    path = find_case(f"herkal/specimen-{name}")
+    return dict(case_of_document(path, read_document(path)).analysis.arguments)
+
+
+PARTS: Mapping[str, Callable[[Part, Path], None]] = {
+    "photographs": _photographs,
+    "film": _film,
+    "fit": _fit,
+    "response": _response,
+}
+
+
+def read_found(folder: Path) -> dict[str, Any]:
+    """What the fits have found."""
+    return json.loads((folder / FOUND).read_text(encoding="utf-8"))
