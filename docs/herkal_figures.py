@@ -3,7 +3,7 @@
     foldyn study herkal --out FOLDER
     python docs/herkal_figures.py FOLDER
 
-writes images/herkal-*.png and prints the tables in Markdown.
+writes images/herkal-*.png and specimen-test-*.png, and prints the tables in Markdown.
 """
 
 from __future__ import annotations
@@ -13,15 +13,27 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 from foldyn import plots
+from foldyn.report import Table
+from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
 from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.models import REFERENCE, label, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
-from foldyn.studies.herkal.study import FULL, Study
+from foldyn.studies.herkal.specimen import page
+from foldyn.studies.herkal.specimen.measured import Data
+from foldyn.studies.herkal.study import FULL, RESULTS, Study
 
 IMAGES = Path(__file__).with_name("images")
+SPECIMEN = {
+    "shapes": "folds/data-1.png", "film": "film.png", "supports": "../../specimen-supports.png",
+    "front": "../../specimen-front.png",
+}  # fmt: skip
+"""Figures of the study, from the folder of the specimen."""
+WIDTH = 900  # pixels
 
 
 def draw(study: Study, found: variations.Variations) -> None:
@@ -35,6 +47,19 @@ def draw(study: Study, found: variations.Variations) -> None:
     plot_sensitivity(found, models, paper_table()).savefig(
         IMAGES / "herkal-sensitivity.png", dpi=100
     )
+
+
+def specimen(folder: Path) -> list[Table]:
+    """Copy the specimen's figures, smaller; returns the tables of its part of the page."""
+    for name, file in SPECIMEN.items():
+        with Image.open(folder / RESULTS / "specimen" / file) as picture:
+            picture.thumbnail((WIDTH, 10 * WIDTH))
+            picture.convert("P", palette=Image.Palette.ADAPTIVE).save(
+                IMAGES / f"specimen-test-{name}.png", optimize=True
+            )
+    parts = Study(FULL, folder, Data()).parts[1]
+    told = page.sections(folder / RESULTS, parts, Album(folder))
+    return [one for one in told if isinstance(one, Table)]
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
@@ -68,6 +93,8 @@ def main(folder: Path) -> None:
         sensitivity_page.orientations(found),
         sensitivity_page.frequencies(found),
     ):
+        table(one.header, one.rows)
+    for one in specimen(folder):
         table(one.header, one.rows)
     print(f"\n{report.verdict(study, found)}\n\n{sensitivity_page.opinion(found)}")
 

@@ -79,11 +79,6 @@ TIME = np.arange(240) * STEP
 LATE = 20.4 * STEP
 
 
-def zero_of(found):
-    """Time of the film (s) that counts as that of the release."""
-    return -found.steps["as tracked"][0][0]
-
-
 def film(**nodes):
     columns = {int(name[1:]): values for name, values in nodes.items()}
     return History(
@@ -95,7 +90,7 @@ def test_preparation_starts_at_the_first_turning_point() -> None:
     offset = 7e-4
     found = prepared.prepare(film(n8=ringing(TIME, LATE) + offset, n22=0.5 * ringing(TIME, LATE)))
     assert found.nodes == [8, 22]
-    start = zero_of(found)
+    start = found.released
     assert start == pytest.approx(LATE, abs=STEP)
     turn = LATE + (np.pi - np.arctan(9.0 / (2.0 * np.pi * 9.5))) / (2.0 * np.pi * 9.5)
     assert found.history.time[0] + start == pytest.approx(turn, abs=STEP)
@@ -111,7 +106,15 @@ def test_preparation_starts_at_the_first_turning_point() -> None:
 def test_preparation_of_a_film_that_begins_with_the_release() -> None:
     found = prepared.prepare(film(n8=ringing(TIME)))
     assert found.before[0] == pytest.approx(4e-3, rel=1e-2)
-    assert zero_of(found) <= STEP
+    assert found.released <= STEP
+
+
+def test_times_of_a_table_are_rounded() -> None:
+    exact = film(n8=ringing(TIME, LATE))
+    found = prepared.prepare(replace(exact, time=np.round(TIME, 5)))
+    np.testing.assert_allclose(np.diff(found.history.time), STEP, rtol=1e-4)
+    with pytest.raises(InputError, match="not evenly spaced"):
+        prepared.prepare(replace(exact, time=TIME + 1e-3 * (np.arange(240) % 2)))
 
 
 def test_gaps() -> None:
@@ -126,7 +129,7 @@ def test_gaps() -> None:
     assert missing.sum(axis=0).tolist()[:2] == [4, 15]
     whole = np.isfinite(found.whole).all(axis=0)
     assert whole.tolist() == [True, False, True]
-    true = ringing(found.history.time + zero_of(found), LATE)
+    true = ringing(found.history.time + found.released, LATE)
     shift = np.nanmean(found.history.values[:, 0] - true)
     np.testing.assert_allclose(found.whole[:, 0] - shift, true, atol=3e-5)  # splined
     kept = found.whole_of(found.of([15, 29], "two"))
@@ -239,7 +242,7 @@ def test_the_support_decides_frequency_and_damping(released) -> None:
     front = evaluation.compared(released, motions)
     assert front.sizes["support"] == 3 and front.node.values.tolist() == list(FRONT)
     frequency = {
-        str(name): page.vibration_of(front.model.sel(support=name, node=WATCHED).values, STEP)[0]
+        str(name): page.vibration_of(front.model.sel(support=name, node=WATCHED).values, STEP).peak
         for name in front.support.values
     }
     assert frequency["plate"] == pytest.approx(9.5, rel=0.03)
@@ -259,6 +262,8 @@ def tables(tmp_path):
     (tmp_path / "film.csv").write_text("time [s],node 8 x [m]\n" + "\n".join(rows) + "\n")
     (tmp_path / "shapes.csv").write_text("load_factor,node,x [m]\n0.5,8,0.02\n")
     (tmp_path / "load.png").write_bytes(b"")
+    (tmp_path / "grams.csv").write_text("displacement [mm],force [g]\n20,12.75\n36,23.05\n")
+    (tmp_path / "other.csv").write_text("time [s],node 9 x [m]\n0,0.1\n1,0.2\n2,0.1\n")
     (tmp_path / "film.mp4").write_text("no film")
     return tmp_path
 
@@ -283,6 +288,9 @@ def test_files_are_sorted_by_what_they_hold(tables) -> None:
     ("names", "message"),
     [
         (["nothing.csv"], "there is no such file"),
+        (["."], "is a folder"),
+        (["grams.csv"], "the unit [g] is not known"),
+        (["other.csv"], "node 8 was not measured; it tells the release"),
         (["weights.csv", "weights.csv"], "is a static test, too; give one of each"),
         (["load.png"], "track photographs first, foldyn track"),
         (["shapes.csv"], "shapes without forces say nothing of the stiffness"),

@@ -202,14 +202,10 @@ def noisy(data: Sequence[Measurement], draw: np.random.Generator) -> list[Measur
     return result
 
 
-def peak(
-    values: NDArray[np.float64],
-    step: float = 1.0 / RATE,
-    band: tuple[float, float] = (7.0, 12.0),
-) -> tuple[float, float]:
-    """Frequency (Hz) and damping ratio of the strongest decaying cosine within a band (Hz)."""
+def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, float]:
+    """Frequency (Hz) and damping ratio of the strongest decaying cosine between 7 and 12 Hz."""
     found = matrix_pencil(values, step)
-    near = (found.damped_frequency > band[0]) & (found.damped_frequency < band[1])
+    near = (found.damped_frequency > 7.0) & (found.damped_frequency < 12.0)
     best = int(np.argmax(np.where(near, found.amplitude, 0.0)))
     return float(found.damped_frequency[best]), float(found.damping_ratio[best])
 

@@ -52,6 +52,11 @@ def write_sensitivity(folder: Path, varied: Variations) -> Path:
 
 def _opening(study: Study) -> str:
     n = study.plan.numerics
+    specimen = (
+        ""
+        if study.data is None
+        else "\n\nThe last part is the paper's specimen, from a film to a calibrated model."
+    )
     short = (
         ""
         if n == FULL.numerics
@@ -70,7 +75,7 @@ def _opening(study: Study) -> str:
         "The metric: per reported node, the norm of the difference of the amplitude spectra up to "
         "5 Hz over the norm of the shell's spectrum; then the mean over the nodes. 0 is equal; 1 "
         "is as far away as no motion at all."
-        f"{short}"
+        f"{specimen}{short}"
     )
 
 

@@ -173,14 +173,25 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
     return found
 
 
-def compared(released: Released, motions: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def compared(
+    released: Released, motions: Mapping[str, xr.Dataset], truth: xr.Dataset | None = None
+) -> xr.Dataset:
     """Front nodes of the film and of the models at the same times, without trend.
+
+    Parameters
+    ----------
+    released : Released
+    motions : mapping of str to xarray.Dataset
+        By the names of supports.
+    truth : xarray.Dataset, optional
+        Of a synthetic film: positions at the times of its frames.
 
     Returns
     -------
     xarray.Dataset
-        `measured` (time, node), NaN where a node was lost, `whole` (time, node), short gaps
-        filled and NaN throughout where there are longer ones, and `model` (support, time, node), m.
+        In m: `measured` (time, node), NaN where a node was lost; `whole` (time, node), short gaps
+        filled and NaN throughout where there are longer ones; `model` (support, time, node); and
+        `true` (time, node) where it is known.
     """
     front = [node for node in released.free.nodes if node in FRONT]
     one = released.free.of(front, "front nodes")
@@ -191,7 +202,7 @@ def compared(released: Released, motions: Mapping[str, xr.Dataset]) -> xr.Datase
         curves.append(curve - one.trend(curve))
     places = [released.free.nodes.index(node) for node in front]
     whole, line = released.free.whole[:, places], one.trend(one.values)
-    return xr.Dataset(
+    found = xr.Dataset(
         {
             "whole": (("time", "node"), whole - line, {"units": "m"}),
             "measured": (("time", "node"), one.values - line, {"units": "m"}),
@@ -199,6 +210,11 @@ def compared(released: Released, motions: Mapping[str, xr.Dataset]) -> xr.Datase
         },
         {"time": ("time", one.time, {"units": "s"}), "node": front, "support": list(motions)},
     )
+    if truth is None:
+        return found
+    moved = truth["position"].sel(node=front, axis="x")
+    true = CubicSpline(moved["time"], moved)(one.time + released.free.released)
+    return found.assign(true=(("time", "node"), true - one.trend(true), {"units": "m"}))
 
 
 def _read(case: Path) -> tuple[Path, dict[str, Any]]:

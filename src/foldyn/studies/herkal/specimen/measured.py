@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from foldyn.cases.csv_table import read_headings
 from foldyn.errors import InputError
-from foldyn.experiment import History, Measurement, load_tracks, open_film
+from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
 from foldyn.experiment.films import PHOTOS
 from foldyn.experiment.measured_files import recognize
 from foldyn.experiment.measured_paths import Shapes
+from foldyn.studies.herkal.specimen.prepared import prepare
 
 SYNTHETIC = "synthetic"
 AXIS = "x"
@@ -78,7 +78,8 @@ def data_of(names: Sequence[str]) -> Data:
     for name in names:
         file = Path(name)
         if not file.is_file():
-            raise InputError(f"--data {name}: there is no such file")
+            what = "is a folder; name a file in it" if file.is_dir() else "there is no such file"
+            raise InputError(f"--data {name}: {what}")
         kind = _kind(file)
         if kind in found:
             raise InputError(
@@ -101,10 +102,9 @@ def _kind(file: Path) -> str:
             "herkal/specimen --loads N,N,... and give their tracks (*.nc)"
         )
     if file.suffix == ".csv":
-        names = [name for name, _ in read_headings(file)]
-        if {"displacement", "force"} <= set(names):
-            return "static"
         told = measurement(file, "")
+        if isinstance(told, ForceDisplacement):
+            return "static"
         if isinstance(told, Shapes):
             raise InputError(
                 f"--data {file}: shapes without forces say nothing of the stiffness; give forces "
@@ -127,6 +127,7 @@ def _kind(file: Path) -> str:
 
 def _released(told: Measurement) -> str:
     assert isinstance(told, History)
+    prepare(told)  # says at the door why it is no release
     return "release"
 
 

@@ -27,6 +27,7 @@ LONGEST = 8  # frames of a gap that is filled: a third of a period
 MOVED = 0.03  # part of its way by which the watched node has moved when it counts as released
 SLACK = 0.015  # s, by which the instant of the release may be wrong
 SETTLED = 0.1  # part of the record over which the final position is averaged
+ROUNDED = 0.01  # part of an interval by which a time may be rounded
 FEWEST = 0.5  # part of the frames in which a node must have been measured
 
 
@@ -43,6 +44,8 @@ class FreeVibration:
         The same with short gaps filled; NaN throughout where a node was lost for longer.
     before : ndarray, shape (m,)
         Displacement of the same nodes before the release (m), relative to the final position.
+    released : float
+        Time of the record that counts as that of the release (s).
     steps : mapping of str to (time, values)
         The watched node after each step (s, m).
     """
@@ -50,6 +53,7 @@ class FreeVibration:
     history: History
     whole: NDArray[np.float64]
     before: NDArray[np.float64]
+    released: float
     steps: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 
     @property
@@ -111,8 +115,8 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
     nodes = numbers_of(measured)
     if watched not in nodes:
         raise InputError(f"{measured.name}: node {watched} was not measured; it tells the release")
-    column, time = nodes.index(watched), measured.time
-    step = sampling_interval(time)
+    column, time = nodes.index(watched), _even(measured.time)
+    step = time[1] - time[0]
     released = _release(measured.values[:, column])
     stop = min(len(time), released + 1 + round(SEEN / step))
     window = measured.values[released:stop]
@@ -142,7 +146,15 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
         "less its final position": (times, resting),
         "without the line of best fit": (times, remove_trend(resting)),
     }
-    return FreeVibration(history, whole, before, steps)
+    return FreeVibration(history, whole, before, float(time[released]), steps)
+
+
+def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Times at one interval, where they differ from it by what tables round off only."""
+    even = np.linspace(time[0], time[-1], len(time))
+    if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
+        sampling_interval(time)  # says what is wrong
+    return even
 
 
 def _release(x: NDArray[np.float64]) -> int:

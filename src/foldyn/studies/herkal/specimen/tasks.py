@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, FRONT = "photographs.nc", "film.nc", "found.json", "front.nc"
+TRUTH = "film-truth.nc"
 RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
 MASS = "circumcenter"
 
@@ -131,9 +132,11 @@ def _film(part: Part, folder: Path) -> None:
         _tracked(part, part.data.film, folder)
         return
     with tempfile.TemporaryDirectory(dir=folder) as there:  # it takes most of a gigabyte
-        film = Path(there) / synthetic.TRACKED
-        experiment.write_film(synthetic.film(Path(there), part.shot), film)
-        _tracked(part, film, folder)
+        file = Path(there) / synthetic.TRACKED
+        film = synthetic.film(Path(there), part.shot)
+        experiment.write_film(film, file)
+        netcdf.write(film.truth(), folder / TRUTH)
+        _tracked(part, file, folder)
 
 
 def _tracked(part: Part, file: Path, folder: Path) -> None:
@@ -167,7 +170,7 @@ def _history(part: Part, folder: Path) -> History | None:
 
 
 def _fit(part: Part, folder: Path) -> None:
-    kept = {"folder": folder / "evaluations"}
+    kept: dict[str, Any] = {"folder": folder / "evaluations"}
     found: dict[str, Any] = {}
     changes: dict[str, Any] = {}
     static = _static(part, folder)
@@ -180,7 +183,8 @@ def _fit(part: Part, folder: Path) -> None:
     if measured is not None:
         released = evaluation.fit_release(measured, folder / "models", changes, **kept)
         _write(released.fits[evaluation.FILM_SUPPORT], folder / "damping", part.note)
-        front = evaluation.compared(released, evaluation.motions(released))
+        truth = netcdf.read(folder / TRUTH, "") if part.data.synthetic else None
+        front = evaluation.compared(released, evaluation.motions(released), truth)
         netcdf.write(front, folder / FRONT)
         plots.plot_steps(released.free.steps, title=part.note).savefig(folder / "steps.png")
         found |= {
