@@ -141,7 +141,7 @@ def released_case(
     Parameters
     ----------
     folder : Path
-        Gets the case file and the state that it starts from.
+        Gets the case file and the state that it starts from; made where it is missing.
     changes : mapping, optional
         Values of the static calibration, by key.
     step : float
@@ -153,6 +153,7 @@ def released_case(
     duration : float
         Of the motion (s).
     """
+    folder.mkdir(parents=True, exist_ok=True)
     save(pressed([press / FULL], changes), folder / "pressed.nc")
     document = replaced(read_document(find_case("herkal/specimen-release")), changes or {})
     del document["loads"]
@@ -240,8 +241,8 @@ def calibrate(
         static = noisy(static_data(), draw)
     folds = fit_folds(static, folder=kept, **how)
     if film is None:
-        film = noisy(release_data(released_case(_made(folder / "truth"))), draw)
-    model = released_case(_made(folder / "fitted"), changes_of(folds))
+        film = noisy(release_data(released_case(folder / "truth")), draw)
+    model = released_case(folder / "fitted", changes_of(folds))
     return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept, **how)
 
 
@@ -269,11 +270,6 @@ def spectra_of(film: Sequence[Measurement]) -> list[Spectrum]:
     ]
 
 
-def _made(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
 if __name__ == "__main__":
     place = Path(sys.argv[1] if len(sys.argv) > 1 else "herkal-calibration")
     folds, damping = calibrate(place)
@@ -284,7 +280,8 @@ if __name__ == "__main__":
         for score in one.scores:
             print(f"  {score.name}: rms {score.rms:.3g} {score.unit}")
         title = f"Paper specimen, synthetic data: {name}"
-        print("  ", write_fit(one, _made(place / name), title))
+        (place / name).mkdir(parents=True, exist_ok=True)
+        print("  ", write_fit(one, place / name, title))
     film = damping.problem.measurements[0].observed()
     for name, values in (("film", film), ("model", damping.predicted[0])):
         frequency, ratio = peak(values[round(TURNED * RATE) :])

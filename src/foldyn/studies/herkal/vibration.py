@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from foldyn.cases import Case, Rayleigh, read_case
 from foldyn.dynamics import simulate
 from foldyn.linear import character, frf, modes, peaks_of
-from foldyn.signals import LogDecrement, log_decrement, matrix_pencil
+from foldyn.signals import LogDecrement, log_decrement
 from foldyn.studies import find_case
+from foldyn.studies.herkal.calibration import WATCHED, peak
 from foldyn.studies.targets import Verdict, read_targets, verdicts
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
-WATCHED = 8  # the paper's node 9, next to the top
 RELEASED = 2.0  # s, when the weight is taken away,
 SETTLED = 0.05  # and how long after it the first minimum is
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
@@ -112,10 +110,7 @@ def released(damping: Rayleigh = ALONE, **changes: Any) -> Release:
     late = motion.sel(time=slice(RELEASED + SETTLED, None))
     x = late["displacement"].sel(node=WATCHED, axis="x").values
     step = float(late["time"][1] - late["time"][0])
-    found = matrix_pencil(x, step)
-    near = (found.damped_frequency > 7.0) & (found.damped_frequency < 12.0)
-    best = int(np.argmax(np.where(near, found.amplitude, 0.0)))
-    frequency, ratio = float(found.damped_frequency[best]), float(found.damping_ratio[best])
+    frequency, ratio = peak(x, step)
     return Release(log_decrement(x, step, frequency=frequency), frequency, ratio, motion)
 
 

@@ -139,7 +139,12 @@ def fit_release(
     duration = float(free.history.time[-1]) + 2.0 * free.history.align
     cases = {
         support: calibration.released_case(
-            _made(models / support.replace(" ", "-")), changes, step, press, support, duration
+            models / support.replace(" ", "-"),
+            changes,
+            step,
+            press,
+            support,
+            duration,
         )
         for support in SUPPORTS
     }
@@ -219,8 +224,3 @@ def compared(
 
 def _read(case: Path) -> tuple[Path, dict[str, Any]]:
     return case, read_document(case)
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
