@@ -38,7 +38,7 @@ duration = 0.1
 def folder(tmp_path_factory):
     """A film of a sheet at rest that shakes as a whole, photographs of it, and its case."""
     from foldyn.experiment import Camera, Look, Sensor, SyntheticFilm, write_film
-    from foldyn.experiment.picture import Studio
+    from foldyn.experiment.rendering.picture import Studio
 
     folder = tmp_path_factory.mktemp("track")
     (folder / "case.toml").write_text(CASE, "utf-8")

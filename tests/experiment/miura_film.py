@@ -63,7 +63,7 @@ def make_film(count: int, seed: int = 0, dropped: tuple = (), **sensor: Any) -> 
     from scipy.interpolate import CubicSpline
 
     from foldyn.experiment import Look, Sensor, SyntheticFilm
-    from foldyn.experiment.picture import Studio
+    from foldyn.experiment.rendering.picture import Studio
 
     grid = np.linspace(REST - 1.2 * AMPLITUDE, REST + 1.2 * AMPLITUDE, 25)
     spline = CubicSpline(grid, moving_states(grid))

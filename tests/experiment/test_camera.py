@@ -9,7 +9,7 @@ from miura_film import DISTANCE, SCALE, camera, cv2, moving_states
 from foldyn.errors import InputError
 from foldyn.experiment import Camera, Scale, scale_of_lengths, scale_of_target
 from foldyn.experiment.camera import axes_of_view
-from foldyn.experiment.view import View
+from foldyn.experiment.tracking.view import View
 
 POINTS = moving_states(70.0)[0]
 

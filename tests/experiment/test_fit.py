@@ -12,7 +12,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes
-from foldyn.experiment.fit_problem import problem
+from foldyn.experiment.calibration.fit_problem import problem
 
 MOVED = -np.linspace(0.03, 0.3, 8)
 TIME = np.linspace(0.0, 2.0, 60)

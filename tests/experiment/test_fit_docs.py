@@ -10,7 +10,7 @@ import pytest
 
 from foldyn.cli.fit import plan_of
 from foldyn.cli.main import main, parser
-from foldyn.experiment.fit_problem import problem
+from foldyn.experiment.calibration.fit_problem import problem
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/calibration.md"
 

@@ -9,9 +9,9 @@ import xarray as xr
 
 from foldyn.errors import InputError
 from foldyn.experiment import ForceDisplacement, History, Shapes, Spectrum
-from foldyn.experiment.fit_file import is_fit_file, read_fit
-from foldyn.experiment.fit_problem import Problem, problem
-from foldyn.experiment.measured_files import recognize, shapes
+from foldyn.experiment.calibration.fit_file import is_fit_file, read_fit
+from foldyn.experiment.calibration.fit_problem import Problem, problem
+from foldyn.experiment.calibration.measured_files import recognize, shapes
 
 FORCES = "displacement [mm],force [mN]\n-100,-8\n-200,-17\n-300,-27\n"
 SHAPES = "load_factor,node,x [mm],z [mm]\n0.5,0,10,1\n1,0,20,2\n1,2,11,3\n"

@@ -9,7 +9,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
-from foldyn.experiment.fit_problem import problem
+from foldyn.experiment.calibration.fit_problem import problem
 from foldyn.signals import spectrum
 
 TIME = np.arange(0.0, 2.0, 0.05)

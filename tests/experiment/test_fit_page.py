@@ -10,9 +10,9 @@ import pytest
 
 import foldyn as fd
 from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
-from foldyn.experiment.fit_figures import plot_correlation, plot_histories, plot_shapes
-from foldyn.experiment.fit_page import write_fit
-from foldyn.experiment.fit_problem import problem
+from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_histories, plot_shapes
+from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.experiment.calibration.fit_problem import problem
 
 TIME = np.linspace(0.0, 2.0, 80)
 MOVED = -np.linspace(0.05, 0.3, 6)

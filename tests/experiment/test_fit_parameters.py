@@ -7,9 +7,9 @@ import pytest
 
 from foldyn.errors import InputError
 from foldyn.experiment import Parameter
-from foldyn.experiment.key_paths import parts, replaced, value_at
-from foldyn.experiment.parameters import space
-from foldyn.experiment.ties import Tie
+from foldyn.experiment.calibration.key_paths import parts, replaced, value_at
+from foldyn.experiment.calibration.parameters import space
+from foldyn.experiment.calibration.ties import Tie
 
 DOCUMENT = {
     "sheet": {"thickness": 0.01, "length_scale_ratio": 2.0},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foldyn.experiment.uncertainty import uncertainty
+from foldyn.experiment.calibration.uncertainty import uncertainty
 
 ONE = np.ones(2)
 FREE = np.zeros(2, dtype=bool)

@@ -8,8 +8,8 @@ from miura_film import FRONT, RATE, errors, make_film, model
 
 import foldyn as fd
 from foldyn.experiment import Tracking, track_film, write_film
-from foldyn.experiment.corners import find_corners
-from foldyn.experiment.follow import follow
+from foldyn.experiment.tracking.corners import find_corners
+from foldyn.experiment.tracking.follow import follow
 
 
 def test_nodes_keep_their_identity_and_their_place(sharp, tracked):

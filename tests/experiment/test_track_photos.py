@@ -8,7 +8,7 @@ from miura_film import DISTANCE, SCALE, camera, cv2, folded, model, moving_state
 
 from foldyn.errors import InputError
 from foldyn.experiment import Look, Placing, Sensor, Tracking, track_photos
-from foldyn.experiment.picture import Studio
+from foldyn.experiment.rendering.picture import Studio
 
 DIHEDRALS = (75.0, 68.0, 62.0)
 

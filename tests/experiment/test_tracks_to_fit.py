@@ -25,8 +25,8 @@ from foldyn.experiment import (
     write_csv,
     write_film,
 )
-from foldyn.experiment.fit_file import read_fit
-from foldyn.experiment.measured_files import history, recognize, shapes
+from foldyn.experiment.calibration.fit_file import read_fit
+from foldyn.experiment.calibration.measured_files import history, recognize, shapes
 
 ALPHA, RATIO = 14.0, 2.7  # the truth: 1/s, and L*/L_F
 RATE, DROPPED = 240.0, 30  # frames/s, and the frame that repeats the one before

@@ -15,7 +15,7 @@ from foldyn.errors import ComputationError, InputError
 
 if TYPE_CHECKING:
     from foldyn.experiment import Course, Estimate, Fit
-    from foldyn.experiment.fit_file import FitFile
+    from foldyn.experiment.calibration.fit_file import FitFile
 
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
@@ -109,7 +109,7 @@ def _write(found: Fit, plan: FitFile, folder: Path, figures: bool) -> None:
             found.save(folder / name)
         found.write_case(folder / WRITTEN[2])
         if figures:
-            from foldyn.experiment.fit_page import write_fit
+            from foldyn.experiment.calibration.fit_page import write_fit
 
             write_fit(found, folder, plan.title)
     except InputError as error:  # the input was right: something else went wrong
@@ -127,7 +127,7 @@ def _line(one: Estimate, confidence: float) -> str:
 
 def plan_of(given: argparse.Namespace) -> FitFile:
     """What to fit: from a fit file, or a case file and the other arguments."""
-    from foldyn.experiment.fit_file import is_fit_file, read_fit
+    from foldyn.experiment.calibration.fit_file import is_fit_file, read_fit
     from foldyn.studies import find_case
 
     path = find_case(given.file)
@@ -145,8 +145,8 @@ def plan_of(given: argparse.Namespace) -> FitFile:
 
 
 def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
-    from foldyn.experiment.fit_file import FitFile
-    from foldyn.experiment.measured_files import recognize
+    from foldyn.experiment.calibration.fit_file import FitFile
+    from foldyn.experiment.calibration.measured_files import recognize
 
     if not given.data:
         raise InputError(

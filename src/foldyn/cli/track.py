@@ -169,7 +169,7 @@ def summary(ds: xarray.Dataset) -> str:
 
 def _are_photos(inputs: Sequence[str]) -> bool:
     """Whether the inputs are photographs; they are all of a kind, and a film is alone."""
-    from foldyn.experiment.films import PHOTOS
+    from foldyn.experiment.tracking.films import PHOTOS
 
     photos = [Path(name).suffix.lower() in PHOTOS for name in inputs]
     if any(photos) and not all(photos):

@@ -31,8 +31,8 @@ from foldyn.experiment import (
     Spectrum,
     fit,
 )
-from foldyn.experiment.fit_page import write_fit
-from foldyn.experiment.key_paths import replaced
+from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import load, save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings, trace

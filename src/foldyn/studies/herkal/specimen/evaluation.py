@@ -18,7 +18,7 @@ from foldyn.cases.reading import case_of_document, read_document
 from foldyn.dynamics import initial_state, simulate
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
-from foldyn.experiment.key_paths import replaced
+from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import load
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
@@ -130,7 +130,7 @@ def fit_release(
     step : float
         Of the simulations (s).
     **how
-        Arguments of `foldyn.experiment.fit`.
+        Arguments of `foldyn.fit`.
     """
     free = prepare(measured)
     path = calibration.pressed(FACTORS, changes)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from foldyn.errors import InputError
 from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
-from foldyn.experiment.films import PHOTOS
-from foldyn.experiment.measured_files import recognize
-from foldyn.experiment.measured_paths import Shapes
+from foldyn.experiment.calibration.measured_files import recognize
+from foldyn.experiment.calibration.measured_paths import Shapes
+from foldyn.experiment.tracking.films import PHOTOS
 from foldyn.studies.herkal.specimen.prepared import prepare
 
 SYNTHETIC = "synthetic"

@@ -15,8 +15,8 @@ from foldyn import experiment, plots
 from foldyn.cases.reading import case_of_document, read_document
 from foldyn.errors import ComputationError
 from foldyn.experiment import Fit, History, Measurement
-from foldyn.experiment.fit_page import write_fit
-from foldyn.experiment.key_paths import replaced
+from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.linear import frf, modes
 from foldyn.results import netcdf, save
 from foldyn.studies import find_case

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases.values import number, show, suggest
 from foldyn.errors import InputError
-from foldyn.experiment.key_paths import number_keys, parts, value_at
-from foldyn.experiment.ties import Tie
+from foldyn.experiment.calibration.key_paths import number_keys, parts, value_at
+from foldyn.experiment.calibration.ties import Tie
 
 
 @dataclass(frozen=True)

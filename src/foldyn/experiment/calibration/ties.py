@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from foldyn.cases.values import suggest
 from foldyn.errors import InputError
-from foldyn.experiment.key_paths import parts
+from foldyn.experiment.calibration.key_paths import parts
 
 _OPERATIONS = {
     ast.Add: operator.add,

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.experiment.fit_figures import (
+from foldyn.experiment.calibration.fit_figures import (
     MOST,
     plot_correlation,
     plot_forces,
@@ -18,11 +18,11 @@ from foldyn.experiment.fit_figures import (
     plot_shapes,
     plot_spectra,
 )
-from foldyn.experiment.fit_problem import Run
-from foldyn.experiment.fitted import Fit
-from foldyn.experiment.measured_motions import History, Spectrum
-from foldyn.experiment.measured_paths import ForceDisplacement, Shapes
-from foldyn.experiment.measurement import Measurement
+from foldyn.experiment.calibration.fit_problem import Run
+from foldyn.experiment.calibration.fitted import Fit
+from foldyn.experiment.calibration.measured_motions import History, Spectrum
+from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.plots import style
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from foldyn.experiment.camera import axes_of_view
-from foldyn.experiment.matching import Match, Placing
-from foldyn.experiment.models import Model
+from foldyn.experiment.tracking.matching import Match, Placing
+from foldyn.experiment.tracking.models import Model
 
 
 def add_displacements(

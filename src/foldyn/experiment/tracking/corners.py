@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.experiment.junctions import refine
 from foldyn.experiment.opencv import opencv
+from foldyn.experiment.tracking.junctions import refine
 
 _CANDIDATES = 5  # of Harris's measure for each corner that is asked for
 

@@ -13,7 +13,7 @@ from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.cases.values import choice, show
 from foldyn.errors import InputError
-from foldyn.experiment.measurement import Measurement, axis_number, column
+from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
 
 IMPOSED = "imposed"
 """Selects all nodes that supports of the case move along the axis."""

@@ -15,7 +15,7 @@ from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
-from foldyn.experiment.measurement import Measurement, axis_number, column
+from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
 from foldyn.signals import sampling_interval, spectrum
 
 DETRENDS = (None, "constant", "linear")

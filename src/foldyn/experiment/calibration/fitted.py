@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 import foldyn
 from foldyn.errors import InputError
-from foldyn.experiment.fit_problem import Problem
-from foldyn.experiment.key_paths import replaced
+from foldyn.experiment.calibration.fit_problem import Problem
+from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import netcdf
 
 

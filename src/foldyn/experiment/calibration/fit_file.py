@@ -17,11 +17,11 @@ from foldyn.cases.reading import read_document
 from foldyn.cases.schema import Section
 from foldyn.cases.values import choice
 from foldyn.errors import InputError
-from foldyn.experiment.measured_files import READERS, read_measurement
-from foldyn.experiment.measured_motions import History, Spectrum
-from foldyn.experiment.measured_paths import ForceDisplacement, Shapes
-from foldyn.experiment.measurement import Measurement
-from foldyn.experiment.parameters import Parameter
+from foldyn.experiment.calibration.measured_files import READERS, read_measurement
+from foldyn.experiment.calibration.measured_motions import History, Spectrum
+from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.parameters import Parameter
 
 CLASSES = {one.kind: one for one in (ForceDisplacement, Shapes, History, Spectrum)}
 MADE = (

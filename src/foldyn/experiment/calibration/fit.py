@@ -16,12 +16,12 @@ from scipy.optimize import least_squares
 
 from foldyn.cases.values import number
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment.evaluations import Evaluations
-from foldyn.experiment.fit_problem import Problem, problem
-from foldyn.experiment.fitted import Descent, Estimate, Fit, score
-from foldyn.experiment.measurement import Measurement
-from foldyn.experiment.parameters import Parameter
-from foldyn.experiment.uncertainty import Uncertainty, uncertainty
+from foldyn.experiment.calibration.evaluations import Evaluations
+from foldyn.experiment.calibration.fit_problem import Problem, problem
+from foldyn.experiment.calibration.fitted import Descent, Estimate, Fit, score
+from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.parameters import Parameter
+from foldyn.experiment.calibration.uncertainty import Uncertainty, uncertainty
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""

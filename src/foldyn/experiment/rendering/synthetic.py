@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera
 from foldyn.experiment.opencv import opencv
-from foldyn.experiment.paper import Look
-from foldyn.experiment.picture import Sensor, Studio
+from foldyn.experiment.rendering.paper import Look
+from foldyn.experiment.rendering.picture import Sensor, Studio
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 """Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment.fit_problem import Problem
+from foldyn.experiment.calibration.fit_problem import Problem
 
 Outcome = NDArray[np.float64] | str
 """All predictions in a row, or why there are none."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.experiment.follow import Guide
-from foldyn.experiment.matching import Match, by_neighbors, hidden_nodes
-from foldyn.experiment.models import Model
-from foldyn.experiment.view import Array
+from foldyn.experiment.tracking.follow import Guide
+from foldyn.experiment.tracking.matching import Match, by_neighbors, hidden_nodes
+from foldyn.experiment.tracking.models import Model
+from foldyn.experiment.tracking.view import Array
 
 _FEWEST = 6
 

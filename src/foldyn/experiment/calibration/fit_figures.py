@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
-from foldyn.experiment.fitted import Fit
-from foldyn.experiment.measured_motions import History, Spectrum
-from foldyn.experiment.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.fitted import Fit
+from foldyn.experiment.calibration.measured_motions import History, Spectrum
+from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
 from foldyn.plots import style
 
 WIDTH = 9.0  # inches

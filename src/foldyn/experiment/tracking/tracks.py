@@ -12,13 +12,13 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment.corners import CornerSettings, find_corners
-from foldyn.experiment.films import Film, checked_box, open_film, read_photo
-from foldyn.experiment.follow import FollowSettings, Step, follow
-from foldyn.experiment.guide import guide_of
-from foldyn.experiment.matching import Match, Placing, match_nodes
-from foldyn.experiment.models import Model
 from foldyn.experiment.opencv import opencv
+from foldyn.experiment.tracking.corners import CornerSettings, find_corners
+from foldyn.experiment.tracking.films import Film, checked_box, open_film, read_photo
+from foldyn.experiment.tracking.follow import FollowSettings, Step, follow
+from foldyn.experiment.tracking.guide import guide_of
+from foldyn.experiment.tracking.matching import Match, Placing, match_nodes
+from foldyn.experiment.tracking.models import Model
 
 Tell = Callable[[int], None]
 
@@ -309,7 +309,7 @@ def _in_metres(
     known = how.placing.metres_per_pixel
     if model is None or match is None:
         return ds.assign_attrs({} if known is None else {"metres_per_pixel": known})
-    from foldyn.experiment.displacements import add_displacements
+    from foldyn.experiment.tracking.displacements import add_displacements
 
     missing = [node for node in how.nodes or () if node not in ds["node_of_point"].values]
     if missing:

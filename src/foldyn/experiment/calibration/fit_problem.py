@@ -20,9 +20,9 @@ from foldyn.cases.values import show
 from foldyn.dynamics import initial_state, simulate
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment.key_paths import replaced, value_at
-from foldyn.experiment.measurement import Measurement
-from foldyn.experiment.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.key_paths import replaced, value_at
+from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.program import program
 from foldyn.results import load
 from foldyn.statics import Settings, trace

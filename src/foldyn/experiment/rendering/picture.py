@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.experiment.camera import Camera
 from foldyn.experiment.opencv import opencv
-from foldyn.experiment.paper import Look, Paper, grain_tile, shading
+from foldyn.experiment.rendering.paper import Look, Paper, grain_tile, shading
 
 _MARGIN = 6  # pixels around the structure that are drawn anew in each picture
 
@@ -137,7 +137,7 @@ class Studio:
         self, positions: NDArray[np.float64], box: NDArray[np.int64], size: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """Mean of the rays in the part of the image that the structure may cover."""
-        from foldyn.experiment.raster import draw
+        from foldyn.experiment.rendering.raster import draw
 
         camera, look, paper = self.camera, self.look, self.paper
         shape = (int(size[1]), int(size[0]))

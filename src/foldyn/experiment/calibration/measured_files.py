@@ -16,10 +16,10 @@ from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
 from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
-from foldyn.experiment.measured_motions import History, Spectrum
-from foldyn.experiment.measured_paths import IMPOSED, ForceDisplacement, Shapes
-from foldyn.experiment.measurement import Measurement, axis_number
-from foldyn.experiment.store import load_tracks
+from foldyn.experiment.calibration.measured_motions import History, Spectrum
+from foldyn.experiment.calibration.measured_paths import IMPOSED, ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measurement import Measurement, axis_number
+from foldyn.experiment.tracking.store import load_tracks
 
 
 def force_displacement(

@@ -16,7 +16,7 @@ from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.cases.supports import AXES
 from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
-from foldyn.experiment.key_paths import parts
+from foldyn.experiment.calibration.key_paths import parts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

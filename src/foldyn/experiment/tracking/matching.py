@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.experiment.camera import axes_of_view
-from foldyn.experiment.junctions import refine
-from foldyn.experiment.view import Array, View, fit_view
+from foldyn.experiment.tracking.junctions import refine
+from foldyn.experiment.tracking.view import Array, View, fit_view
 
 _TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # of the image about the line of sight
 _SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # about the scale by size, where it is not known

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.experiment.junctions import refine
 from foldyn.experiment.opencv import opencv
+from foldyn.experiment.tracking.junctions import refine
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 

@@ -1,0 +1,1 @@
+"""Calibration: numbers of a case file found from measurements."""

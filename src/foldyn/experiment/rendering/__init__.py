@@ -1,0 +1,1 @@
+"""Synthetic pictures: films and photographs of simulated motions and paths."""
