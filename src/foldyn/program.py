@@ -39,4 +39,5 @@ def digest(package: Path, *more: str) -> str:
 
 
 def _sources(part: Path) -> list[Path]:
-    return [part] if part.is_file() else list(part.rglob("*.py"))
+    inside = [path for path in part.rglob("*") if path.suffix in (".py", ".toml")]
+    return [part] if part.is_file() else inside

@@ -18,6 +18,7 @@ from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
+from foldyn.studies.herkal.specimen.agreement import vibration_of
 from foldyn.studies.herkal.specimen.measured import Data, data_of
 
 STEP = 1.0 / calibration.RATE
@@ -99,14 +100,30 @@ def test_preparation_starts_at_the_first_turning_point() -> None:
     expected = ringing(found.history.time + start, LATE)
     np.testing.assert_allclose(found.history.values[:, 0], expected, atol=4e-5)
     np.testing.assert_array_equal(found.history.values, found.whole)
-    assert found.history.align == prepared.SLACK and found.history.detrend == "linear"
+    assert found.history.align == 0.015 and found.history.detrend == "linear"
     assert next(iter(found.steps)) == "as tracked" and len(found.steps) == 5
 
 
-def test_preparation_of_a_film_that_begins_with_the_release() -> None:
-    found = prepared.prepare(film(n8=ringing(TIME)))
-    assert found.before[0] == pytest.approx(4e-3, rel=1e-2)
-    assert found.released <= STEP
+@pytest.mark.parametrize("cut", [-1, 0, 2, 6])
+def test_a_film_that_begins_with_the_release_or_after_it(cut) -> None:
+    """The press would be taken for less than it was."""
+    x = ringing(TIME + cut * STEP)
+    with pytest.raises(InputError, match=r"node 8 is not still for 0.0125 s before it moves"):
+        prepared.prepare(film(n8=x))
+
+
+@pytest.mark.parametrize("duration", [0.15, 0.4])
+def test_a_film_that_shows_the_pressing_too(duration) -> None:
+    """At rest, pressed within some time, held, released: what phones film."""
+    time = np.arange(480) * STEP
+    pressing = np.clip((time - 0.1) / duration, 0.0, 1.0) ** 2 * 4e-3
+    late = 0.1 + duration + 0.2 + 0.4 * STEP
+    wander = 1e-4 * np.sin(2.0 * np.pi * 0.8 * time)  # of the hand
+    x = np.where(time < late, pressing + wander, ringing(time, late) + wander[-1])
+    history = History(nodes=[8], time=time, values=x[:, None], name="film")
+    found = prepared.prepare(history)
+    assert found.released == pytest.approx(late, abs=1.5 * STEP)
+    assert found.before[0] == pytest.approx(4e-3, rel=0.05)
 
 
 def test_times_of_a_table_are_rounded() -> None:
@@ -122,7 +139,7 @@ def test_gaps() -> None:
     x["n8"][60:64] = np.nan  # short: filled for spectra
     x["n15"][60:75] = np.nan  # long
     x["n22"][34:] = np.nan  # lost for good
-    x["n29"][31:36] = np.nan  # over the turning point, where the record begins
+    x["n29"][30:35] = np.nan  # over the turning point, where the record begins
     found = prepared.prepare(film(**x))
     assert found.nodes == [8, 15, 29]
     missing = ~np.isfinite(found.history.values)
@@ -146,7 +163,7 @@ def test_gaps() -> None:
             {"n8": np.where((TIME > 0.3) & (TIME < 0.6), np.nan, ringing(TIME, LATE))},
             "node 8 was lost for more than 8 frames while it swings",
         ),
-        ({"n8": 1e-3 * np.exp(-TIME / 0.1)}, "does not turn"),
+        ({"n8": 1e-3 * np.exp(-np.maximum(TIME - 0.1, 0) / 0.1)}, "film: node 8 does not swing"),
     ],
 )
 def test_what_cannot_be_prepared(nodes, message) -> None:
@@ -175,6 +192,20 @@ def test_where_on_the_path_a_shape_lies(path) -> None:
         evaluation.load_factor(path, FRONT, np.full(24, np.nan))
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda u: -u, "move upwards: turn the sign of x, which points down"),
+        (lambda u: 5.0 * u, "goes down by 56 mm at most; is the unit or scale right"),
+        (lambda u: u[::-1], "they move unlike the model pressed from above"),
+    ],
+)
+def test_shapes_that_no_state_of_the_model_has(path, change, message) -> None:
+    moved = calibration.pressed([0.3333]).displacement.sel(node=list(FRONT), axis="x").values[0]
+    with pytest.raises(InputError, match=message):
+        evaluation.load_factor(path, FRONT, change(moved))
+
+
 def photographs(changes=None):
     """Tracks of photographs of the model under the three weights, without error."""
     there = calibration.pressed([0.0, *calibration.weighed(changes)], changes)
@@ -184,7 +215,7 @@ def photographs(changes=None):
         {"displacement": (("photo", "node", "axis"), moved)},
         {"node": np.arange(63), "axis": list("xyz"), "load": ("photo", [0, *calibration.WEIGHTS])},
         {"foldyn_tracks": 1, "match_rms_px": np.full(4, 0.2), "metres_per_pixel": 8e-5},
-    )
+    ).assign(rest_position=there.rest_position[:63].drop_vars(["node", "axis"]))
 
 
 def test_folds_from_tracked_photographs() -> None:
@@ -199,6 +230,29 @@ def test_folds_from_tracked_photographs() -> None:
         assert found[key].value == pytest.approx(value, rel=2e-3)
     with pytest.raises(InputError, match="track them with --loads"):
         evaluation.static_test(photographs().drop_vars("load"), "")
+
+
+def test_a_specimen_that_slid_along_y() -> None:
+    """It stands on the plate unglued."""
+    straight, slid = photographs(), photographs()
+    slid["displacement"][..., 1] += np.array([0.0, 1e-3, -2e-3, 3e-3])[:, None]
+    shapes = [evaluation.static_test(one, "")[1].values for one in (straight, slid)]
+    np.testing.assert_allclose(shapes[1], shapes[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.drop_vars("displacement"), "tracked without a model"),
+        (lambda t: t.isel(node=slice(0, 9)), "tracked with another model"),
+        (lambda t: t.assign(rest_position=1.2 * t.rest_position), "tracked with another model"),
+        (lambda t: t.assign(displacement=np.nan * t.displacement), "no front node was measured"),
+        (lambda t: t.assign(displacement=-t.displacement), "photograph 1: .* turn the sign"),
+    ],
+)
+def test_tracks_that_are_not_of_the_specimen(change, message) -> None:
+    with pytest.raises(InputError, match=message):
+        evaluation.static_test(change(photographs()), "")
 
 
 def test_a_softer_sheet_is_taken_for_softer_folds() -> None:
@@ -242,7 +296,7 @@ def test_the_support_decides_frequency_and_damping(released) -> None:
     front = evaluation.compared(released, motions)
     assert front.sizes["support"] == 3 and front.node.values.tolist() == list(FRONT)
     frequency = {
-        str(name): page.vibration_of(front.model.sel(support=name, node=WATCHED).values, STEP).peak
+        str(name): vibration_of(front.model.sel(support=name, node=WATCHED).values, STEP).peak
         for name in front.support.values
     }
     assert frequency["plate"] == pytest.approx(9.5, rel=0.03)
@@ -263,6 +317,14 @@ def tables(tmp_path):
     (tmp_path / "shapes.csv").write_text("load_factor,node,x [m]\n0.5,8,0.02\n")
     (tmp_path / "load.png").write_bytes(b"")
     (tmp_path / "grams.csv").write_text("displacement [mm],force [g]\n20,12.75\n36,23.05\n")
+    forces = {
+        "one": "20,0.125", "metres": "20000,0.125\n36000,0.226", "upwards": "-20,0.1\n36,0.2",
+        "pulled": "20,-0.125\n36,-0.226",
+    }  # fmt: skip
+    for name, lines in forces.items():
+        (tmp_path / f"{name}.csv").write_text(f"displacement [mm],force [N]\n{lines}\n")
+    slow = "\n".join(f"{k / 30:.5f},{x:.9f}" for k, x in enumerate(ringing(np.arange(40) / 30)))
+    (tmp_path / "slow.csv").write_text(f"time [s],node 8 x [m]\n{slow}\n")
     (tmp_path / "other.csv").write_text("time [s],node 9 x [m]\n0,0.1\n1,0.2\n2,0.1\n")
     (tmp_path / "film.mp4").write_text("no film")
     return tmp_path
@@ -292,6 +354,11 @@ def test_files_are_sorted_by_what_they_hold(tables) -> None:
         (["grams.csv"], "the unit [g] is not known"),
         (["other.csv"], "node 8 was not measured; it tells the release"),
         (["weights.csv", "weights.csv"], "is a static test, too; give one of each"),
+        (["one.csv"], "1 force cannot give 2 parameters"),
+        (["metres.csv"], "displacements are 2e+04 to 3.6e+04 mm"),
+        (["upwards.csv"], "must be above 0, downwards"),
+        (["pulled.csv"], "a force is -0.226 N"),
+        (["slow.csv"], "30 frames per second are too few"),
         (["load.png"], "track photographs first, foldyn track"),
         (["shapes.csv"], "shapes without forces say nothing of the stiffness"),
         (["film.mp4"], "film.mp4"),
@@ -359,3 +426,84 @@ def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path) -> None:
     told = page.sections(tmp_path, then, Album(tmp_path))
     text = "".join(section.html() for section in told)
     assert "SYNTHETIC" in text and text.count("<figure>") == 10
+
+
+# ---------------------------------------------------------------------- the page
+def front_of(**models):
+    """What `compared` gives, by hand: nodes 1 and 8, the film a cosine of 9.5 Hz."""
+    time = np.arange(120) * STEP
+    film = np.stack([ringing(time), 0.5 * ringing(time)], axis=1)
+    x = np.stack([film * models.get(name, 1.0) for name in ("plate", "glued", "glue alone")])
+    if "alone" in models:
+        since = np.exp(-9.0 * time) * np.cos(2.0 * np.pi * models["alone"] * time)
+        x[2] = 4e-3 * np.stack([since, 0.5 * since], axis=1)
+    along = ("time", "node")
+    return xr.Dataset(
+        {"measured": (along, film), "whole": (along, film.copy()), "model": (("support", *along), x)},
+        {"time": time, "node": [1, 8], "support": ["plate", "glued", "glue alone"]},
+    )
+
+
+def test_agreement_of_film_and_model_by_node() -> None:
+    front = front_of(glued=1.1, plate=0.7)
+    table = page._agreement(front)
+    assert list(table.header)[2:] == [
+        "time: glued (%)", "time: ideal (%)", "frequency: glued (%)", "frequency: ideal (%)",
+    ]  # fmt: skip
+    for row, node, fitted in zip(table.rows, (1, 8), (False, True), strict=True):
+        assert row[0] == node and (row[1] == "fitted") == fitted
+        np.testing.assert_allclose(row[2:], [10.0, 30.0, 10.0, 30.0], rtol=1e-9)
+    front["whole"][:, 1] = np.nan
+    assert page._agreement(front).rows[1][4:] == [None, None]
+
+
+def test_what_is_said_of_the_supports_is_what_was_found() -> None:
+    assert "So the plate held the row" in page._glue(front_of(alone=6.0))
+    assert "So the plate held" not in page._glue(front_of(alone=9.4))
+    flat = front_of()
+    flat["model"][2] = 0.0
+    assert "no peak" in page._glue(flat)
+
+
+def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None:
+    """The film began 32.1 ms before the release."""
+    positions = np.zeros((240, 63, 3))
+    time = np.arange(240) * STEP
+    for node in FRONT:
+        positions[:, node, 0] = np.interp(
+            time - 0.0321, motion.time, motion.displacement[:, node, 0]
+        )
+    truth = xr.Dataset(
+        {"position": (("time", "node", "axis"), positions)},
+        {"time": time, "node": np.arange(63), "axis": list("xyz")},
+    )
+    motions = evaluation.motions(released)
+    front = evaluation.compared(released, motions, truth)
+    assert float(np.abs(front.true - front.measured).max()) < 1e-6
+    assert page._tracked(front)[0].text.startswith("The front nodes were measured in 100.0%")
+
+
+def test_a_fit_that_is_none_says_so(released) -> None:
+    summary = released.fits["glued"].summary()
+    assert page._doubt(summary, "node 8") == []
+    summary["measurements"][0]["relative"] = 0.9
+    summary["parameters"][1] |= {"at_bound": True, "note": "at its bound: the data pull it further"}
+    (told,) = page._doubt(summary, "node 8")
+    assert told.text.startswith("DO NOT USE") and "misfit is 90%" in told.text
+    assert "beta (s) is at its bound" in told.text
+
+
+def test_other_data_in_a_folder_leave_nothing_of_the_first(tables) -> None:
+    """Figures of a synthetic study must not stand on the page of measured data."""
+    inside = tables / tasks.FOLDER
+    for name in ("folds/data-1.png", "film.png", "damping/data-0.png", tasks.FILM):
+        (inside / name).parent.mkdir(parents=True, exist_ok=True)
+        (inside / name).write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(20))
+    given = data_of([str(tables / "weights.csv")])
+    _, (fit, response) = tasks.parts(synthetic.COARSE, given)
+    fit.make(tables)
+    told = page.sections(tables, [fit, response], Album(tables))
+    text = "".join(section.html() for section in told)
+    assert text.count("<figure>") == 1 and "Release" not in text and "corners" not in text
+    assert not (inside / "damping").exists()
+    assert tasks.Part("film", data=given).settings()["data"] == {}

@@ -68,7 +68,7 @@ def shapes(
         Other arguments of `Shapes`.
     """
     names = _names(file)
-    if file.suffix == ".nc" or "photo" in names:
+    if file.suffix.lower() == ".nc" or "photo" in names:
         return _shapes_of_tracks(file, nodes, load_factor, **known)
     if load_factor is not None:
         raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
@@ -160,7 +160,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
             f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
             'kind = "shapes", load_factor = [...]'
         )
-    if file.suffix == ".nc":
+    if file.suffix.lower() == ".nc":
         moved = _along(file, _tracks(file, "time")["displacement"], [axis])[..., 0]
         nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
         if not nodes:
@@ -183,7 +183,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
 
 def _names(file: Path) -> list[str]:
     """Names of the columns of a CSV file, or of the dimensions of tracks."""
-    if file.suffix == ".nc":
+    if file.suffix.lower() == ".nc":
         return [str(name) for name in load_tracks(file).sizes]
     return [name for name, _ in read_headings(file)]
 
@@ -201,7 +201,7 @@ def _motions(
     names = _names(file)
     if "photo" in names:
         raise InputError(f'{file}: holds photographs, which have no times; use kind = "shapes"')
-    if file.suffix == ".nc":
+    if file.suffix.lower() == ".nc":
         moved = _along(file, _tracks(file, "time")["displacement"], [axis], nodes)
         return moved["time"].values, moved.values[..., 0]
     axis_number(f"{file}: axis", axis)
@@ -220,7 +220,7 @@ def _motions(
 def _shapes_of_tracks(
     file: Path, nodes: Any, load_factor: Sequence[float] | None, **known: Any
 ) -> Shapes:
-    moved = _tracks(file, "photo")["displacement"] if file.suffix == ".nc" else _table(file)
+    moved = _tracks(file, "photo")["displacement"] if file.suffix.lower() == ".nc" else _table(file)
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(

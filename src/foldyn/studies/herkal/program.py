@@ -7,7 +7,9 @@ from foldyn import program as computing
 CASE_STUDIES = tuple(
     f"studies/herkal/{name}.py" for name in ("models", "runs", "metric", "partners", "sensitivity")
 )
-SPECIMEN = ("experiment", "studies/herkal/calibration.py", "studies/herkal/specimen")
+SPECIMEN = (
+    "experiment", "studies/herkal/calibration.py", "studies/herkal/specimen", "studies/herkal/cases"
+)  # fmt: skip
 
 
 def program() -> str:

@@ -25,6 +25,8 @@ from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
 from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 
 FILM_SUPPORT = "glued"
+UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
+SAME = 1e-4  # m, by which positions at rest may differ
 FACTORS = np.linspace(0.0, 1.0, 29)  # of the path on which measured shapes are sought
 
 
@@ -38,28 +40,55 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
     nodes : sequence of int
     moved : ndarray, shape (m,)
         Displacement along x (m), NaN of nodes that were not seen.
+
+    Raises
+    ------
+    InputError
+        No node was seen, or they have moved as on no state of the path.
     """
     known = np.isfinite(moved)
     if not known.any():
         raise InputError("no front node was measured; the displacement of the top is unknown")
-    there = [node for node, seen in zip(nodes, known, strict=True) if seen]
-    along = path["displacement"].sel(node=there, axis="x").values
-    shape = CubicSpline(path["load_factor"].values, along)
+    shape = _along(path, [node for node, seen in zip(nodes, known, strict=True) if seen])
 
     def misfit(factor: float) -> float:
-        return float(np.sum((shape(factor) - moved[known]) ** 2))
+        return float(np.sqrt(np.mean((shape(factor)[:, 0] - moved[known]) ** 2)))
 
     factors = path["load_factor"].values
     near = int(np.argmin([misfit(f) for f in factors]))
     span = factors[max(0, near - 1)], factors[min(len(factors) - 1, near + 1)]
-    return float(minimize_scalar(misfit, bounds=span, method="bounded", options={"xatol": 1e-9}).x)
+    found = minimize_scalar(misfit, bounds=span, method="bounded", options={"xatol": 1e-9})
+    size = float(np.sqrt(np.mean(moved[known] ** 2)))
+    if found.fun > UNLIKE * size:
+        mean = float(np.mean(moved[known]))
+        why = (
+            "they move upwards: turn the sign of x, which points down"
+            if mean < 0.0
+            else f"the model goes down by {1e3 * FULL:g} mm at most; is the unit or scale right?"
+            if found.x > 0.999 * factors[-1]
+            else "they move unlike the model pressed from above"
+        )
+        raise InputError(
+            f"front nodes have moved by {1e3 * mean:.3g} mm along x on average, which is "
+            f"{found.fun / size:.0%} off the nearest state of the model: {why}"
+        )
+    return float(found.x)
 
 
-def static_test(photos: xr.Dataset, label: str) -> list[Measurement]:
+def _along(path: xr.Dataset, nodes: Sequence[int]) -> CubicSpline:
+    """Displacements of nodes, shape (m, 3), by the load factor."""
+    moved = path["displacement"].sel(node=list(nodes)).transpose("step", "node", "axis").values
+    return CubicSpline(path["load_factor"].values, moved)
+
+
+def static_test(
+    photos: xr.Dataset, label: str, changes: Mapping[str, Any] | None = None
+) -> list[Measurement]:
     """Forces over displacements of the top, and shapes of the front, from tracked photographs.
 
     The straight edge of the top has no corners once it is loaded: its displacement is that of the
-    model's state in which the corners below fit best.
+    model's state in which the corners below fit best. The specimen is not glued: where it slid
+    along y counts for nothing.
 
     Parameters
     ----------
@@ -67,15 +96,31 @@ def static_test(photos: xr.Dataset, label: str) -> list[Measurement]:
         Of `foldyn.experiment.track_photos`, with the coordinate `load` (N).
     label : str
         What the data are called.
+    changes : mapping, optional
+        Values of the model, by key, whose states are compared.
+
+    Raises
+    ------
+    InputError
+        No loads, or nodes that have moved as no state of the model.
     """
-    if "load" not in photos.coords:
-        raise InputError("the tracks of photographs have no loads: track them with --loads")
-    loaded = photos.isel(photo=np.flatnonzero(photos["load"].values > 0.0))
-    moved = loaded["displacement"].sel(node=list(FRONT))
-    path = calibration.pressed(FACTORS)
-    factors = [load_factor(path, FRONT, along) for along in moved.sel(axis="x").values]
+    check_tracks(photos)
+    loads = photos["load"].values if "load" in photos.coords else np.zeros(photos.sizes["photo"])
+    if not (loads > 0.0).any():
+        raise InputError("no photograph has a load above 0 N: track them with --loads")
+    numbers = np.flatnonzero(loads > 0.0)
+    loaded = photos.isel(photo=numbers)
+    moved = loaded["displacement"].sel(node=list(FRONT), axis=["x", "y"]).values.copy()
+    path = calibration.pressed(FACTORS, changes)
+    shape, factors = _along(path, FRONT), []
+    for number, one in zip(numbers, moved, strict=True):
+        try:
+            factors.append(load_factor(path, FRONT, one[:, 0]))
+        except InputError as error:
+            raise InputError(f"photograph {number}: {error}") from None
+        one[:, 1] -= np.nanmean(one[:, 1] - shape(factors[-1])[:, 1])
     rms = np.asarray(photos.attrs["match_rms_px"]) * float(photos.attrs["metres_per_pixel"])
-    seen = np.isfinite(moved.values).any(axis=(0, 2))
+    seen = np.isfinite(moved).any(axis=(0, 2))
     return [
         ForceDisplacement(
             nodes=calibration.TOP, displacement=FULL * np.array(factors),
@@ -83,10 +128,35 @@ def static_test(photos: xr.Dataset, label: str) -> list[Measurement]:
         ),
         Shapes(
             nodes=np.array(FRONT)[seen].tolist(), load_factor=factors, axes="xy",
-            values=moved.sel(axis=["x", "y"]).values[:, seen],
+            values=moved[:, seen],
             sigma=float(np.sqrt(np.mean(rms**2) / 2.0)), name="front corners", label=label,
         ),
     ]  # fmt: skip
+
+
+def check_tracks(tracks: xr.Dataset) -> None:
+    """Refuse tracks that are not of the specimen, seen from the front.
+
+    Raises
+    ------
+    InputError
+        No model, another sheet, or x unknown.
+    """
+    rest = calibration.pressed([0.0])["rest_position"].sel(node=list(FRONT)).values
+    if "displacement" not in tracks:
+        raise InputError("tracked without a model: foldyn track needs --model herkal/specimen")
+    known = set(FRONT) <= set(tracks["node"].values.tolist())
+    theirs = tracks["rest_position"].sel(node=list(FRONT)).values if known else rest + np.inf
+    if np.abs(theirs - rest).max() > SAME:
+        raise InputError("tracked with another model: foldyn track needs --model herkal/specimen")
+    if (
+        "x" not in tracks["axis"].values
+        or not np.isfinite(tracks["displacement"].sel(node=list(FRONT), axis="x").values).any()
+    ):
+        raise InputError(
+            "no front node was measured along x: film the specimen from the front (--up=-x "
+            "--facing z)"
+        )
 
 
 @dataclass(frozen=True, eq=False)

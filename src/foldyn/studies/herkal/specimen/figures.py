@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from foldyn.linear import peaks_of
 from foldyn.plots import style
-from foldyn.signals import sampling_interval, spectrum
-from foldyn.studies.herkal.calibration import BAND, WATCHED
+from foldyn.signals import sampling_interval
+from foldyn.studies.herkal.calibration import WATCHED
+from foldyn.studies.herkal.specimen.agreement import content
 
 if TYPE_CHECKING:
     import xarray
@@ -25,18 +26,6 @@ SUPPORT_NAMES = {
     "plate": "plate alone (ideal)",
     "glue alone": "node 59 alone",
 }
-
-
-FINER = 8  # times by which the grid of frequencies is finer than the resolution
-
-
-def content(x: NDArray[np.float64], step: float) -> tuple[NDArray, NDArray] | None:
-    """Frequencies (Hz) up to the band's end and amplitudes; None where samples are missing."""
-    if not np.isfinite(x).all():
-        return None
-    frequency, amplitude = spectrum(x, step, detrend="constant", pad=FINER)
-    inside = frequency <= BAND[1]
-    return frequency[inside], amplitude[inside]
 
 
 def plot_front(front: xarray.Dataset, support: str, label: str, note: str) -> Figure:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from foldyn.errors import InputError
 from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
-from foldyn.experiment.calibration.measured_paths import Shapes
 from foldyn.experiment.tracking.films import PHOTOS
+from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL
+from foldyn.studies.herkal.specimen import evaluation
 from foldyn.studies.herkal.specimen.prepared import prepare
 
 SYNTHETIC = "synthetic"
@@ -41,7 +43,7 @@ class Data:
     @property
     def film(self) -> Path | None:
         """The release, where it is a film that is still to be tracked."""
-        is_film = self.release is not None and self.release.suffix not in (".nc", ".csv")
+        is_film = self.release is not None and self.release.suffix.lower() not in (".nc", ".csv")
         return self.release if is_film else None
 
     @property
@@ -80,11 +82,14 @@ def data_of(names: Sequence[str]) -> Data:
         if not file.is_file():
             what = "is a folder; name a file in it" if file.is_dir() else "there is no such file"
             raise InputError(f"--data {name}: {what}")
-        kind = _kind(file)
+        try:
+            kind = _kind(file)
+        except InputError as error:
+            said = str(error)
+            raise InputError(f"--data {said if str(file) in said else f'{file}: {said}'}") from None
         if kind in found:
-            raise InputError(
-                f"--data {name}: {found[kind]} is a {kind} test, too; give one of each"
-            )
+            what = {"static": "a static test", "release": "a release"}[kind]
+            raise InputError(f"--data {name}: {found[kind]} is {what}, too; give one of each")
         found[kind] = file.resolve()
     return Data(**found)
 
@@ -95,42 +100,59 @@ def measurement(file: Path, label: str) -> Measurement:
 
 
 def _kind(file: Path) -> str:
-    """Whether a file is of a static test ("static") or of a release ("release")."""
-    if file.suffix.lower() in PHOTOS:
+    """Whether a file is of a static test ("static") or of a release ("release").
+
+    All that can be said against it is said here, before anything is computed.
+    """
+    suffix = file.suffix.lower()
+    if suffix in PHOTOS:
         raise InputError(
-            f"--data {file}: track photographs first, foldyn track PHOTO PHOTO ... --model "
-            "herkal/specimen --loads N,N,... and give their tracks (*.nc)"
+            "track photographs first, foldyn track PHOTO PHOTO ... --model herkal/specimen "
+            "--loads N,N,... and give their tracks (*.nc)"
         )
-    if file.suffix == ".csv":
-        told = measurement(file, "")
-        if isinstance(told, ForceDisplacement):
-            return "static"
-        if isinstance(told, Shapes):
-            raise InputError(
-                f"--data {file}: shapes without forces say nothing of the stiffness; give forces "
-                "over displacements, or tracks of photographs with loads"
-            )
-        return _released(told)
-    if file.suffix == ".nc":
+    if suffix == ".nc":
         tracks = load_tracks(file)
-        if "photo" not in tracks.dims:
-            return _released(measurement(file, ""))
-        if "load" not in tracks.coords or "displacement" not in tracks:
-            raise InputError(
-                f"--data {file}: photographs without loads, or without a model: track them with "
-                "--loads and --model herkal/specimen"
-            )
+        if "photo" in tracks.dims:
+            evaluation.static_test(tracks, "")
+            return "static"
+        evaluation.check_tracks(tracks)
+    elif suffix != ".csv":
+        open_film(str(file))
+        return "release"
+    told = measurement(file, "")
+    if isinstance(told, ForceDisplacement):
+        _check_forces(told)
         return "static"
-    open_film(str(file))  # says why, where it is none
+    if not isinstance(told, History):
+        raise InputError(
+            "shapes without forces say nothing of the stiffness; give forces over displacements, "
+            "or tracks of photographs with loads (*.nc)"
+        )
+    prepare(told)
     return "release"
 
 
-def _released(told: Measurement) -> str:
-    assert isinstance(told, History)
-    prepare(told)  # says at the door why it is no release
-    return "release"
+def _check_forces(told: ForceDisplacement) -> None:
+    """Refuse points from which the folds cannot be found."""
+    moved = told.displacement
+    if len(moved) < len(FOLD_RANGES):
+        raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
+    if not ((moved > 0.0) & (moved <= FULL)).all():
+        raise InputError(
+            f"displacements are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; those of "
+            f"the top must be above 0, downwards, and at most {1e3 * FULL:g} mm"
+        )
+    if not (told.force > 0.0).all():
+        raise InputError(f"a force is {told.force.min():.3g} N; those that press are positive")
 
 
 def _digest(file: Path) -> str:
+    state = file.stat()
+    return _digest_of(file, state.st_size, state.st_mtime_ns)
+
+
+@cache
+def _digest_of(file: Path, size: int, changed: int) -> str:
+    """Digest of a file; that of a long film takes seconds."""
     with file.open("rb") as opened:
         return hashlib.file_digest(opened, "sha256").hexdigest()[:16]

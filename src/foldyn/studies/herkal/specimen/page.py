@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,26 +11,30 @@ import numpy as np
 import xarray as xr
 
 from foldyn import plots
-from foldyn.errors import InputError
 from foldyn.linear import character, peaks_of
 from foldyn.report import Heading, Picture, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.results import case_of, load, netcdf
-from foldyn.signals import find_peaks, log_decrement, sampling_interval
+from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
 from foldyn.studies.herkal.case_page import NO_BREAK
-from foldyn.studies.herkal.metric import deviation
 from foldyn.studies.herkal.specimen import figures, synthetic, tasks
+from foldyn.studies.herkal.specimen.agreement import (
+    NEAR,
+    content_misfit,
+    misfit,
+    vibration_of,
+)
 from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
-from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES, content
+from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
 from foldyn.studies.targets import Target, read_targets
 
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
 TARGETS = Path(__file__).parents[1] / "targets.toml"
-NEAR = (4.0, 14.0)  # Hz, where the axial vibration is sought
 CORNER = 0  # top node at which the frequency response is read
+POOR = 0.3  # misfit, as a part of what was measured, above which a fit is none
 HIGHEST = 22.0  # Hz, of the peaks in the table
 SYMBOLS = {
     "sheet.length_scale_ratio": "length-scale ratio",
@@ -100,14 +103,15 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
     parts += [
         Table(
             ["displacement of the top (mm)", "weight (N)"], rows,
-            "What is fitted, with the shapes: displacements of the top, imposed on the model, and "
-            "the weights that its reaction must equal.",
+            "What is fitted: displacements of the top, imposed on the model, and the weights that "
+            "its reaction must equal.",
         ),
         _estimates({"": found["folds"]}, FOLDS, data),
+        *_doubt(found["folds"], "weights"),
         Picture(folder / "folds" / "data-0.png", "Forces, and the fitted model."),
     ]  # fmt: skip
     shapes = folder / "folds" / "data-1.png"
-    if shapes.is_file():
+    if shapes.is_file():  # the folder is made anew by each fit
         parts.append(
             Picture(shapes, "Deformed shapes of the model over the corners in the photographs.")
         )
@@ -137,17 +141,35 @@ def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], d
     return Table(header, rows, "Fitted parameters.", digits=4)
 
 
+def _doubt(fit: dict[str, Any], what: str) -> list[Section]:
+    """Say in words where a fit is none."""
+    told = []
+    poor = [m for m in fit["measurements"] if m["name"] == what and m["relative"] > POOR]
+    if poor:
+        told.append(f"the misfit is {poor[0]['relative']:.0%} of what was measured")
+    told += [f"{SYMBOLS[p['key']]} is {p['note']}" for p in fit["parameters"] if p["at_bound"]]
+    told += [
+        f"the data do not determine {SYMBOLS[p['key']]}"
+        for p in fit["parameters"]
+        if not p["determined"] and not p["at_bound"]
+    ]
+    if not told:
+        return []
+    return [Text(f"DO NOT USE THESE PARAMETERS, nor what follows from them: {'; '.join(told)}.")]
+
+
 # ---------------------------------------------------------------------- release
 def _release(
     folder: Path, found: dict[str, Any], data: Data, album: Album, note: str
 ) -> list[Section]:
     front = netcdf.read(folder / tasks.FRONT, "cannot be read as NetCDF")
     parts: list[Section] = [Heading("Release: the damping", 3)]
-    if (folder / "film.png").is_file():
+    filmed = data.synthetic or data.film is not None
+    if filmed:
         parts.append(
             Picture(folder / "film.png", "The frame of the film in which the model was recognized.")
         )
-    label = f"{data.label} film" if (folder / tasks.FILM).is_file() else data.label
+    label = f"{data.label} film" if filmed else data.label
     parts += [
         Picture(
             folder / "steps.png",
@@ -161,6 +183,7 @@ def _release(
             "nodes are held out."
         ),
         _estimates(found["damping"], DAMPING, data),
+        *_doubt(found["damping"][FILM_SUPPORT], f"node {WATCHED}"),
         album.figure(
             "specimen-supports",
             f"Node {WATCHED}: the film, and the model on three supports (left), and their spectra "
@@ -184,45 +207,6 @@ def _release(
         _agreement(front),
     ]
     return parts
-
-
-@dataclass(frozen=True)
-class Vibration:
-    """Axial vibration of a record; nan where there is none.
-
-    Attributes
-    ----------
-    peak : float
-        Frequency (Hz) of the highest peak of the amplitude spectrum.
-    frequency, damping_ratio : float
-        From the maxima over time, by the logarithmic decrement (Hz).
-    """
-
-    peak: float = math.nan
-    frequency: float = math.nan
-    damping_ratio: float = math.nan
-
-    @property
-    def cells(self) -> list[float | None]:
-        """For a table: Hz, Hz and per cent."""
-        return [_cell(v) for v in (self.peak, self.frequency, 100.0 * self.damping_ratio)]
-
-
-def vibration_of(x: np.ndarray, step: float) -> Vibration:
-    """Axial vibration of a record of which nothing is missing."""
-    found = content(x, step)
-    if found is None:
-        return Vibration()
-    peaks = find_peaks(*found)
-    near = (peaks.frequency > NEAR[0]) & (peaks.frequency < NEAR[1])
-    if not near.any():
-        return Vibration()
-    peak = float(peaks.frequency[near][np.argmax(peaks.height[near])])
-    try:
-        maxima = log_decrement(x, step, rest=0.0, frequency=peak)
-    except InputError:  # fewer than two
-        return Vibration(peak)
-    return Vibration(peak, maxima.damped_frequency, maxima.damping_ratio)
 
 
 def _peaks(front: xr.Dataset, data: Data) -> Table:
@@ -263,20 +247,24 @@ def _tracked(front: xr.Dataset) -> list[Section]:
 
 
 def _glue(front: xr.Dataset) -> str:
+    """What the supports do to the frequency, and whether that tells them apart."""
     step = sampling_interval(front["time"].values)
     held, alone = (
         vibration_of(front["model"].sel(node=WATCHED, support=support).values, step).peak
         for support in (FILM_SUPPORT, "glue alone")
     )
     paper = _targets()["release_frequency"].value
-    return (
-        "The paper glued node 59 and let the specimen stand on the plate. Held at node 59 alone, "
-        "with nothing below the other nodes of the bottom, the model vibrates at "
-        f"{alone:.1f} Hz; with the row kept in x by the plate at {held:.1f} Hz, beside the paper's "
-        f"{paper:g} Hz. It is the plate that makes the frequency. Glue instead of a smooth plate "
-        "changes the damping that one finds, as the table above says: a wrong support is paid for "
-        "in alpha and beta."
+    told = (
+        "The paper glued node 59 and let the specimen stand on the plate. The model has its peak "
+        f"at {alone:.1f} Hz when it is held at node 59 alone, with nothing below the other nodes "
+        f"of the bottom, and at {held:.1f} Hz with the row kept in x by the plate; the paper found "
+        f"{paper:g} Hz."
     )
+    if not math.isfinite(held) or not math.isfinite(alone):
+        return "With one of the supports the model has no peak where it is sought."
+    if abs(held - paper) < 0.5 * abs(alone - paper):
+        told += " So the plate held the row, whatever the glue did."
+    return told
 
 
 def _agreement(front: xr.Dataset) -> Table:
@@ -289,8 +277,8 @@ def _agreement(front: xr.Dataset) -> Table:
         both = [front["model"].sel(node=node, support=support).values for support in shown]
         rows.append(
             [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
-             *[100.0 * _misfit(film, x) for x in both],
-             *[_cell(100.0 * _content_misfit(whole, x, step)) for x in both]]
+             *[100.0 * misfit(film, x) for x in both],
+             *[_cell(100.0 * content_misfit(whole, x, step)) for x in both]]
         )  # fmt: skip
     return Table(
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
@@ -301,19 +289,6 @@ def _agreement(front: xr.Dataset) -> Table:
         "on the plate alone (ideal), each with its own damping.",
         digits=3,
     )  # fmt: skip
-
-
-def _misfit(film: np.ndarray, model: np.ndarray) -> float:
-    known = np.isfinite(film)
-    return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
-
-
-def _content_misfit(film: np.ndarray, model: np.ndarray, step: float) -> float:
-    """The paper's metric; nan where the node was lost for long."""
-    measured, said = content(film, step), content(model, step)
-    if measured is None or said is None:
-        return math.nan
-    return float(deviation(said[1][:, None], measured[1][:, None])[0])
 
 
 # ---------------------------------------------------------------------- vibration

@@ -22,9 +22,10 @@ from foldyn.signals import (
     subtract_final,
 )
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
+from foldyn.studies.herkal.specimen.release import release_of
 
-LONGEST = 8  # frames of a gap that is filled: a third of a period
-MOVED = 0.03  # part of its way by which the watched node has moved when it counts as released
+GAP = 1 / 30  # s, of a gap that is filled: a third of a period
+SLOWEST = 60.0  # frames per second
 SLACK = 0.015  # s, by which the instant of the release may be wrong
 SETTLED = 0.1  # part of the record over which the final position is averaged
 ROUNDED = 0.01  # part of an interval by which a time may be rounded
@@ -84,7 +85,7 @@ def numbers_of(history: History) -> list[int]:
     return np.ravel(history.nodes).astype(int).tolist()
 
 
-def _filled(x: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
+def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[np.float64]:
     """Part of a record with short gaps filled; NaN where it was lost for longer."""
     known = np.flatnonzero(np.isfinite(x))
     before, after = known[known <= start], known[known >= stop - 1]
@@ -92,9 +93,9 @@ def _filled(x: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64
         return np.full(stop - start, np.nan)
     first, last = int(before[-1]), int(after[0])
     inside = known[(known >= first) & (known <= last)]
-    if np.diff(inside).max() - 1 > LONGEST:
+    if np.diff(inside).max() - 1 > gap:
         return np.full(stop - start, np.nan)
-    return fill_gaps(x[first : last + 1], LONGEST)[start - first : stop - first]
+    return fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
 def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
@@ -110,19 +111,26 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
     Raises
     ------
     InputError
-        The watched node was not measured, or lost for long while it swings, or does not swing.
+        The watched node was not measured, is not still before the release, was lost for long while
+        it swings, or does not swing; fewer than 60 frames per second.
     """
-    nodes = numbers_of(measured)
+    nodes, name = numbers_of(measured), f"{measured.name}: node {watched}"
     if watched not in nodes:
-        raise InputError(f"{measured.name}: node {watched} was not measured; it tells the release")
+        raise InputError(f"{name} was not measured; it tells the release")
     column, time = nodes.index(watched), _even(measured.time)
-    step = time[1] - time[0]
-    released = _release(measured.values[:, column])
+    step = float(time[1] - time[0])
+    if step * SLOWEST > 1.001:
+        raise InputError(
+            f"{measured.name}: {1.0 / step:.3g} frames per second are too few for a vibration of "
+            f"10 Hz; {SLOWEST:g} are needed"
+        )
+    gap = round(GAP / step)
+    held, released = release_of(measured.values[:, column], step, name)
     stop = min(len(time), released + 1 + round(SEEN / step))
     window = measured.values[released:stop]
-    first, swing = _known(window[:, column], measured.name, watched)
+    first, swing = _known(window[:, column], name, gap)
     stop = released + first + len(swing)
-    turn = first + first_turning_point(swing)
+    turn = first + _turn(swing, name)
     x = measured.values[released + turn : stop]
     last = _mean(x[-max(1, round(SETTLED * len(x))) :])
     seen = np.isfinite(last) & (np.isfinite(x).mean(axis=0) >= FEWEST)
@@ -130,12 +138,14 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
     times = time[released + turn : stop] - time[released]
     kept = [node for node, there in zip(nodes, seen, strict=True) if there]
     history = replace(
-        measured, nodes=kept, time=times, values=x[:, seen] - final, align=SLACK,
+        measured, nodes=kept, time=times, values=x[:, seen] - final,
+        align=min(SLACK, float(times[0])),
         detrend="linear", delay=0.0,
     )  # fmt: skip
     records = measured.values[:, seen].T
-    whole = np.stack([_filled(one, released + turn, stop) for one in records], axis=1) - final
-    before = _mean(measured.values[: released + 1, seen]) - final
+    whole = np.stack([_filled(one, released + turn, stop, gap) for one in records], axis=1)
+    whole -= final
+    before = _mean(measured.values[held : released + 1, seen]) - final
     shown = swing[turn - first :]
     resting = subtract_final(shown, SETTLED)
     since = time - time[released]
@@ -157,27 +167,28 @@ def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return even
 
 
-def _release(x: NDArray[np.float64]) -> int:
-    """Index of the last sample before a record leaves its first level for good."""
-    known = np.flatnonzero(np.isfinite(x))
-    if known.size < 4:
-        raise InputError("the watched node was measured in fewer than four frames")
-    moved = np.abs(x[known] - x[known[0]])
-    left = int(np.argmax(moved > MOVED * moved.max()))
-    return int(known[max(0, left - 1)])
+def _turn(swing: NDArray[np.float64], name: str) -> int:
+    """Index of the first turning point."""
+    try:
+        return first_turning_point(swing)
+    except InputError:
+        raise InputError(
+            f"{name} does not swing back after it moved fastest: no release, or one that is damped "
+            "too much; cut the film so that the release is its fastest motion"
+        ) from None
 
 
-def _known(x: NDArray[np.float64], name: str, node: int) -> tuple[int, NDArray[np.float64]]:
+def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np.float64]]:
     """Record of the watched node behind its last long gap, and where that begins."""
     known = np.flatnonzero(np.isfinite(x))
-    long = np.flatnonzero(np.diff(known) - 1 > LONGEST)
+    long = np.flatnonzero(np.diff(known) - 1 > gap)
     first, last = (int(known[long[-1] + 1]) if len(long) else int(known[0])), int(known[-1])
     if last + 1 - first < len(x) // 2:
         raise InputError(
-            f"{name}: node {node} was lost for more than {LONGEST} frames while it swings; light "
-            "the specimen better, or film it from nearer"
+            f"{name} was lost for more than {gap} frames while it swings; light the specimen "
+            "better, or film it from nearer"
         )
-    return first, fill_gaps(x[first : last + 1], LONGEST)
+    return first, fill_gaps(x[first : last + 1], gap)
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:

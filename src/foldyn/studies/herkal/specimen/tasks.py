@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -67,7 +68,10 @@ class Part:
     def settings(self) -> dict[str, Any]:
         """All that its result depends on."""
         shot = asdict(self.shot) if self.data.synthetic else {}
-        return {"program": specimen_program(), "data": self.data.digests(), "shot": shot}
+        data = self.data.digests()
+        if self.part == "film":
+            data.pop("static", None)
+        return {"program": specimen_program(), "data": data, "shot": shot}
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
@@ -148,14 +152,17 @@ def _tracked(part: Part, file: Path, folder: Path) -> None:
     experiment.save_tracks(tracks, folder / FILM)
 
 
-def _static(part: Part, folder: Path) -> list[Measurement]:
+def _static(
+    part: Part, folder: Path, changes: Mapping[str, Any] | None = None
+) -> list[Measurement]:
     """The static test, empty where only a release was measured."""
     file = part.data.static
     if file is not None and file.suffix == ".csv":
         return [measurement(file, part.data.label)]
     if file is None and not part.data.synthetic:
         return []
-    return evaluation.static_test(experiment.load_tracks(file or folder / PHOTOS), part.data.label)
+    tracks = experiment.load_tracks(file or folder / PHOTOS)
+    return evaluation.static_test(tracks, part.data.label, changes)
 
 
 def _history(part: Part, folder: Path) -> History | None:
@@ -173,9 +180,14 @@ def _fit(part: Part, folder: Path) -> None:
     kept: dict[str, Any] = {"folder": folder / "evaluations"}
     found: dict[str, Any] = {}
     changes: dict[str, Any] = {}
+    for stale in ("folds", "damping", "models"):
+        shutil.rmtree(folder / stale, ignore_errors=True)
     static = _static(part, folder)
     if static:
         folds = calibration.fit_folds(static, **kept)
+        if len(static) > 1:  # the displacements are of states of the model: again, with its folds
+            static = _static(part, folder, calibration.changes_of(folds))
+            folds = calibration.fit_folds(static, **kept)
         changes = calibration.changes_of(folds)
         _write(folds, folder / "folds", part.note)
         found |= {"folds": folds.summary(), "weights": _weights(static)}
