@@ -438,8 +438,9 @@ def front_of(**models):
         since = np.exp(-9.0 * time) * np.cos(2.0 * np.pi * models["alone"] * time)
         x[2] = 4e-3 * np.stack([since, 0.5 * since], axis=1)
     along = ("time", "node")
+    seen = {"measured": (along, film), "whole": (along, film.copy())}
     return xr.Dataset(
-        {"measured": (along, film), "whole": (along, film.copy()), "model": (("support", *along), x)},
+        {**seen, "model": (("support", *along), x)},
         {"time": time, "node": [1, 8], "support": ["plate", "glued", "glue alone"]},
     )
 
