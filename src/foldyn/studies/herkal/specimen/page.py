@@ -118,8 +118,9 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
     if data.synthetic:
         parts.append(
             Text(
-                "The intervals know of noise only. That the sheet is softer than the model, which "
-                "the fit cannot know, goes into both numbers: they need not contain the truth."
+                "That the sheet is softer than the model, which the fit cannot know, goes into "
+                "both numbers. The intervals take what is left for random errors of single values: "
+                "they need not contain the truth."
             )
         )
     return parts
