@@ -196,7 +196,8 @@ def test_where_on_the_path_a_shape_lies(path) -> None:
     ("change", "message"),
     [
         (lambda u: -u, "move upwards: turn the sign of x, which points down"),
-        (lambda u: 5.0 * u, "goes down by 56 mm at most; is the unit or scale right"),
+        (lambda u: 5.0 * u, "more than the 61.6 mm of the top that are tried; is the unit"),
+        (lambda u: 3.5 * u, "more than the 61.6 mm of the top that are tried; is the unit"),
         (lambda u: u[::-1], "they move unlike the model pressed from above"),
     ],
 )
@@ -314,6 +315,8 @@ def tables(tmp_path):
     (tmp_path / "weights.csv").write_text("displacement [mm],force [N]\n20,0.125\n36,0.226\n")
     rows = [f"{t:.6f},{x:.9f}" for t, x in zip(TIME, ringing(TIME, LATE), strict=True)]
     (tmp_path / "film.csv").write_text("time [s],node 8 x [m]\n" + "\n".join(rows) + "\n")
+    rows = [f"{t:.6f},{-x:.9f}" for t, x in zip(TIME, ringing(TIME, LATE), strict=True)]
+    (tmp_path / "reversed.csv").write_text("time [s],node 8 x [m]\n" + "\n".join(rows) + "\n")
     (tmp_path / "shapes.csv").write_text("load_factor,node,x [m]\n0.5,8,0.02\n")
     (tmp_path / "load.png").write_bytes(b"")
     (tmp_path / "grams.csv").write_text("displacement [mm],force [g]\n20,12.75\n36,23.05\n")
@@ -358,6 +361,7 @@ def test_files_are_sorted_by_what_they_hold(tables) -> None:
         (["metres.csv"], "displacements are 2e+04 to 3.6e+04 mm"),
         (["upwards.csv"], "must be above 0, downwards"),
         (["pulled.csv"], "a force is -0.226 N"),
+        (["reversed.csv"], "turn the sign of x, which points down"),
         (["slow.csv"], "30 frames per second are too few"),
         (["load.png"], "track photographs first, foldyn track"),
         (["shapes.csv"], "shapes without forces say nothing of the stiffness"),

@@ -27,7 +27,7 @@ from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 FILM_SUPPORT = "glued"
 UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
 SAME = 1e-4  # m, by which positions at rest may differ
-FACTORS = np.linspace(0.0, 1.0, 29)  # of the path on which measured shapes are sought
+FACTORS = np.linspace(0.0, 1.1, 34)  # of the path on which measured shapes are sought
 
 
 def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float64]) -> float:
@@ -59,13 +59,15 @@ def load_factor(path: xr.Dataset, nodes: Sequence[int], moved: NDArray[np.float6
     span = factors[max(0, near - 1)], factors[min(len(factors) - 1, near + 1)]
     found = minimize_scalar(misfit, bounds=span, method="bounded", options={"xatol": 1e-9})
     size = float(np.sqrt(np.mean(moved[known] ** 2)))
-    if found.fun > UNLIKE * size:
+    beyond = found.x > 0.999 * factors[-1]
+    if beyond or found.fun > UNLIKE * size:
         mean = float(np.mean(moved[known]))
         why = (
             "they move upwards: turn the sign of x, which points down"
             if mean < 0.0
-            else f"the model goes down by {1e3 * FULL:g} mm at most; is the unit or scale right?"
-            if found.x > 0.999 * factors[-1]
+            else f"more than the {1e3 * FULL * factors[-1]:.3g} mm of the top that are tried; is "
+            "the unit or the scale right?"
+            if beyond
             else "they move unlike the model pressed from above"
         )
         raise InputError(
@@ -203,9 +205,7 @@ def fit_release(
         Arguments of `foldyn.fit`.
     """
     free = prepare(measured)
-    path = calibration.pressed(FACTORS, changes)
-    front = np.where(np.isin(free.nodes, FRONT), free.before, np.nan)
-    press = FULL * load_factor(path, free.nodes, front)
+    press = press_of(free, changes)
     duration = float(free.history.time[-1]) + 2.0 * free.history.align
     cases = {
         support: calibration.released_case(
@@ -226,6 +226,18 @@ def fit_release(
     data = [*film, *calibration.spectra_of(whole)]
     fits = {s: calibration.fit_damping(cases[s], data, **how) for s in (FILM_SUPPORT, "plate")}
     return Released(free, press, cases, fits)
+
+
+def press_of(free: FreeVibration, changes: Mapping[str, Any] | None = None) -> float:
+    """Displacement of the top (m) before a release, from that of the front nodes.
+
+    Raises
+    ------
+    InputError
+        They have moved as in no state of the model.
+    """
+    front = np.where(np.isin(free.nodes, FRONT), free.before, np.nan)
+    return FULL * load_factor(calibration.pressed(FACTORS, changes), free.nodes, front)
 
 
 def motions(released: Released) -> dict[str, xr.Dataset]:

@@ -128,19 +128,19 @@ def _kind(file: Path) -> str:
             "shapes without forces say nothing of the stiffness; give forces over displacements, "
             "or tracks of photographs with loads (*.nc)"
         )
-    prepare(told)
+    evaluation.press_of(prepare(told))
     return "release"
 
 
 def _check_forces(told: ForceDisplacement) -> None:
     """Refuse points from which the folds cannot be found."""
-    moved = told.displacement
+    moved, most = told.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
         raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
-    if not ((moved > 0.0) & (moved <= FULL)).all():
+    if not ((moved > 0.0) & (moved <= most)).all():
         raise InputError(
             f"displacements are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; those of "
-            f"the top must be above 0, downwards, and at most {1e3 * FULL:g} mm"
+            f"the top must be above 0, downwards, and at most {1e3 * most:.3g} mm"
         )
     if not (told.force > 0.0).all():
         raise InputError(f"a force is {told.force.min():.3g} N; those that press are positive")
