@@ -31,6 +31,7 @@ from foldyn.studies.herkal.partners import FAR, LEAST_MAC
 from foldyn.studies.herkal.pool import Done
 from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.second_shell import second_table
+from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import LINEAR, Plan, Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets
 
@@ -347,13 +348,30 @@ def test_command_refuses_bad_input(tmp_path, capsys):
 @pytest.mark.slow
 def test_the_command_runs_and_goes_on(tmp_path, capsys):
     """Quick study: shell and all rules; case 1 has the paper's best; a second call skips all."""
+    pytest.importorskip("cv2")
     out = str(tmp_path / "study")
     assert main(["study", "herkal", "--quick", "--out", out]) == 0
-    study = Study(studies.QUICK, tmp_path / "study")
+    study = Study(studies.QUICK, tmp_path / "study", Data())
+    assert "The paper specimen: from photographs" in (tmp_path / "study/report.html").read_text()
     row = study.table()["case1"]
     assert all(0.0 < value < 1.0 for value in row.values())
     assert study.frequencies("case2", "consistent").deviation[0] == pytest.approx(0.0, abs=0.15)
     capsys.readouterr()
     assert main(["study", "herkal", "--quick", "--out", out]) == 0
-    count = len(study.plan.jobs())
+    count = study.count
+    assert count == len(study.plan.jobs()) + 4
     assert f"skipped {count} of {count} runs" in capsys.readouterr().out
+
+
+def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
+    """It is an optional part: the case studies do not need it."""
+
+    def missing():
+        raise InputError("pip install foldyn[experiment]")
+
+    monkeypatch.setattr("foldyn.experiment.opencv", missing)
+    monkeypatch.setattr(studies, "QUICK", Plan(SHORT, ("case1",), ("panel",)))
+    assert main(["study", "herkal", "--quick", "--out", str(tmp_path / "study")]) == 0
+    told = capsys.readouterr().out
+    assert "synthetic film is left out: pip install foldyn[experiment]" in told
+    assert "specimen-" not in told
