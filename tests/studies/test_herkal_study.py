@@ -371,6 +371,7 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("foldyn.experiment.opencv", missing)
     monkeypatch.setattr(Study, "compute", lambda *_: [])
+    (tmp_path / "study").mkdir()
     assert main(["study", "herkal", "--quick", "--out", str(tmp_path / "study")]) == 0
     told = capsys.readouterr().out
     assert "synthetic film is left out: pip install foldyn[experiment]" in told
