@@ -223,11 +223,11 @@ def _peaks(front: xr.Dataset, data: Data) -> Table:
     ]
     rows += [[name, *vibration_of(x, step).cells] for name, x in curves.items()]
     return Table(
-        ["", "peak of the spectrum (Hz)", "frequency of the maxima (Hz)",
-         "damping by their decrement (%)"],
+        ["", "spectrum's peak (Hz)", "maxima (Hz)", "decrement (%)"],
         rows,
-        f"Vibration of node {WATCHED} along x: the highest peak between {NEAR[0]:g} and "
-        f"{NEAR[1]:g} Hz, and the logarithmic decrement of the maxima, as the paper has it.",
+        f"Vibration of node {WATCHED} along x: the highest peak of its spectrum between "
+        f"{NEAR[0]:g} and {NEAR[1]:g} Hz; the frequency of its maxima over time, and the damping by their "
+        "logarithmic decrement, as the paper has it.",
         digits=3,
     )  # fmt: skip
 
