@@ -226,8 +226,8 @@ def _peaks(front: xr.Dataset, data: Data) -> Table:
         ["", "spectrum's peak (Hz)", "maxima (Hz)", "decrement (%)"],
         rows,
         f"Vibration of node {WATCHED} along x: the highest peak of its spectrum between "
-        f"{NEAR[0]:g} and {NEAR[1]:g} Hz; the frequency of its maxima over time, and the damping by their "
-        "logarithmic decrement, as the paper has it.",
+        f"{NEAR[0]:g} and {NEAR[1]:g} Hz; the frequency of its maxima over time, and the "
+        "damping by their logarithmic decrement, as the paper has it.",
         digits=3,
     )  # fmt: skip
 
