@@ -112,6 +112,13 @@ def test_a_film_that_begins_with_the_release_or_after_it(cut) -> None:
         prepared.prepare(film(n8=x))
 
 
+def test_the_held_position_is_a_mean() -> None:
+    """Of 12 frames or so: their noise must not become the press."""
+    noise = np.where(np.arange(240) % 2, 1e-4, -1e-4) * (TIME < LATE)
+    found = prepared.prepare(film(n8=ringing(TIME, LATE) + noise))
+    assert found.before[0] == pytest.approx(4e-3, abs=3e-5)
+
+
 @pytest.mark.parametrize("duration", [0.15, 0.4])
 def test_a_film_that_shows_the_pressing_too(duration) -> None:
     """At rest, pressed within some time, held, released: what phones film."""
@@ -392,7 +399,7 @@ def test_parts_need_those_before_them(tables) -> None:
     assert not fit.there(tables) and page.sections(tables, [fit, response], Album(tables)) == []
 
 
-def test_a_table_of_weights_alone(tables) -> None:
+def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
     """Folds are fitted, no damping; other data are computed anew."""
     (_, (fit, response)) = tasks.parts(synthetic.COARSE, data_of([str(tables / "weights.csv")]))
     fit.make(tables)
@@ -405,6 +412,8 @@ def test_a_table_of_weights_alone(tables) -> None:
     assert "static: weights.csv" in text and "synthetic" not in text
     other = replace(fit, data=Data(static=tables / "film.csv"))
     assert not other.there(tables)
+    monkeypatch.setattr(tasks, "specimen_program", lambda: "another")
+    assert not fit.there(tables)
 
 
 # ---------------------------------------------------------------------- the whole chain
