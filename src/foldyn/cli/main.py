@@ -19,6 +19,8 @@ from foldyn.cli.track import add_track, track
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
+"""Environment of OpenCV: what decoders would say of a broken film is ours to say."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -139,6 +141,8 @@ def _add_state(command: argparse.ArgumentParser) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     given = parser().parse_args(arguments)
+    for name, level in SILENT.items():
+        os.environ.setdefault(name, level)
     with warnings.catch_warnings():
         warnings.simplefilter("always", FoldynWarning)
         warnings.showwarning = _Warnings()

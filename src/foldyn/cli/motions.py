@@ -27,11 +27,10 @@ class MotionRun:
         self.motion = self._prepare(case_file, figures)
 
     def _prepare(self, case_file: CaseFile, figures: bool) -> Motion:
-        from foldyn.dynamics import initial_state, prepare
-        from foldyn.results import load
+        from foldyn.dynamics import prepare, start_of
         from foldyn.signals.spectrum import MINIMUM_SAMPLES
 
-        start = case_file.initial(self.rule, read=lambda path, at: initial_state(load(path), at))
+        start = start_of(case_file, self.rule)
         arguments = case_file.analysis.arguments
         try:
             motion = prepare(case_file.case(self.rule), initial=start, **arguments)

@@ -22,17 +22,14 @@ class PathRun:
     file = "result.nc"
 
     def __init__(self, case_file: CaseFile) -> None:
-        from foldyn.dynamics import initial_state
-        from foldyn.results import load
+        from foldyn.dynamics import start_of
         from foldyn.statics import Settings
 
         self.place = f"{case_file.path}: "
         self.case = case_file.case()
         self.arguments = dict(case_file.analysis.arguments)
         self.arguments["settings"] = Settings(**case_file.analysis.settings)
-        self.arguments["start"] = case_file.initial(
-            read=lambda path, at: initial_state(load(path), at)
-        )
+        self.arguments["start"] = start_of(case_file)
 
     def compute(self, progress: bool, begun: Callable[[], None]) -> xarray.Dataset:
         """Follow the path.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -71,9 +70,6 @@ def track(given: Namespace) -> Path:
     """Run the command; returns the path of the tracks."""
     from foldyn import experiment
 
-    # what decoders would say of a broken film is ours to say
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     experiment.opencv()  # nothing else is worth a look without it
     out = Path(given.out)
     if out.suffix != ".nc":

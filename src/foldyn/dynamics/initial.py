@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from foldyn.cases import State
+from foldyn.cases import CaseFile, State
 from foldyn.errors import InputError
+from foldyn.results import load
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -33,3 +34,15 @@ def initial_state(result: Any, at: int = -1) -> State:
     sample = result.isel({dimension: at})
     velocity = sample["velocity"].to_numpy() if "velocity" in sample else None
     return State(sample["displacement"].to_numpy(), velocity)
+
+
+def start_of(case_file: CaseFile, mass: str | None = None) -> State | None:
+    """State that a case file starts from, read from the result that it names; None for rest.
+
+    Parameters
+    ----------
+    case_file : CaseFile
+    mass : str, optional
+        As of `CaseFile.initial`, which says what is raised.
+    """
+    return case_file.initial(mass, read=lambda path, at: initial_state(load(path), at))

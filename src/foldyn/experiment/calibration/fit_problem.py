@@ -13,18 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import State
 from foldyn.cases.casefile import CaseFile
 from foldyn.cases.reading import case_of_document, read_document, validated
 from foldyn.cases.values import show
-from foldyn.dynamics import initial_state, simulate
+from foldyn.dynamics import simulate, start_of
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.key_paths import replaced, value_at
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.program import program
-from foldyn.results import load
 from foldyn.statics import Settings, trace
 
 STEADY = "generalized_alpha"
@@ -120,7 +118,7 @@ class Problem:
         found.update(json.dumps(told).encode())
         for run in self.runs:
             found.update(json.dumps(run.document, sort_keys=True, default=str).encode())
-            state = _start(self.case_file(run, self.space.column("start")))
+            state = start_of(self.case_file(run, self.space.column("start")))
             for array in () if state is None else (state.displacement, state.velocity):
                 found.update(b"" if array is None else np.asarray(array).tobytes())
             for file in sorted(_files(run.document)):
@@ -236,7 +234,7 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """Path or motion that a case file asks for, at the load factors that are measured."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        state, case = _start(case_file), case_file.case()
+        state, case = start_of(case_file), case_file.case()
         if case_file.analysis.kind == "dynamics":
             return simulate(case, initial=state, **_steady(case_file))
         given = case_file.analysis.arguments
@@ -245,11 +243,6 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
         kept = {key: given[key] for key in ("constant", "inertia_relief")}
         settings = Settings(**{**case_file.analysis.settings, "stability": False})
         return trace(case, load_factors=way, start=state, settings=settings, **kept)
-
-
-def _start(case_file: CaseFile) -> State | None:
-    """State that a case file starts from."""
-    return case_file.initial(read=lambda path, at: initial_state(load(path), at))
 
 
 def _steady(case_file: CaseFile) -> dict[str, Any]:

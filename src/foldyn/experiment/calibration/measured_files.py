@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +68,10 @@ def shapes(
     **known
         Other arguments of `Shapes`.
     """
-    names = _names(file)
-    if file.suffix.lower() == ".nc" or "photo" in names:
-        return _shapes_of_tracks(file, nodes, load_factor, **known)
+    source = _Source.of(file)
+    names = source.names
+    if source.tracks is not None or "photo" in names:
+        return _shapes_of_tracks(source, nodes, load_factor, **known)
     if load_factor is not None:
         raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
     axes = "".join(axis for axis in AXES if axis in names)
@@ -124,7 +126,7 @@ def history(
         Other arguments of `History`.
     """
     chosen = _listed(file, nodes)
-    time, values = _motions(file, chosen, axis, columns)
+    time, values = _motions(_Source.of(file), chosen, axis, columns)
     if window is not None:
         first, last = _range("window", window, "times (s)")
         within = (time >= first) & (time <= last)
@@ -154,14 +156,15 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     axis, "node 8 x"; as do the tracks of a film, of all nodes that were seen. A node that was seen
     once only shows no motion and is left out.
     """
-    names = _names(file)
+    source = _Source.of(file)
+    names = source.names
     if "photo" in names:
         raise InputError(
             f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
             'kind = "shapes", load_factor = [...]'
         )
-    if file.suffix.lower() == ".nc":
-        moved = _along(file, _tracks(file, "time")["displacement"], [axis])[..., 0]
+    if source.tracks is not None:
+        moved = _along(file, source.moved("time"), [axis])[..., 0]
         nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
         if not nodes:
             raise InputError(f"{file}: no node was measured along {axis}; choose another axis")
@@ -176,16 +179,48 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
                 f'{file}: the columns are {some(names)}; needed are "displacement" and '
                 f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
             )
-    counts = np.isfinite(_motions(file, nodes, axis)[1]).sum(axis=0)
-    shown = [node for node, count in zip(nodes, counts, strict=True) if count != 1]
-    return history(file, shown or nodes, axis, **known)
+    time, values = _motions(source, nodes, axis)
+    shown = np.isfinite(values).sum(axis=0) != 1
+    kept = np.flatnonzero(shown if shown.any() else ~shown)
+    listed = [nodes[k] for k in kept]
+    return _made(
+        History, file, nodes=listed, time=time, values=values[:, kept], axis=axis, **known
+    )  # fmt: skip
 
 
-def _names(file: Path) -> list[str]:
-    """Names of the columns of a CSV file, or of the dimensions of tracks."""
-    if file.suffix.lower() == ".nc":
-        return [str(name) for name in load_tracks(file).sizes]
-    return [name for name, _ in read_headings(file)]
+@dataclass(frozen=True, eq=False)
+class _Source:
+    """A file that has been looked into once.
+
+    Attributes
+    ----------
+    file : Path
+    names : list of str
+        Of the columns of a CSV file, or of the dimensions of tracks.
+    tracks : xarray.Dataset or None
+        None for a CSV file.
+    """
+
+    file: Path
+    names: list[str]
+    tracks: xr.Dataset | None
+
+    @classmethod
+    def of(cls, file: Path) -> _Source:
+        if file.suffix.lower() == ".nc":
+            tracks = load_tracks(file)
+            return cls(file, [str(name) for name in tracks.sizes], tracks)
+        return cls(file, [name for name, _ in read_headings(file)], None)
+
+    def moved(self, along: str) -> xr.DataArray:
+        """Displacements of nodes in tracks."""
+        if self.tracks is None or "displacement" not in self.tracks or along not in self.names:
+            what = "a film" if along == "time" else "photographs"
+            raise InputError(
+                f"{self.file}: holds no displacements of nodes over {along}; track {what} with "
+                "--model"
+            )
+        return self.tracks["displacement"]
 
 
 def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
@@ -195,14 +230,14 @@ def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _motions(
-    file: Path, nodes: Sequence[int], axis: str, columns: Sequence[str] | None = None
+    source: _Source, nodes: Sequence[int], axis: str, columns: Sequence[str] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times, and displacements of nodes along an axis, shape (t, m)."""
-    names = _names(file)
+    file, names = source.file, source.names
     if "photo" in names:
         raise InputError(f'{file}: holds photographs, which have no times; use kind = "shapes"')
-    if file.suffix.lower() == ".nc":
-        moved = _along(file, _tracks(file, "time")["displacement"], [axis], nodes)
+    if source.tracks is not None:
+        moved = _along(file, source.moved("time"), [axis], nodes)
         return moved["time"].values, moved.values[..., 0]
     axis_number(f"{file}: axis", axis)
     headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
@@ -218,9 +253,10 @@ def _motions(
 
 
 def _shapes_of_tracks(
-    file: Path, nodes: Any, load_factor: Sequence[float] | None, **known: Any
+    source: _Source, nodes: Any, load_factor: Sequence[float] | None, **known: Any
 ) -> Shapes:
-    moved = _tracks(file, "photo")["displacement"] if file.suffix.lower() == ".nc" else _table(file)
+    file = source.file
+    moved = _table(source) if source.tracks is None else source.moved("photo")
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(
@@ -237,9 +273,9 @@ def _shapes_of_tracks(
     )  # fmt: skip
 
 
-def _table(file: Path) -> xr.DataArray:
+def _table(source: _Source) -> xr.DataArray:
     """Displacements in a CSV file with a line for each photograph, as tracks have them."""
-    columns = _columns(_names(file))
+    file, columns = source.file, _columns(source.names)
     if not columns:
         raise InputError(f'{file}: has no columns "node 8 x", ... of displacements')
     headings = [f"node {node} {axis}" for node, axis in columns]
@@ -250,16 +286,6 @@ def _table(file: Path) -> xr.DataArray:
         values[:, nodes.index(node), AXES.index(axis)] = table[heading]
     axes = {"node": nodes, "axis": list(AXES)}
     return xr.DataArray(values, axes, ("photo", "node", "axis"))
-
-
-def _tracks(file: Path, along: str) -> Any:
-    tracks = load_tracks(file)
-    if "displacement" not in tracks or along not in tracks.sizes:
-        what = "a film" if along == "time" else "photographs"
-        raise InputError(
-            f"{file}: holds no displacements of nodes over {along}; track {what} with --model"
-        )
-    return tracks
 
 
 def _along(

@@ -36,6 +36,9 @@ class Film:
         Region of interest: column and row of its first pixel, width and height.
     timed : bool
         Times come from the file; else from the rate alone.
+    told : int
+        Frames that the file says it has, often the rate times the duration: an estimate. 0 where it
+        does not say.
     """
 
     path: Path
@@ -43,6 +46,7 @@ class Film:
     rate: float
     box: Box
     timed: bool = True
+    told: int = 0
 
     def frames(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         """Give the time (s) and the gray region of interest of each frame."""
@@ -107,6 +111,7 @@ def open_film(
         opened = film.isOpened()
         read, picture = film.read() if opened else (False, None)
         told = film.get(cv2.CAP_PROP_FPS) if opened else 0.0
+        count = film.get(cv2.CAP_PROP_FRAME_COUNT) if opened else 0.0
     finally:
         film.release()
     if not read or picture is None:
@@ -119,9 +124,9 @@ def open_film(
     if rate is None and not (np.isfinite(told) and 0.1 < told < 1e6):
         raise InputError(f"{path}: does not say its frames per second; give them: --rate")
     height, width = picture.shape[:2]
-    return Film(
-        path, (width, height), float(rate or told), checked_box(roi, width, height), rate is None
-    )
+    box = checked_box(roi, width, height)
+    frames = round(count) if np.isfinite(count) and count > 0.0 else 0
+    return Film(path, (width, height), float(rate or told), box, rate is None, frames)
 
 
 def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[np.uint8]:

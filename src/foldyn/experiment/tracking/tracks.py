@@ -12,7 +12,6 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment.opencv import opencv
 from foldyn.experiment.tracking.corners import CornerSettings, find_corners
 from foldyn.experiment.tracking.films import Film, checked_box, open_film, read_photo
 from foldyn.experiment.tracking.follow import FollowSettings, Step, follow
@@ -224,13 +223,9 @@ def _check_length(film: Film, frames: int) -> None:
     """Refuse a film of one frame, and warn of one that breaks off."""
     if frames < 2:
         raise InputError(f"{film.path}: one frame alone shows no motion; give a longer film")
-    cv2 = opencv()
-    file = cv2.VideoCapture(str(film.path))
-    told = file.get(cv2.CAP_PROP_FRAME_COUNT)  # often the rate times the duration: an estimate
-    file.release()
-    if frames < _WHOLE * told:
+    if frames < _WHOLE * film.told:
         message = (
-            f"{film.path}: breaks off: {frames} frames can be read, it should have {told:.0f}; "
+            f"{film.path}: breaks off: {frames} frames can be read, it should have {film.told}; "
             "the tracks end there. Copy it from the camera again"
         )
         warnings.warn(message, FoldynWarning, stacklevel=3)

@@ -19,8 +19,9 @@ import tomli_w
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from foldyn.cases import CaseFile, read_case
 from foldyn.cases.reading import case_of_document, read_document
-from foldyn.dynamics import initial_state, simulate
+from foldyn.dynamics import simulate, start_of
 from foldyn.experiment import (
     Fit,
     ForceDisplacement,
@@ -33,7 +34,7 @@ from foldyn.experiment import (
 )
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.key_paths import replaced
-from foldyn.results import load, save
+from foldyn.results import save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings, trace
 from foldyn.studies import find_case
@@ -87,9 +88,20 @@ rest, and resists the large turns of the panels.
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
     """Path of the specimen whose top is pressed down to fractions of 56 mm."""
-    path = find_case("herkal/specimen")
-    case = case_of_document(path, replaced(read_document(path), changes or {})).case()
+    case = shipped("specimen", changes).case()
     return trace(case, load_factors=list(factors), settings=Settings(stability=False))
+
+
+def shipped(name: str, changes: Mapping[str, Any] | None = None) -> CaseFile:
+    """A shipped case file ("specimen", "specimen-frf", ...) with other values of some keys."""
+    path = find_case(f"herkal/{name}")
+    return case_of_document(path, replaced(read_document(path), changes or {}))
+
+
+def motion_of(case_file: CaseFile) -> Any:
+    """Motion of a case file, from the state that it names."""
+    start = start_of(case_file)
+    return simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
 
 
 def force_on_top(path: Any) -> NDArray[np.float64]:
@@ -177,9 +189,7 @@ def released_case(
 
 def release_data(case: Path) -> list[Measurement]:
     """Histories of node 8, and of all other front nodes held out, as a film has them."""
-    case_file = case_of_document(case, read_document(case))
-    start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
-    motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
+    motion = motion_of(read_case(case))
     time = np.arange(0.0, SEEN, 1.0 / RATE)
     along = motion["displacement"].sel(axis="x")
     others = tuple(node for node in FRONT if node != WATCHED)

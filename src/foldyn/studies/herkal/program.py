@@ -8,7 +8,8 @@ CASE_STUDIES = tuple(
     f"studies/herkal/{name}.py" for name in ("models", "runs", "metric", "partners", "sensitivity")
 )
 SPECIMEN = (
-    "experiment", "studies/herkal/calibration.py", "studies/herkal/specimen", "studies/herkal/cases"
+    "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
+    "studies/herkal/specimen", "studies/herkal/cases",
 )  # fmt: skip
 
 

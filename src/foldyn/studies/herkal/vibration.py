@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cases import Case, Rayleigh, read_case
+from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics import simulate
 from foldyn.linear import character, frf, modes, peaks_of
 from foldyn.signals import LogDecrement, log_decrement
-from foldyn.studies import find_case
-from foldyn.studies.herkal.calibration import WATCHED, peak
+from foldyn.studies.herkal.calibration import WATCHED, peak, shipped
 from foldyn.studies.targets import Verdict, read_targets, verdicts
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle
+HIGHEST = 22.0  # Hz, of the peaks that are told
 RELEASED = 2.0  # s, when the weight is taken away,
 SETTLED = 0.05  # and how long after it the first minimum is
 PAIR, ALONE = Rayleigh(14.4, 4.1e-4), Rayleigh(15.8)
@@ -43,16 +44,37 @@ class Response:
     frequencies: tuple[float, ...]
     damping: tuple[float, ...]
 
+    @classmethod
+    def of(cls, found: xarray.Dataset) -> Response:
+        """Peaks of a result of `foldyn.frf`."""
+        every = peaks_of(found, CORNER, "x", prominence=0.02)
+        peaks = [one for one in every if one.frequency < HIGHEST]
+        return cls(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
 
-def specimen(name: str, mass: str = "circumcenter", damping: Rayleigh | None = None) -> Case:
-    """A shipped case of the specimen ("modes", "frf-published", ...) with another damping."""
-    case = read_case(find_case(f"herkal/specimen-{name}")).case(mass)
+
+def specimen(
+    name: str,
+    mass: str = "circumcenter",
+    damping: Rayleigh | None = None,
+    changes: Mapping[str, Any] | None = None,
+) -> Case:
+    """A shipped case of the specimen ("modes", "frf-published", ...), as it is or changed.
+
+    Parameters
+    ----------
+    name, mass : str
+    damping : Rayleigh, optional
+        Another damping.
+    changes : mapping, optional
+        Other values of some keys.
+    """
+    case = shipped(f"specimen-{name}", changes).case(mass)
     return case if damping is None else replace(case, damping=damping)
 
 
 def analysis(name: str) -> dict[str, Any]:
     """Arguments of the analysis of a shipped case."""
-    return dict(read_case(find_case(f"herkal/specimen-{name}")).analysis.arguments)
+    return dict(shipped(f"specimen-{name}").analysis.arguments)
 
 
 def response(
@@ -73,8 +95,7 @@ def response(
     name = "frf-published" if published else "frf"
     damping = replace(damping, state="start" if published else "rest")
     found = frf(specimen(name, mass, damping), **{**analysis(name), **changes})
-    peaks = [p for p in peaks_of(found, CORNER, "x", prominence=0.02) if p.frequency < 22.0]
-    return Response(tuple(p.frequency for p in peaks), tuple(p.textbook for p in peaks))
+    return Response.of(found)
 
 
 @dataclass(frozen=True, eq=False)

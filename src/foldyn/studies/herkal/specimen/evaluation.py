@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
+from foldyn.cases import read_case
 from foldyn.cases.reading import case_of_document, read_document
-from foldyn.dynamics import initial_state, simulate
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
 from foldyn.experiment.calibration.key_paths import replaced
-from foldyn.results import load
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
 from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
@@ -144,7 +143,7 @@ def check_tracks(tracks: xr.Dataset) -> None:
     InputError
         No model, another sheet, or x unknown.
     """
-    rest = calibration.pressed([0.0])["rest_position"].sel(node=list(FRONT)).values
+    rest = calibration.shipped("specimen").pattern.vertices[list(FRONT)]
     if "displacement" not in tracks:
         raise InputError("tracked without a model: foldyn track needs --model herkal/specimen")
     known = set(FRONT) <= set(tracks["node"].values.tolist())
@@ -253,10 +252,7 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
         damping = released.fits.get(support, released.fits[FILM_SUPPORT]).values
         document = replaced(read_document(case), damping)
         case.with_name("fitted.toml").write_text(tomli_w.dumps(document), encoding="utf-8")
-        case_file = case_of_document(case, document)
-        start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
-        motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
-        found[support] = motion
+        found[support] = calibration.motion_of(case_of_document(case, document))
     return found
 
 
@@ -284,7 +280,7 @@ def compared(
     one = released.free.of(front, "front nodes")
     curves = []
     for support, motion in motions.items():
-        case = case_of_document(*_read(released.cases[support])).case()
+        case = read_case(released.cases[support]).case()
         curve = one.curves(motion, case)
         curves.append(curve - one.trend(curve))
     places = [released.free.nodes.index(node) for node in front]
@@ -302,7 +298,3 @@ def compared(
     moved = truth["position"].sel(node=front, axis="x")
     true = CubicSpline(moved["time"], moved)(one.time + released.free.released)
     return found.assign(true=(("time", "node"), true - one.trend(true), {"units": "m"}))
-
-
-def _read(case: Path) -> tuple[Path, dict[str, Any]]:
-    return case, read_document(case)

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from foldyn.linear import peaks_of
 from foldyn.plots import style
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import WATCHED
 from foldyn.studies.herkal.specimen.agreement import content
+from foldyn.studies.herkal.vibration import CORNER, Response
 
 if TYPE_CHECKING:
     import xarray
@@ -107,18 +107,17 @@ def _plot_content(axes: Axes, x: NDArray[np.float64], step: float, look: Mapping
 
 
 def plot_responses(
-    responses: Mapping[str, xarray.Dataset], node: int, peaks: Sequence[float], note: str
+    responses: Mapping[str, xarray.Dataset], peaks: Sequence[float], note: str
 ) -> Figure:
-    """Draw the size of responses of a node along x, and where the paper's peaks are."""
+    """Draw the size of responses of a corner of the top along x, and the paper's peaks."""
     figure = style.new_figure(7.0, 3.8)
     style.title_above(figure, note)
     axes = figure.subplots()
-    style.frame(axes, "frequency (Hz)", "receptance (mm/N)", f"node {node} along x")
+    style.frame(axes, "frequency (Hz)", "receptance (mm/N)", f"node {CORNER} along x")
     for k, (name, found) in enumerate(responses.items()):
-        size = 1e3 * np.abs(found["receptance"].sel(node=node, axis="x").values)
+        size = 1e3 * np.abs(found["receptance"].sel(node=CORNER, axis="x").values)
         axes.plot(found["frequency"].values, size, **style.line_style(k), label=name)
-        marked = peaks_of(found, node, "x", prominence=0.02)
-        spots = [one.frequency for one in marked]
+        spots = Response.of(found).frequencies
         heights = np.interp(spots, found["frequency"].values, size)
         axes.plot(spots, heights, "o", color=style.CYCLE[k], markersize=4)
     for k, frequency in enumerate(peaks):

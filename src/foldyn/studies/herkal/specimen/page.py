@@ -11,13 +11,13 @@ import numpy as np
 import xarray as xr
 
 from foldyn import plots
-from foldyn.linear import character, peaks_of
+from foldyn.linear import character
 from foldyn.report import Heading, Picture, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.case_page import NO_BREAK
+from foldyn.studies.herkal.case_page import NO_BREAK, cell
 from foldyn.studies.herkal.specimen import figures, synthetic, tasks
 from foldyn.studies.herkal.specimen.agreement import (
     NEAR,
@@ -29,13 +29,11 @@ from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
 from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
+from foldyn.studies.herkal.vibration import ORDINALS, TARGETS, Response
 from foldyn.studies.targets import Target, read_targets
 
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
-TARGETS = Path(__file__).parents[1] / "targets.toml"
-CORNER = 0  # top node at which the frequency response is read
 POOR = 0.3  # misfit, as a part of what was measured, above which a fit is none
-HIGHEST = 22.0  # Hz, of the peaks in the table
 SYMBOLS = {
     "sheet.length_scale_ratio": "length-scale ratio",
     "model.fold_law.theta1": "theta1 (degrees)",
@@ -163,7 +161,7 @@ def _doubt(fit: dict[str, Any], what: str) -> list[Section]:
 def _release(
     folder: Path, found: dict[str, Any], data: Data, album: Album, note: str
 ) -> list[Section]:
-    front = netcdf.read(folder / tasks.FRONT, "cannot be read as NetCDF")
+    front = netcdf.read(folder / tasks.COMPARED, "cannot be read as NetCDF")
     parts: list[Section] = [Heading("Release: the damping", 3)]
     filmed = data.synthetic or data.film is not None
     if filmed:
@@ -279,7 +277,7 @@ def _agreement(front: xr.Dataset) -> Table:
         rows.append(
             [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
              *[100.0 * misfit(film, x) for x in both],
-             *[_cell(100.0 * content_misfit(whole, x, step)) for x in both]]
+             *[cell(100.0 * content_misfit(whole, x, step)) for x in both]]
         )  # fmt: skip
     return Table(
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
@@ -297,7 +295,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
     responses = {name: load(folder / file) for name, file in tasks.RESPONSES.items()}
     labels = {"published": "the paper's parameters", "fitted": "fitted parameters"}
     paper = _targets()
-    peaks = [paper[f"frf_{which}_peak"].value for which in ("first", "second", "third")]
+    peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
     named = character(modes, "x")
     shown = [k + 1 for k in range(min(6, modes.sizes["mode"]))]
@@ -307,7 +305,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
             "specimen-response",
             "Response of a corner of the top to a sine of 1 mN on each of its nodes.",
             lambda: figures.plot_responses(
-                {labels[name]: one for name, one in responses.items()}, CORNER, peaks, note
+                {labels[name]: one for name, one in responses.items()}, peaks, note
             ),
         ),
         _response_table(responses, paper),
@@ -322,21 +320,16 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
 
 
 def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Target]) -> Table:
-    found = {
-        name: [p for p in peaks_of(one, CORNER, "x", prominence=0.02) if p.frequency < HIGHEST]
-        for name, one in responses.items()
-    }
+    found = [Response.of(one) for one in responses.values()]
     rows: list[list[Any]] = []
-    for k, which in enumerate(("first", "second", "third")):
+    for k, which in enumerate(ORDINALS):
         target = paper[f"frf_{which}_peak"]
         row: list[Any] = [f"{target.what} (Hz)", target.value]
-        rows.append(row + [p[k].frequency if k < len(p) else None for p in found.values()])
-    for k, which in ((1, "second"), (2, "third")):
+        rows.append(row + [_at(one.frequencies, k) for one in found])
+    for k, which in enumerate(ORDINALS[1:], 1):
         target = paper[f"half_power_{which}"]
         row = [f"{target.what} (%)", target.value]
-        rows.append(
-            row + [_cell(100.0 * p[k].textbook) if k < len(p) else None for p in found.values()]
-        )
+        rows.append(row + [_at(one.damping, k, 100.0) for one in found])
     return Table(
         ["", "paper", "the paper's parameters, here", "fitted parameters"], rows,
         "Peaks of the response, and damping by the half-power points as the paper has it.",
@@ -344,9 +337,9 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
     )  # fmt: skip
 
 
+def _at(values: Sequence[float], k: int, factor: float = 1.0) -> float | None:
+    return cell(factor * values[k]) if k < len(values) else None
+
+
 def _targets() -> Mapping[str, Target]:
     return read_targets(TARGETS, "specimen")
-
-
-def _cell(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -29,8 +29,8 @@ def release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, int
     Returns
     -------
     first, released : int
-        Samples of the held position: the last one before the release, and how far back the node
-        was still.
+        Samples between which the node is held: since when it has been still, and the last one
+        before it is let go.
 
     Raises
     ------

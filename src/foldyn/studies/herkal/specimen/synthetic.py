@@ -18,9 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn import experiment
-from foldyn.cases.reading import case_of_document, read_document
-from foldyn.dynamics import initial_state, simulate
-from foldyn.results import load
+from foldyn.cases import read_case
 from foldyn.studies.herkal import calibration
 
 if TYPE_CHECKING:
@@ -111,10 +109,7 @@ def film(folder: Path, shot: Shot) -> experiment.SyntheticFilm:
 def released(folder: Path, shot: Shot) -> xarray.Dataset:
     """The true motion; the release is at `shot.held`."""
     case = calibration.released_case(folder, OTHERWISE, support=SUPPORT, duration=shot.free)
-    case_file = case_of_document(case, read_document(case))
-    start = case_file.initial(read=lambda path, at: initial_state(load(path), at))
-    motion = simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
-    return held_and_creeping(motion, shot.held)
+    return held_and_creeping(calibration.motion_of(read_case(case)), shot.held)
 
 
 def held_and_creeping(motion: xarray.Dataset, held: float) -> xarray.Dataset:

@@ -8,34 +8,27 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from foldyn import experiment, plots
-from foldyn.cases.reading import case_of_document, read_document
 from foldyn.errors import ComputationError
 from foldyn.experiment import Fit, History, Measurement
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.linear import frf, modes
 from foldyn.results import netcdf, save
-from foldyn.studies import find_case
-from foldyn.studies.herkal import calibration
+from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.program import specimen_program
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
 
-if TYPE_CHECKING:
-    import xarray
-
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
-PHOTOS, FILM, FOUND, FRONT = "photographs.nc", "film.nc", "found.json", "front.nc"
+PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
 RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
-MASS = "circumcenter"
 
 
 @dataclass(frozen=True)
@@ -157,7 +150,7 @@ def _static(
 ) -> list[Measurement]:
     """The static test, empty where only a release was measured."""
     file = part.data.static
-    if file is not None and file.suffix == ".csv":
+    if file is not None and file.suffix.lower() == ".csv":
         return [measurement(file, part.data.label)]
     if file is None and not part.data.synthetic:
         return []
@@ -197,7 +190,7 @@ def _fit(part: Part, folder: Path) -> None:
         _write(released.fits[evaluation.FILM_SUPPORT], folder / "damping", part.note)
         truth = netcdf.read(folder / TRUTH, "") if part.data.synthetic else None
         front = evaluation.compared(released, evaluation.motions(released), truth)
-        netcdf.write(front, folder / FRONT)
+        netcdf.write(front, folder / COMPARED)
         plots.plot_steps(released.free.steps, title=part.note).savefig(folder / "steps.png")
         found |= {
             "press": released.press,
@@ -222,23 +215,11 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
     for name, given in (("published", {}), ("fitted", changes)):
-        save(_frequency_response(given), folder / RESPONSES[name])
-    save(modes(_case("modes", changes), **_arguments("modes")), folder / MODES)
-
-
-def _frequency_response(changes: Mapping[str, Any]) -> xarray.Dataset:
-    return frf(_case("frf", changes), **_arguments("frf"))
-
-
-def _case(name: str, changes: Mapping[str, Any]) -> Any:
-    path = find_case(f"herkal/specimen-{name}")
-    kept = {k: v for k, v in changes.items() if name == "frf" or not k.startswith("damping.")}
-    return case_of_document(path, replaced(read_document(path), kept)).case(MASS)
-
-
-def _arguments(name: str) -> dict[str, Any]:
-    path = find_case(f"herkal/specimen-{name}")
-    return dict(case_of_document(path, read_document(path)).analysis.arguments)
+        case = vibration.specimen("frf", changes=given)
+        save(frf(case, **vibration.analysis("frf")), folder / RESPONSES[name])
+    folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
+    case = vibration.specimen("modes", changes=folds)
+    save(modes(case, **vibration.analysis("modes")), folder / MODES)
 
 
 PARTS: Mapping[str, Callable[[Part, Path], None]] = {
