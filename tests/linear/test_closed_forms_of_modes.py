@@ -42,7 +42,8 @@ def test_a_hinged_rigid_panel_with_each_mass_rule(mass):
         expected = arm / np.sqrt(inertia)
         assert shape == pytest.approx(expected, abs=1e-2 * expected.max())
     assert 0 < errors[1] < 1e-4
-    assert errors[0] / errors[1] == pytest.approx(10, rel=1e-3)
+    # the eigenvalues' rounding is up to 1e-3 of the smaller error on some machines
+    assert errors[0] / errors[1] == pytest.approx(10, rel=3e-3)
 
 
 class Truss:
