@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.histories import Constant, History
-from foldyn.cases.values import show
+from foldyn.cases.history import set_field
+from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
 
 
@@ -22,14 +23,35 @@ class Function(History):
     ----------
     function : callable
         Takes a time (s), a float, and gives a factor.
+    at : sequence of float, optional
+        Times (s) at which it jumps or turns a corner, none of them if empty: integrators that
+        choose their steps end one there. Without it they can only look at the function here and
+        there within a step, and warn that a short pulse may be missed.
 
     Notes
     -----
     A function cannot be written to a file: results store it sampled at the stage times of the run.
+
+    Examples
+    --------
+    >>> tap = Function(lambda t: max(0.0, 1.0 - abs(t - 0.3) / 0.01), at=[0.29, 0.3, 0.31])
+    >>> tap.knots()
+    (0.29, 0.3, 0.31)
     """
 
     function: Callable[[Any], Any]
+    at: Sequence[float] | None = None
     kind: ClassVar[str] = "function"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.at is not None:
+            times = np.atleast_1d(numbers("at", self.at))
+            set_field(self, "at", tuple(np.unique(times).tolist()))
+
+    def knots(self) -> tuple[float, ...] | None:
+        """See `History.knots`."""
+        return None if self.at is None else tuple(self.at)
 
     def factor(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `History.factor`."""

@@ -80,6 +80,10 @@ class HalfSine(Formula):
         """See `History.parameters`."""
         return (self.duration,)
 
+    def knots(self) -> tuple[float, ...]:
+        """See `History.knots`."""
+        return 0.0, self.duration
+
 
 @dataclass(frozen=True)
 class Ramp(Formula):
@@ -118,6 +122,10 @@ class Ramp(Formula):
     def parameters(self) -> tuple[float, ...]:
         """See `History.parameters`."""
         return (self.duration,)
+
+    def knots(self) -> tuple[float, ...]:
+        """See `History.knots`."""
+        return 0.0, self.duration
 
 
 @dataclass(frozen=True)
@@ -225,6 +233,10 @@ class Chirp(Formula):
             for time, end in zip((0.0, self.duration), ends, strict=True)
             if abs(self(end)) > 1e-9
         )
+
+    def knots(self) -> tuple[float, ...]:
+        """See `History.knots`."""
+        return 0.0, self.duration
 
 
 HISTORIES: Mapping[str, type[History]] = {

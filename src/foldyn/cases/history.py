@@ -49,6 +49,10 @@ class History(ABC):
         """Times (s) at which the factor jumps: no motion can be imposed across them."""
         return ()
 
+    def knots(self) -> tuple[float, ...] | None:
+        """Times (s), in order, at which it jumps or turns a corner; None if nobody knows them."""
+        return self.jumps()
+
 
 class Formula(History):
     """A history whose formula is compiled, the one of its `code` in `waveforms`."""

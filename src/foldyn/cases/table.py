@@ -16,6 +16,8 @@ from foldyn.cases.history import Formula, check_flag, set_field
 from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
 
+SHARP = 0.01  # of the range of a table: how far a sharp corner leads away from a straight line
+
 
 @dataclass(frozen=True, eq=False)
 class Table(Formula):
@@ -107,6 +109,16 @@ class Table(Formula):
             cubics[:-1, 2] = np.diff(self.values) / np.diff(self.times)
         cubics[:, 3] = self.values
         return self.times, cubics
+
+    def knots(self) -> tuple[float, ...]:
+        """See `History.knots`: both ends, and sharp corners; those of a curve's points are not."""
+        sharp = np.ones(len(self.times), bool)
+        sharp[1:-1] = False
+        if not self.smooth:
+            steps = np.diff(self.times)
+            turn = np.abs(np.diff(np.diff(self.values) / steps))
+            sharp[1:-1] = turn * np.minimum(steps[1:], steps[:-1]) > SHARP * np.ptp(self.values)
+        return tuple(self.times[sharp].tolist())
 
     def __eq__(self, other: object) -> bool:
         """Tell whether the other is a table of the same numbers."""

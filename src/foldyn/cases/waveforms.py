@@ -21,6 +21,8 @@ from foldyn.materials.compiled import kernel
 CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
 CALLED = -1
 PARAMETERS = 4
+GAUSS_POINTS, GAUSS_WEIGHTS = (0.5 * x for x in np.polynomial.legendre.leggauss(8))
+GAUSS_POINTS += 0.5  # of an interval from 0 to 1
 
 
 class Waveforms(NamedTuple):
@@ -190,3 +192,29 @@ def waveform_table(w, row, times):
     for i in range(times.size):
         out[0, i], out[1, i], out[2, i] = waveform(w, row, times[i], True)
     return out
+
+
+@kernel
+def unseen(w, first, last, before, after, out):
+    """Mean distance (h,) of histories from straight lines between their values at two times.
+
+    before, after : factors (h, 3) at the times `first` and `last`. What lies between them and what
+    a step with its load averaged over both ends does not see.
+    """
+    for row in range(out.size):
+        rate = (after[row, 0] - before[row, 0]) / (last - first)
+        total, low, knot = 0.0, first, w.first[row]
+        while knot < w.first[row + 1] and w.knot[knot] <= first:
+            knot += 1
+        while low < last:
+            high = last
+            if knot < w.first[row + 1] and w.knot[knot] < last:
+                high = w.knot[knot]
+                knot += 1
+            for k in range(GAUSS_POINTS.size):
+                t = low + (high - low) * GAUSS_POINTS[k]
+                line = before[row, 0] + rate * (t - first)
+                distance = abs(waveform(w, row, t, False)[0] - line)
+                total += GAUSS_WEIGHTS[k] * (high - low) * distance
+            low = high
+        out[row] = total / (last - first)

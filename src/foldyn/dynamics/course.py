@@ -25,6 +25,8 @@ class Plan(NamedTuple):
     every: int  # steps between samples; 0: samples are `interval` apart
     interval: float  # s
     tolerance: float  # relative error of a step; 0 with a fixed step
+    floor: float  # least displacement that errors are measured by, m
+    stops: NDArray  # times (s) in order at which steps that vary end: knots of the histories
 
 
 class Course(NamedTuple):

@@ -128,6 +128,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     The error of a step is that of the worst node, relative to the largest displacement and the
     largest velocity that the motion has had so far. clock: the time, the next step, the last
     error, these two largest values, the smallest and the largest step, the end of the last step.
+    Steps end at the stops of the plan, where loads may jump.
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
@@ -159,22 +160,30 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     while count[0] < last and clock[0] < plan.end:
         if plan.every > 0 and count[1] == out.time.size:
             break
-        t, h = clock[0], min(clock[1], plan.end - clock[0])
-        if t + 1.01 * h >= plan.end:  # no tiny step at the end
-            h = plan.end - t
+        t, wanted = clock[0], clock[1]
+        stop = np.searchsorted(plan.stops, t, side="right")
+        stops = stop < plan.stops.size
+        goal = plan.stops[stop] if stops else plan.end
+        h = min(wanted, goal - t)
+        if t + 1.01 * h >= goal:  # no tiny step before it
+            h = goal - t
+        stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
             return STUCK, -1
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
+            moment = t + C[stage] * h
+            if stops and C[stage] == 1.0:  # before what happens there
+                moment = np.nextafter(goal, -np.inf)
             powers[0, stage], powers[1, stage] = acceleration(
-                model, system, mass, ut, vt, t + C[stage] * h, a, work, s
+                model, system, mass, ut, vt, moment, a, work, s
             )
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
         count[3] += 6
-        scale_u = max(clock[3], _largest(fut)) * plan.tolerance
-        scale_v = max(clock[4], _largest(fvt)) * plan.tolerance
+        scale_u = max(clock[3], _largest(fut), plan.floor) * plan.tolerance
+        scale_v = max(clock[4], _largest(fvt), plan.floor / plan.dt) * plan.tolerance
         error_u, error_v = _error(speeds, h), _error(accelerations, h)
         error = 0.0
         if error_u > 0.0 or error_v > 0.0:
@@ -193,7 +202,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return PENETRATION, hinge
-        after = plan.end if h == plan.end - t else t + h
+        after = goal if h == goal - t else t + h
         count[0] += 1
         clock[5], clock[6] = min(clock[5], h), max(clock[6], h)
         for k in range(2):
@@ -226,6 +235,14 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         clock[0], clock[2] = after, max(error, 1e-4)
         clock[3], clock[4] = scale_u / plan.tolerance, scale_v / plan.tolerance
         clock[1] = min(plan.dt, h * max(0.2, min(factor, 5.0)))
+        if stops:
+            clock[1] = max(clock[1], min(wanted, plan.dt))
+            powers[0, 0], powers[1, 0] = acceleration(
+                model, system, mass, course.u, course.v, after, a, work, s
+            )
+            count[3] += 1
+            for i in range(n):
+                accelerations[0, i] = fa[i]
         if plan.every > 0 and count[0] % plan.every == 0:
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
             count[3] += 1

@@ -17,9 +17,11 @@ from foldyn.dynamics.choice import AUTO, choose
 from foldyn.dynamics.course import Plan
 from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import check_mass, is_lumped
+from foldyn.dynamics.kinds import longest
 from foldyn.dynamics.methods import Method, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
@@ -40,6 +42,8 @@ MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
+FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
+MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on: see `resolution`
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -158,7 +162,7 @@ def prepare(
     if not integrator.implicit or not is_lumped(case.structure.mass):
         check_mass(case.structure.mass, case.fixed)
     critical = critical_step(case, method, u)
-    plan = _plan(integrator, duration, dt, every, critical, force, tolerance, float(start))
+    plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, method, u, critical)
     warn_of_unstable_damping(case, u)
     if not force and plan.dt > critical:
@@ -168,6 +172,11 @@ def prepare(
         )
     check_memory(expected_samples(plan), len(u), len(case.supported_dofs))
     check_steady(case, plan.start, plan.end)
+    if plan.steps:
+        memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY
+        warn_of_coarse_steps(case, plan, integrator.looks, memory, integrator.implicit, 4)
+    elif integrator.implicit:
+        warn_of_functions(case, 4)
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
         warnings.warn(
@@ -198,8 +207,8 @@ def _with_radius(method: Method, spectral_radius: float | None) -> Method:
 
 
 def _plan(
-    method: Method, duration: float, dt: float | None, every: int | float, critical: float,
-    force: bool, tolerance: float | None, start: float,
+    case: Case, method: Method, duration: float, dt: float | None, every: int | float,
+    critical: float, force: bool, tolerance: float | None, start: float,
 ) -> Plan:  # fmt: skip
     """Steps and samples that the arguments of `simulate` ask for."""
     if tolerance is not None:
@@ -212,7 +221,9 @@ def _plan(
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
-        return variable_steps(duration, dt, every, largest, start, tolerance or default)
+        floor = FLOOR * longest(case.structure.model)
+        stops = knots(case)
+        return variable_steps(duration, dt, every, largest, start, tolerance or default, floor, stops)
     return fixed_steps(duration, dt, every, critical, start)
 
 

@@ -46,6 +46,18 @@ def hinges_alone(model: Any) -> Any:
     return model._replace(bar_runs=model.bar_runs[:0])
 
 
+def hinges_linear(model: Any, u: NDArray) -> Any:
+    """The model with hinges as stiff as they are meant to be, about their angles at u (n, 3).
+
+    Those of a shell are so at rest.
+    """
+    if isinstance(model, ShellModel):
+        return model
+    runs = model.hinge_runs.copy()
+    runs[:, 2] = 0
+    return model._replace(hinge_rest=angles_of(model, u), hinge_runs=runs)
+
+
 def put_force(model: Any, u: NDArray, force: NDArray, work: Any) -> None:
     """Internal force (rows, 3) at u (rows, 3), outside of compiled loops."""
     if isinstance(model, ShellModel):

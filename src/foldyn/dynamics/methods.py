@@ -14,6 +14,7 @@ from foldyn.dynamics import (
     energy_momentum,
     generalized_alpha,
     newmark,
+    resolution,
     rk4,
 )
 from foldyn.dynamics.engine import Compiled, Engine, threads_of
@@ -45,6 +46,8 @@ class Method(NamedTuple):
         Of an implicit method: its steps from a `Bench`.
     massless : bool
         Whether it takes dofs without mass beside the displacements, those of a shell.
+    looks : tuple of float
+        Where in a step, from 0 to 1, it looks at the loads.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Method(NamedTuple):
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
     massless: bool = False
+    looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
     def implicit(self) -> bool:
@@ -63,15 +67,14 @@ class Method(NamedTuple):
     def engine(self, case: Case, packed: Packed) -> Engine:
         """The method with a case and the memory that it works with."""
         if self.scheme is not None:
-            jumps = [time for _, history in case.load_terms for time in history.jumps()]
-            return Implicit(self.scheme, packed, tuple(jumps))
+            return Implicit(self.scheme, packed, resolution.jumps(case))
         return Compiled(self.loop, packed, 1 if self.adaptive else threads_of(packed))
 
 
 METHODS: Mapping[str, Method] = {
     method.name: method
     for method in (
-        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth),
+        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth, looks=(0.0, 0.5, 1.0)),
         Method(
             "central_difference",
             central_difference.ORDER,

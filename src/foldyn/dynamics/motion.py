@@ -267,6 +267,15 @@ class Motion:
                 FoldynWarning,
                 stacklevel=3,
             )
+        size, least = float(self._course.clock[3]), self.plan.floor
+        if 0.0 < size < least:
+            warnings.warn(
+                f"the motion is small: {size:.3g} m at most, where errors of steps are measured "
+                f"by {least:.3g} m, a share of the longest bar; use a tolerance of "
+                f"{self.plan.tolerance * size / least:.1g}, or a method with a fixed step",
+                FoldynWarning,
+                stacklevel=3,
+            )
         return self._dataset()
 
 

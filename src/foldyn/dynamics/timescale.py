@@ -59,7 +59,10 @@ def vibrating_share(
     times = start + np.linspace(0.0, duration, min(MOST_TIMES, 2 + math.ceil(duration / step)))
     share = SMOOTH
     for _, history in terms:
+        turns = [t for t in history.knots() or () if start < t < start + duration]
         if any(start < jump < start + duration for jump in history.jumps()):
+            return 1.0
+        if len(turns) and np.diff(turns, prepend=start).min() < step:  # a pulse
             return 1.0
         before, now, after = (history(np.maximum(times + k * step, start)) for k in (-1, 0, 1))
         size = float(np.abs(now).max())

@@ -6,11 +6,16 @@ import math
 import os
 from numbers import Integral, Real
 
+import numpy as np
+from numpy.typing import NDArray
+
 from foldyn.dynamics.course import Plan
 from foldyn.errors import InputError
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
+SAME_TIME = 1e-12  # of the largest time: stops as near as that are one
+NO_STOPS = np.zeros(0)
 
 
 def positive(name: str, value: object) -> float:
@@ -54,25 +59,29 @@ def fixed_steps(
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
         raise InputError(f"every = {every}: longer than the motion of {steps} steps")
-    return Plan(start, start + steps * dt, dt, steps, per_sample, per_sample * dt, 0.0)
+    interval = per_sample * dt
+    return Plan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
 
 
 def variable_steps(
     duration: float, dt: float | None, every: int | float, largest: float, start: float,
-    tolerance: float,
+    tolerance: float, floor: float = 0.0, knots: NDArray = NO_STOPS,
 ) -> Plan:  # fmt: skip
     """Plan of a motion whose steps follow their error; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion.
+    Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that lie
+    within the motion and that time can tell apart.
     """
     duration = positive("duration", duration)
     in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
     interval = float(every) if in_seconds else 0.0
-    return Plan(
-        start, start + duration, dt, 0, 0 if in_seconds else int(every), interval, tolerance
-    )
+    end = start + duration
+    within = np.sort(knots[(knots > start) & (knots < end)])
+    apart = np.diff(within, prepend=start) > SAME_TIME * max(abs(start), abs(end))
+    per_sample = 0 if in_seconds else int(every)
+    return Plan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
 
 
 def expected_samples(plan: Plan) -> int:

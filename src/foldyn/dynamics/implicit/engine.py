@@ -7,21 +7,23 @@ interpreter; the force, the residual and the tangent are compiled.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foldyn.dynamics import outcome
 from foldyn.dynamics.course import Course, Plan, Samples, sample
 from foldyn.dynamics.implicit.banded import one_thread
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
 from foldyn.dynamics.implicit.convergence import NOT_FINITE, SOLVED
+from foldyn.dynamics.implicit.horizon import horizon
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import Bench, Scheme
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.kinds import longest
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.materials.compiled import kernel
 
@@ -30,7 +32,6 @@ STEPS, SAMPLED, REFUSED, EVALUATIONS = range(4)  # places in `Course.count`
 SAME_TIME = 1e-9  # of a step: times as near as that are one
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
-FLOOR = 1e-6  # of the longest bar: the least displacement that errors are measured by
 TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
 
 
@@ -42,8 +43,8 @@ class Implicit:
     make : callable
         The scheme from a bench.
     packed : Packed
-    jumps : sequence of float
-        Times (s) at which loads jump: steps end there, so that no step sees a jump.
+    jumps : tuple of float
+        Times (s), in order, at which loads jump: steps end there, so that no step sees a jump.
     """
 
     threads = 1
@@ -51,10 +52,10 @@ class Implicit:
     def __init__(
         self, make: Callable[[Bench], Scheme], packed: Packed, jumps: tuple[float, ...]
     ) -> None:
-        self._make, self._packed, self._jumps = make, packed, sorted(set(jumps))
+        self._make, self._packed, self._jumps = make, packed, jumps
         self._newton: Newton | None = None
         self._halved = 0
-        self._size = FLOOR * longest(packed.model)
+        self._horizon = 0.0  # s in which a vibration moves on
 
     def facts(self) -> dict[str, Any]:
         """Statistics of the run."""
@@ -97,7 +98,9 @@ class Implicit:
         scheme = self._make(bench)
         newton = Newton(scheme, StepMatrix(self._packed, scheme.symmetric))
         scheme.begin(plan.start)
-        course.clock[SCALE] = np.abs(bench.displacement()).max(initial=0.0)
+        course.clock[SCALE] = _largest(bench.displacement())
+        if self._packed.system.varies and not plan.steps:
+            self._horizon = horizon(bench, newton.matrix, plan.end - plan.start)
         newton.prepare(plan.dt, plan.start)
         self._newton = newton
         return self._note(newton, course, plan.start, out)
@@ -116,7 +119,7 @@ class Implicit:
         t, end, h = float(course.clock[TIME]), plan.start + step * plan.dt, plan.dt
         whole = True
         while t < end - SAME_TIME * plan.dt:
-            goal, jump = self._next_stop(t, end, SAME_TIME * plan.dt)
+            goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = _divide(t, goal, h, jump)
             found, hinge = self._attempt(newton, part, stop, jump)
             if found == outcome.DONE:
@@ -144,7 +147,8 @@ class Implicit:
             wanted = min(float(clock[NEXT]), plan.dt)
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
                 return outcome.STUCK, -1
-            goal, jump = self._next_stop(t, due, SAME_TIME * wanted)
+            near = SAME_TIME * wanted
+            goal, jump = self._next_jump(t, _next_stop(plan, t, due, near), near)
             h, end, jump = _divide(t, goal, wanted, jump)
             found, hinge = self._attempt(newton, h, end, jump)
             if found != outcome.DONE:
@@ -153,8 +157,7 @@ class Implicit:
                 clock[NEXT] = 0.5 * h
                 count[REFUSED] += 1
                 continue
-            error, scale = self._error(newton, h, float(clock[SCALE]))
-            error /= plan.tolerance
+            error, scale = self._error(newton, plan, t, h, float(clock[SCALE]))
             if error <= 1.0:
                 break
             clock[NEXT] = smaller_step(h, error)
@@ -180,14 +183,13 @@ class Implicit:
             return time, True
         return plan.end, time < plan.end + SAME_TIME * plan.interval
 
-    def _next_stop(self, t: float, end: float, near: float) -> tuple[float, float | None]:
+    def _next_jump(self, t: float, end: float, near: float) -> tuple[float, float | None]:
         """Where a step from t has to end at the latest, and the jump of a load there."""
-        for jump in self._jumps:
-            if jump > end + near:
-                break
-            if jump > t + near:
-                return (end if abs(jump - end) <= near else jump), jump
-        return end, None
+        k = bisect_right(self._jumps, t + near)
+        if k == len(self._jumps) or self._jumps[k] > end + near:
+            return end, None
+        jump = self._jumps[k]
+        return (end if abs(jump - end) <= near else jump), jump
 
     def _attempt(self, newton: Newton, h: float, end: float, jump: float | None) -> tuple[int, int]:
         """Solve a step that ends before the jump, if there is one; returns (outcome, hinge)."""
@@ -219,20 +221,42 @@ class Implicit:
         if jump is not None:
             scheme.begin(max(end, jump))
 
-    def _error(self, newton: Newton, h: float, scale: float) -> tuple[float, float]:
-        """Error of the worst node relative to the largest displacement so far, and the latter.
+    def _error(
+        self, newton: Newton, plan: Plan, t: float, h: float, scale: float
+    ) -> tuple[float, float]:
+        """Error of the worst node in a step from t, over the tolerance, and the new scale.
 
-        The change of the acceleration goes through the matrix of the step, which takes away what
-        stiff bars add to it and displacements do not feel.
+        The scale is the largest displacement so far. The change of the acceleration goes through
+        the matrix of the step, which takes away what stiff bars add to it and displacements do not
+        feel. So does what loads do between the ends of the step and the method does not see. The
+        displacement of a slow motion errs by this at once, by the square of the step as the whole
+        motion does, and may do so by the tolerance to the power 2/3, which is the error of the
+        whole motion. In a step shorter than a vibration it is an impulse that lasts: its error is
+        the displacement that it leads to later.
         """
         scheme, bench = newton.scheme, newton.scheme.bench
-        scale = max(scale, float(np.abs(bench.moved()).max(initial=0.0)))
+        scale = max(scale, _largest(bench.moved()))
+        reference, error, force = max(scale, plan.floor), 0.0, bench.unseen(t, t + h)
+        if force is not None:
+            if not newton.matrix.factorized and not newton.renew(h):
+                return math.inf, scale
+            moved = _largest(newton.matrix.solve(force, bench.step)) / reference
+            error = max(moved**1.5, moved * self._horizon / h if self._horizon > h else 0.0)
         change = scheme.change(h)
-        if not change.any() or not newton.matrix.factorized:
-            return 0.0, scale  # nothing has happened yet
-        times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
-        error = newton.matrix.solve(bench.out, bench.step)
-        return float(np.abs(error).max(initial=0.0)) / max(scale, self._size), scale
+        if change.any() and newton.matrix.factorized:
+            times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
+            error = max(error, _largest(newton.matrix.solve(bench.out, bench.step)) / reference)
+        return error / plan.tolerance, scale
+
+
+def _largest(values: NDArray) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+def _next_stop(plan: Plan, t: float, end: float, near: float) -> float:
+    """Where a step from t has to end at the latest, for the knots of the histories."""
+    k = int(np.searchsorted(plan.stops, t + near, side="right"))
+    return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end
 
 
 def _divide(

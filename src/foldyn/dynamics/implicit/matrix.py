@@ -120,6 +120,10 @@ class StepMatrix:
                     raise
         self._factors = self._sparse(weights, self._blocks)
 
+    def forget(self) -> None:
+        """Give up the factors."""
+        self._factors = None
+
     @property
     def factorized(self) -> bool:
         """Whether there is something to solve with."""

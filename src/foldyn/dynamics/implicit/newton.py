@@ -44,6 +44,16 @@ class Newton:
         scheme.tangent(self.matrix, bench.displacement(), False)
         scheme.works(h)
 
+    def renew(self, h: float) -> bool:
+        """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
+        self.scheme.tangent(self.matrix, self.scheme.bench.displacement(), False)
+        try:
+            self.matrix.factorize(self.scheme.weights(h))
+        except SingularTangentError:
+            return False
+        self._h = h
+        return True
+
     def solve(self, h: float, t: float) -> int:
         """Move bench.shift from its prediction to equilibrium at the end t of a step h (s).
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -113,6 +114,7 @@ class Bench:
         self.out, self.step = np.zeros(shape), np.zeros(shape)
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
+        self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
         self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
         q, w, a, force = (np.zeros(shape) for _ in range(4))
         self.new = Phase(q, w, a, force, np.zeros(histories))
@@ -156,6 +158,31 @@ class Bench:
         out = q.copy()
         np.add.at(out.reshape(-1), moved.dof, moved.value * factor[moved.row, 0])
         return out
+
+    def unseen(self, first: float, last: float) -> NDArray | None:
+        """Force (n, 3) at the end of a step that what histories do within it would exert, N.
+
+        None if they are straight lines there. The dihedrals of the last evaluation stay those of
+        the end.
+        """
+        packed, new = self.packed, self.new
+        if not packed.system.varies:
+            return None
+        unseen(packed.system.waves, first, last, self.old.factor, new.factor, self._gap)
+        return self.push(new, self._gap) if self._gap.any() else None
+
+    def push(self, phase: Phase, change: NDArray) -> NDArray:
+        """Force (n, 3) that a change (h,) of the factors exerts at a phase, with `out` in use, N."""
+        packed, s = self.packed, self.scratch
+        model, system, mass = packed.model, packed.system, packed.mass
+        for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
+            s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
+            s.factor[:, 0] += moved
+            acceleration(model, system, mass, phase.q, phase.w, 0.0, self.earlier, self.work, s)
+            force[:] = s.force
+        s.time[0] = np.nan
+        self._pushed -= self.out
+        return self._pushed
 
     def predict(self, h: float) -> None:
         """Move on as the mean velocities of the last steps go on.
