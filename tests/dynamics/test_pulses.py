@@ -147,7 +147,7 @@ def test_supports_and_folds_that_move_for_a_moment(method):
     for case in (moved, based, turned):
         reference, motion = (
             fd.simulate(case, 0.4, name, every=0.02, dt=dt).displacement.to_numpy()[16:]
-            for name, dt in (("rk4", 5e-5), (method, None))
+            for name, dt in (("rk4", 2.5e-5), (method, None))
         )
         assert np.abs(motion - reference).max() < 0.02 * np.abs(reference).max()
 
