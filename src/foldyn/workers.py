@@ -25,14 +25,14 @@ class Workers:
     ----------
     count : int
         Of processes.
-    begin : callable
+    begin : callable, optional
         Called in each of them first, with `given`.
     *given
         Can be sent to another process.
     """
 
     def __init__(
-        self, count: int, begin: Callable[..., None] = lambda: None, *given: object
+        self, count: int, begin: Callable[..., None] | None = None, *given: object
     ) -> None:
         context = get_context("spawn")
         line, self._end = context.Pipe(duplex=False)
@@ -69,18 +69,14 @@ class Workers:
         self._line.close()
 
 
-def _live(line: Connection, begin: Callable[..., None], given: tuple[Any, ...]) -> None:
+def _live(line: Connection, begin: Callable[..., None] | None, given: tuple[Any, ...]) -> None:
     """Begin a process that ends when the line does."""
     Thread(target=_follow, args=(line,), daemon=True).start()
-    if sys.platform == "linux":  # compiled code may keep the thread waiting, but not a signal
-        import fcntl
-
-        fcntl.fcntl(line.fileno(), fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(line.fileno(), fcntl.F_SETFL, os.O_ASYNC)
-        signal.signal(signal.SIGIO, signal.SIG_DFL)
-        if line.poll():  # it ended before the signal was asked for
-            os._exit(1)
-    begin(*given)
+    _arm(line)
+    if line.poll():  # it ended before that
+        os._exit(1)
+    if begin is not None:
+        begin(*given)
 
 
 def _follow(line: Connection) -> None:
@@ -88,3 +84,18 @@ def _follow(line: Connection) -> None:
         line.recv_bytes()
     except (EOFError, OSError):
         os._exit(1)
+
+
+def _arm(line: Connection) -> None:
+    """Have the system end this process with the line: compiled code keeps threads waiting."""
+    if sys.platform != "linux":
+        return
+    import fcntl
+
+    try:  # opened anew, as who is told of what happens to an opened file is one process
+        own = os.open(f"/proc/self/fd/{line.fileno()}", os.O_RDONLY | os.O_NONBLOCK)
+    except OSError:
+        return
+    signal.signal(signal.SIGIO, signal.SIG_DFL)
+    fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(own, fcntl.F_SETFL, os.O_ASYNC | os.O_NONBLOCK)
