@@ -41,7 +41,7 @@ class Owner:
         """Owner of a folder of results of a file."""
         shipped = [name for name, path in shipped_cases().items() if path == file]
         digest = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
-        with suppress(ValueError):  # on another drive
+        with suppress(ValueError, OSError):  # on another drive; where there is no such place
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
         source = shipped[0] if shipped else file.as_posix()
         return cls(command, source, digest)
