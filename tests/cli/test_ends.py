@@ -21,6 +21,7 @@ from processes import (
     wait_for,
     wait_for_line,
 )
+from test_cli_fit import CASE, FIT
 
 import foldyn as fd
 from foldyn.cli import stamp
@@ -185,3 +186,62 @@ def test_workers_end_with_their_parent(tmp_path, how) -> None:
     parent.send_signal(getattr(signal, how))
     parent.wait(timeout=5)
     wait_for(lambda: not any(map(running, both)), 5.0)
+
+
+def watched(process: subprocess.Popen[str], folder: Path, kind: str) -> list[int]:
+    """Workers of a process, as soon as they have kept something more in a folder."""
+    before = set(folder.glob(kind))
+    wait_for(lambda: set(folder.glob(kind)) - before or process.poll() is not None, 300.0)
+    assert process.poll() is None
+    return children(process.pid)
+
+
+FORCES = "displacement [mm],force [mN]\n-75,1.6\n-150,4.4\n-225,8.1\n-300,13.0\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 9))]
+)
+def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path, number) -> None:
+    for name, text in (("case.toml", CASE), ("fit.toml", FIT), ("forces.csv", FORCES)):
+        (tmp_path / name).write_text(text)
+    kept = tmp_path / "fit-fit" / "evaluations"
+    fit = ("fit", "fit.toml", "--starts", "400", "--processes", "2", "--no-figures")
+    one = start(tmp_path, *fit)
+    workers = watched(one, kept, "*.npz")
+    assert len(workers) == 2
+    one.send_signal(number)
+    one.wait(timeout=10)
+    wait_for(lambda: not any(map(running, workers)), 5.0)
+    there = set(kept.iterdir())
+    err = one.communicate()[1]
+    if number != signal.SIGKILL:
+        assert one.returncode == 128 + number
+        assert "Traceback" not in err
+        named = f"{KEPT}fit-fit/evaluations; the same command goes on from there"
+        assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
+        assert not [path for path in there if path.suffix != ".npz"]
+    assert set(kept.iterdir()) == there
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_a_study_that_is_ended_goes_on(tmp_path) -> None:
+    runs = tmp_path / "herkal-quick" / "runs"
+    for number in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM):
+        one = start(tmp_path, "study", "herkal", "--quick")
+        workers = watched(one, runs, "*.nc")
+        assert len(workers) == 2
+        one.send_signal(number)
+        one.wait(timeout=10)
+        wait_for(lambda: not any(map(running, workers)), 5.0)  # noqa: B023
+        there = set(runs.rglob("*"))
+        out, err = one.communicate()
+        if number != signal.SIGKILL:
+            assert one.returncode == 128 + number
+            assert "Traceback" not in err
+            named = f"{KEPT}herkal-quick/runs; the same command goes on from there"
+            assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
+            assert not [path for path in there if ".tmp" in path.name]
+        assert set(runs.rglob("*")) == there, out

@@ -118,7 +118,8 @@ class Results:
                 self._stamp("running")  # a kill from here on leaves nothing old for new
                 write(file)
             except (OSError, InputError) as error:  # the folder has changed since it was checked
-                self._elsewhere(file, write, reason(error))
+                self.kept.append(elsewhere(file, write, reason(error)))
+                raise unwritten(file, reason(error)) from None
             self.kept.append(str(file))
             self._new.append(name)
             self.clear()
@@ -155,23 +156,33 @@ class Results:
         stamp.write(self.folder, self.owner, state, self._new, self._old)
         self._begun = True
 
-    def _elsewhere(self, file: Path, write: Callable[[Path], None], why: str) -> None:
-        """Save a file in the system's temporary folder, and raise."""
-        made = None
-        try:
-            made = Path(tempfile.mkdtemp(prefix="foldyn-"))
-            write(made / file.name)
-        except (OSError, InputError) as error:
-            if made is not None:
-                shutil.rmtree(made, ignore_errors=True)
-            raise ComputationError(
-                f"{file}: cannot be written ({why}), nor can a temporary folder "
-                f"({reason(error)}): it is lost; make room, or name another folder with --out"
-            ) from None
-        self.kept.append(str(made / file.name))
+
+def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
+    """Save what cannot be saved as a file in the system's temporary folder; says where.
+
+    Raises
+    ------
+    ComputationError
+        Nor can it be saved there.
+    """
+    made = None
+    try:
+        made = Path(tempfile.mkdtemp(prefix="foldyn-"))
+        write(made / file.name)
+    except (OSError, InputError) as error:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
         raise ComputationError(
-            f"{file}: cannot be written ({why}): make room, or name another folder with --out"
-        )
+            f"{file}: cannot be written ({why}), nor can a temporary folder ({reason(error)}): it "
+            "is lost; make room, or name another place with --out"
+        ) from None
+    return str(made / file.name)
+
+
+def unwritten(file: Path, why: str) -> ComputationError:
+    """What is raised where something has been saved elsewhere."""
+    told = f"{file}: cannot be written ({why}): make room, or name another place with --out"
+    return ComputationError(told)
 
 
 @contextmanager
