@@ -161,7 +161,7 @@ def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_fact
     assert failed.status == 1
     reason, kept = failed.err.splitlines()
     assert reason.startswith(f"foldyn: {OLD[1]}: cannot be written (")
-    assert "No space left on device): make room, or name another folder with --out" in reason
+    assert "No space left on device): make room, or name another place with --out" in reason
     (saved,) = elsewhere.rglob("*.nc")
     assert kept == f"foldyn: kept what was computed: {OLD[0]}, {saved}"
     assert fd.load(saved).sizes["time"] == 11
