@@ -92,7 +92,8 @@ def test_an_interrupted_list_keeps_what_was_done(workplace, edited, monkeypatch)
 
     monkeypatch.setattr(Motion, "run", interrupted)
     stopped = workplace.run(edited(('"circumcenter"', '["panel", "centroid"]')))
-    assert (stopped.status, stopped.err) == (130, "foldyn: interrupted\n")
+    kept = KEPT + "case-results/result-panel.nc"
+    assert (stopped.status, stopped.err) == (130, f"foldyn: interrupted\n{kept}\n")
     assert stopped.new == ["case-results", "case-results/result-panel.nc"]
 
 
@@ -104,5 +105,7 @@ def test_a_full_disk(workplace, miura, monkeypatch) -> None:
     failed = workplace.run(miura)
     assert failed.status == 1
     (line,) = failed.err.splitlines()
-    assert line.startswith("foldyn: cannot write the results: ")
-    assert "No space left on device" in line
+    assert line.startswith("foldyn: case-results/result.nc: cannot be written (No space left")
+    assert "nor can a temporary folder" in line
+    assert "--out" in line
+    assert failed.new == []

@@ -13,6 +13,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.cli import folder as results_folder
+from foldyn.cli import stamp
 from foldyn.cli.main import main
 
 CELL = """
@@ -272,7 +273,7 @@ def test_figures_of_an_earlier_motion_go(workplace, slow, tmp_path) -> None:
     (folder / "notes.txt").write_text("mine")
     workplace.write(slow())
     assert main(["run", "case.toml", "--no-figures"]) == 0
-    assert {path.name for path in folder.iterdir()} == {"notes.txt", "result.nc"}
+    assert {path.name for path in folder.iterdir()} == {"notes.txt", "result.nc", stamp.NAME}
 
 
 def test_a_single_point_is_drawn(workplace, slow) -> None:

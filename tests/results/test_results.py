@@ -374,7 +374,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch) -> None:
     before = (tmp_path / "run.nc").read_bytes()
 
     def fail(self, path, **_):
-        path.write_bytes(b"half")
+        path.write(b"half")
         raise OSError("disk full")
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)

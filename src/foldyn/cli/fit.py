@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import check_folder
+from foldyn.cli.folder import Results, held
 from foldyn.cli.speech import speech
+from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, InputError
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
+DRAWN = ("report.html", "correlation.png", "data-[0-9].png", "data-[0-9][0-9].png")
 
 
 def add_fit(commands: Any) -> None:
@@ -61,6 +63,9 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--processes", type=int, help="evaluations that run at a time")
     fit.add_argument("--out", help="folder of the results (default: NAME-fit)")
     fit.add_argument(
+        "--replace", action="store_true", help="replace a fit of another file that is in the folder"
+    )
+    fit.add_argument(
         "--no-figures", action="store_true", help="write the numbers only, no figures and report"
     )
     fit.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
@@ -68,50 +73,59 @@ def add_fit(commands: Any) -> None:
 
 def run_fit(given: argparse.Namespace) -> Path:
     """Fit what the arguments of `add_fit` ask for; returns the folder of the results."""
+    plan = plan_of(given)
+    folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
+    names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]
+    owner = Owner.of("fit", plan.path, folder)
+    say = speech(given.quiet)
+    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+        found = _found(plan, results, given.quiet or not sys.stderr.isatty())
+        for one in found.estimates:
+            say(f"  {_line(one, found.confidence)}")
+        for score in found.scores:
+            held_out = ", held out" if score.held_out else ""
+            say(f"  {score.name}{held_out}: rms misfit {score.rms:.3g} {score.unit}, "
+                f"{100.0 * score.relative:.2g} % of its variation")  # fmt: skip
+        for name, write in zip(WRITTEN, (found.save, found.save, found.write_case), strict=True):
+            results.keep(name, write)
+        say(f"wrote {folder / WRITTEN[0]}")
+        if not given.no_figures:
+            say(f"wrote {_drawn(found, plan, folder)}")
+    return folder
+
+
+def _found(plan: FitFile, results: Results, hidden: bool) -> Fit:
+    """Fit; every evaluation is kept."""
     from tqdm import tqdm
 
     from foldyn.experiment import fit
 
-    plan = plan_of(given)
-    folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
-    check_folder(folder, given.out, [*WRITTEN, *([] if given.no_figures else ["report.html"])])
-    say = speech(given.quiet)
-    hidden = given.quiet or not sys.stderr.isatty()
+    kept = results.folder / KEPT
     layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
     with tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=hidden) as bar:
         bar.set_postfix_str("first use compiles kernels, up to half a minute")
 
         def tell(course: Course) -> None:
+            if not results.kept:
+                results.begin(KEPT)
             if math.isfinite(course.cost):
                 bar.set_postfix_str(f"smallest cost {course.cost:.6g}", refresh=False)
             bar.n = course.computed + course.found
             bar.refresh()
 
-        found = fit(
-            plan.case, plan.data, plan.parameters, ties=plan.ties, folder=folder / KEPT,
+        return fit(
+            plan.case, plan.data, plan.parameters, ties=plan.ties, folder=kept,
             progress=tell, **plan.solver,
         )  # fmt: skip
-    for one in found.estimates:
-        say(f"  {_line(one, found.confidence)}")
-    for score in found.scores:
-        held = ", held out" if score.held_out else ""
-        say(f"  {score.name}{held}: rms misfit {score.rms:.3g} {score.unit}, "
-            f"{100.0 * score.relative:.2g} % of its variation")  # fmt: skip
-    _write(found, plan, folder, not given.no_figures)
-    say(f"wrote {folder / ('fit.json' if given.no_figures else 'report.html')}")
-    return folder
 
 
-def _write(found: Fit, plan: FitFile, folder: Path, figures: bool) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+def _drawn(found: Fit, plan: FitFile, folder: Path) -> Path:
+    from foldyn.experiment.calibration.fit_page import write_fit
+
     try:
-        for name in WRITTEN[:2]:
-            found.save(folder / name)
-        found.write_case(folder / WRITTEN[2])
-        if figures:
-            from foldyn.experiment.calibration.fit_page import write_fit
-
-            write_fit(found, folder, plan.title)
+        return write_fit(found, folder, plan.title)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("interrupted while figures were drawn") from None
     except InputError as error:  # the input was right: something else went wrong
         raise ComputationError(f"{folder}: {error}") from None
 

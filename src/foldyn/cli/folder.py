@@ -1,15 +1,20 @@
-"""The folder of the results: checked before anything runs, written to afterwards."""
+"""The folder of the results: checked before anything runs, held by one run, written to."""
 
 from __future__ import annotations
 
+import re
+import shutil
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from foldyn.errors import ComputationError, InputError
-
-if TYPE_CHECKING:
-    import xarray
+from foldyn.cli import stamp
+from foldyn.cli.lock import LockedError, locked
+from foldyn.cli.signals import ENDINGS
+from foldyn.cli.stamp import Owner
+from foldyn.errors import ComputationError, FoldynError, InputError
+from foldyn.writing import remove_leftovers
 
 DRAWN = (
     "report.html",
@@ -19,52 +24,254 @@ DRAWN = (
     *(f"{name}.{kind}" for name in ("motion", "path", "modes") for kind in ("gif", "mp4")),
 )
 """All that the pages of `report` come with."""
+_RESULT = re.compile(r"result(-\w+)?\.nc")
 
 
-def check_folder(folder: Path, out: str | None, names: list[str]) -> None:
+def check_folder(folder: Path, out: str | None, names: Sequence[str]) -> None:
     """Refuse a results folder that cannot be written, by trying; leaves nothing behind."""
-    place = f"--out {folder}" if out is not None else f"results folder {folder}"
+    with _made(folder, out, names):
+        pass
+
+
+@contextmanager
+def _made(folder: Path, out: str | None, names: Sequence[str]) -> Iterator[None]:
+    """Have a folder that can be written to; it goes again where nothing was written."""
     if out == "":
         raise InputError("--out: is empty; name a folder")
     made: list[Path] = []
     try:
-        for part in (*reversed(folder.parents), folder):
-            if not part.exists():
-                part.mkdir()
-                made.append(part)
-        if not folder.is_dir():
-            raise InputError(f"{place}: is a file; name a folder")
-        for name in names:
-            if (folder / name).is_dir():
-                raise InputError(
-                    f"{place}: {folder / name} is a folder, a file of this name is to be written; "
-                    "name another folder"
-                )
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{place}: cannot be written ({reason}); name another folder") from None
+        try:
+            for part in (*reversed(folder.parents), folder):
+                if not part.exists():
+                    part.mkdir(exist_ok=True)
+                    made.append(part)
+            _check(folder, out, names)
+        except (OSError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            why = getattr(error, "strerror", None) or error
+            raise InputError(
+                f"{_place(folder, out)}: cannot be written ({why}); name another folder"
+            ) from None
+        yield
     finally:
-        for part in reversed(made):
-            part.rmdir()
+        with suppress(OSError):
+            for part in reversed(made):
+                part.rmdir()
 
 
-def remove_drawn(folder: Path) -> None:
-    """Remove the figures of an earlier run: they would belie this one."""
-    for name in DRAWN:
-        (folder / name).unlink(missing_ok=True)
+def _check(folder: Path, out: str | None, names: Sequence[str]) -> None:
+    if not folder.is_dir():
+        raise InputError(f"{_place(folder, out)}: is a file; name a folder")
+    for name in names:
+        if (folder / name).is_dir():
+            raise InputError(
+                f"{_place(folder, out)}: {folder / name} is a folder, a file of this name is to be "
+                "written; name another folder"
+            )
+    with tempfile.TemporaryFile(dir=folder):
+        pass
 
 
-def save_result(result: xarray.Dataset, file: Path) -> str:
-    """Write a result into a folder that is made where needed; returns the file's name."""
-    from foldyn.results import save
+def _place(folder: Path, out: str | None) -> str:
+    return f"--out {folder}" if out is not None else f"results folder {folder}"
 
-    file.parent.mkdir(parents=True, exist_ok=True)
+
+class Results:
+    """Results of one run in a folder that it holds.
+
+    Attributes
+    ----------
+    folder : Path
+    kept : list of str
+        What has been saved, where it is.
+    goes_on : bool
+        Whether the same command would go on from there.
+    """
+
+    def __init__(self, folder: Path, owner: Owner, drawn: Sequence[str], old: list[str]) -> None:
+        self.folder, self.owner, self.drawn = folder, owner, drawn
+        self.kept: list[str] = []
+        self.goes_on = False
+        self._old, self._new = old, list[str]()
+        self._before = stamp.raw(folder)
+        self._begun = self._cleared = False
+
+    def begin(self, name: str) -> None:
+        """Note a folder to which results go one by one, so that the same command goes on."""
+        self.goes_on = True
+        self.kept.append(str(self.folder / name))
+        self._new.append(name)
+        self._stamp("running")
+
+    def keep(self, name: str, write: Callable[[Path], None]) -> None:
+        """Save a file; with the first one all that an earlier run left goes.
+
+        Raises
+        ------
+        ComputationError
+            It cannot be saved there; then it is saved elsewhere, if that is possible.
+        """
+        file = self.folder / name
+        with ENDINGS.saving():
+            try:
+                self._stamp("running")  # a kill from here on leaves nothing old for new
+                write(file)
+            except (OSError, InputError) as error:  # the folder has changed since it was checked
+                self.kept.append(elsewhere(file, write, reason(error)))
+                raise unwritten(file, reason(error)) from None
+            self.kept.append(str(file))
+            self._new.append(name)
+            self.clear()
+            with suppress(OSError):
+                self._stamp("running")
+
+    def clear(self) -> None:
+        """Remove the files of an earlier run, and its figures, which would belie this one."""
+        if self._cleared:
+            return
+        self._cleared = True
+        drawn = [path for pattern in self.drawn for path in self.folder.glob(pattern)]
+        for path in (*drawn, *(self.folder / name for name in self._old if name not in self._new)):
+            if not path.is_dir():
+                path.unlink(missing_ok=True)
+        self._old = []
+
+    def end(self, state: str) -> None:
+        """Stamp the folder for the last time; as it was before, where nothing was written."""
+        with suppress(OSError):
+            if self._new:
+                self._stamp(state)
+            elif self._begun:
+                stamp.restore(self.folder, self._before)
+
+    def told(self) -> str:
+        """What was kept, for the end of a message."""
+        if not self.kept:
+            return ""
+        further = "; the same command goes on from there" if self.goes_on else ""
+        return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
+
+    def _stamp(self, state: str) -> None:
+        stamp.write(self.folder, self.owner, state, self._new, self._old)
+        self._begun = True
+
+
+def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
+    """Save what cannot be saved as a file in the system's temporary folder; says where.
+
+    Raises
+    ------
+    ComputationError
+        Nor can it be saved there.
+    """
+    made = None
     try:
-        save(result, file)
-    except InputError as error:  # the input was right, but the folder has changed since
-        raise ComputationError(str(error), result) from None
-    return str(file)
+        made = Path(tempfile.mkdtemp(prefix="foldyn-"))
+        write(made / file.name)
+    except (OSError, InputError) as error:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+        raise ComputationError(
+            f"{file}: cannot be written ({why}), nor can a temporary folder ({reason(error)}): it "
+            "is lost; make room, or name another place with --out"
+        ) from None
+    return str(made / file.name)
+
+
+def unwritten(file: Path, why: str) -> ComputationError:
+    """What is raised where something has been saved elsewhere."""
+    told = f"{file}: cannot be written ({why}): make room, or name another place with --out"
+    return ComputationError(told)
+
+
+@contextmanager
+def held(
+    folder: Path, out: str | None, names: Sequence[str], owner: Owner, replace: bool = False,
+    drawn: Sequence[str] = DRAWN, inside: Sequence[str] = (),
+) -> Iterator[Results]:  # fmt: skip
+    """Hold a folder for one run; what ends the run names what was kept.
+
+    Parameters
+    ----------
+    folder : Path
+    out : str or None
+        As it was given.
+    names : sequence of str
+        Files to be written.
+    owner : Owner
+    replace : bool
+        Whether results of another owner are replaced.
+    drawn : sequence of str
+        Patterns of the names of figures and pages.
+    inside : sequence of str
+        Folders in it that are written to.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written, another run holds it, or it belongs to another owner.
+    """
+    places = [folder, *(folder / name for name in inside)]
+    try:
+        with _made(folder, out, names), locked(folder):
+            old = _old(folder, _place(folder, out), names, owner, replace)
+            results = Results(folder, owner, drawn, old)
+            remove_leftovers(*places)
+            state = "stopped"
+            try:
+                with _naming(results):
+                    yield results
+                state = "complete"
+            finally:
+                results.end(state)
+                remove_leftovers(*places)
+    except LockedError as error:
+        raise InputError(
+            f"{_place(folder, out)}: another run writes to it ({error}); wait for its end, or name "
+            "another folder"
+        ) from None
+
+
+@contextmanager
+def _naming(results: Results) -> Iterator[None]:
+    """Name what was kept where a run ends early."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(f"{str(stop) or 'interrupted'}{results.told()}") from None
+    except (FoldynError, OSError, MemoryError) as error:
+        if not results.kept and not isinstance(error, ComputationError):
+            raise
+        partial = getattr(error, "partial", None)
+        raise ComputationError(f"{reason(error)}{results.told()}", partial) from None
+
+
+def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
+    """Results in a folder that a run replaces; refuses what is not its own."""
+    found = stamp.read(folder)
+    if found is None:
+        there = [path.name for path in folder.iterdir() if _RESULT.fullmatch(path.name)]
+        strange = sorted(set(there) - set(names))
+        if strange and not replace:
+            raise InputError(
+                f"{place}: holds {strange[0]}, which this run does not write: it would stand "
+                "beside the new results; name another folder, or replace it with --replace"
+            )
+        return there
+    old = [name for name in (*found["results"], *found["outdated"]) if (folder / name).exists()]
+    if old and not owner.same(found) and not replace:
+        raise InputError(
+            f"{place}: holds the results of {stamp.named(found, folder)}; name another folder, or "
+            "replace them with --replace"
+        )
+    return list(dict.fromkeys(old))
+
+
+def reason(error: BaseException) -> str:
+    """What an error says; of one of the system what it was about, without its number."""
+    if isinstance(error, MemoryError):
+        return "not enough memory: take fewer cells or samples"
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror

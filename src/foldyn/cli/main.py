@@ -1,7 +1,7 @@
 """The `foldyn` command: its arguments and exit statuses.
 
-0: done; 1: the computation failed, what was computed is kept and named; 2: bad input, one
-message, nothing written.
+0: done; 1: the computation failed; 2: bad input, one message, nothing written; 128 and its number:
+ended by a signal. What was computed until then is kept and named.
 """
 
 from __future__ import annotations
@@ -15,12 +15,16 @@ from typing import Any
 
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
+from foldyn.cli.folder import reason
+from foldyn.cli.signals import ENDINGS
+from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.track import add_track, track
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, BAD_INPUT = 0, 1, 2
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: what decoders would say of a broken film is ours to say."""
+REPLACE = "replace results of another case file or command that the folder holds"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -90,6 +94,7 @@ def parser() -> argparse.ArgumentParser:
         "tracks (NetCDF), or tables (CSV)",
     )
     study.add_argument("--out", help="folder of the results (default: NAME-study or NAME-quick)")
+    study.add_argument("--replace", action="store_true", help=REPLACE)
     study.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
 
     add_fit(commands)
@@ -108,6 +113,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
         "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
     )
     command.add_argument("--out", help=f"folder of the results (default: NAME-{results})")
+    command.add_argument("--replace", action="store_true", help=REPLACE)
     command.add_argument(
         "--no-figures", action="store_true", help="write the result only, no figures and report"
     )
@@ -140,33 +146,42 @@ def _add_state(command: argparse.ArgumentParser) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
-    given = parser().parse_args(arguments)
-    for name, level in SILENT.items():
-        os.environ.setdefault(name, level)
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", FoldynWarning)
-        warnings.showwarning = _Warnings()
-        try:
+    with ENDINGS.heeded(), steady_streams() as out:
+        return _status(arguments, out)
+
+
+def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
+    """Run the command, and say what ended it early."""
+    try:
+        given = parser().parse_args(arguments)
+        for name, level in SILENT.items():
+            os.environ.setdefault(name, level)
+        os.environ["MPLBACKEND"] = "Agg"  # figures go to files alone
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", FoldynWarning)
+            warnings.showwarning = _Warnings()
             _call(given)
-        except InputError as error:
-            print(f"foldyn: {error}", file=sys.stderr)
-            return BAD_INPUT
-        except ComputationError as error:
-            print(f"foldyn: {error}", file=sys.stderr)
-            return FAILED
-        except MemoryError:
-            print("foldyn: not enough memory: take fewer cells or samples", file=sys.stderr)
-            return BAD_INPUT
-        except BrokenPipeError:  # the reader of our output has left, as `head` does
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return FAILED
-        except OSError as error:  # a full disk, a folder that vanished during the run
-            print(f"foldyn: cannot write the results: {error}", file=sys.stderr)
-            return FAILED
-        except KeyboardInterrupt as stop:
-            print(f"foldyn: {str(stop) or 'interrupted'}", file=sys.stderr)
-            return INTERRUPTED
-    return DONE
+    except InputError as error:
+        return _say(str(error), BAD_INPUT)
+    except ComputationError as error:
+        return _say(str(error), FAILED)
+    except MemoryError as error:
+        return _say(reason(error), BAD_INPUT)
+    except OSError as error:  # a full disk, a folder that vanished during the run
+        return _say(f"cannot write the results: {reason(error)}", FAILED)
+    except KeyboardInterrupt as stop:
+        return _say(str(stop) or "interrupted", ENDINGS.status)
+    out.flush()
+    if out.failure is None:
+        return DONE
+    if isinstance(out.failure, BrokenPipeError):  # who read our output has left, as `head` does
+        return FAILED
+    return _say(f"cannot write to standard output: {reason(out.failure)}", FAILED)
+
+
+def _say(message: str, status: int) -> int:
+    print(f"foldyn: {message}", file=sys.stderr)
+    return status
 
 
 def _call(given: argparse.Namespace) -> None:
@@ -185,13 +200,17 @@ def _call(given: argparse.Namespace) -> None:
     if given.command == "study":
         from foldyn.cli.study import study
 
-        study(given.name, given.quick, given.out, given.quiet, given.sensitivity, given.data)
+        study(
+            given.name, given.quick, given.out, given.quiet, given.sensitivity, given.data,
+            given.replace,
+        )  # fmt: skip
         return
     from foldyn.cases.reading import read_case
     from foldyn.cli.run import run
 
     model = given.model, given.divisions
     how: dict[str, Any] = {"figures": not given.no_figures, "quiet": given.quiet}
+    how |= {"command": given.command, "replace": given.replace}
     if given.command == "run":
         how |= {"read": lambda path: read_case(path, *model), "results": "results"}
     else:
@@ -201,6 +220,7 @@ def _call(given: argparse.Namespace) -> None:
         how |= {"read": lambda path: read_as(path, kind, flags, *model), "results": kind}
     if given.model is not None:
         how["results"] = f"{given.model}-{how['results']}"
+        how["command"] += f" --model {given.model}"
     run(given.case, given.out, **how)
 
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.cases.casefile import CaseFile
 from foldyn.cases.reading import read_case
-from foldyn.cli.folder import check_folder, remove_drawn, save_result
+from foldyn.cli.folder import Results, held, reason
 from foldyn.cli.motions import Motions
 from foldyn.cli.paths import Paths
-from foldyn.cli.runs import Task
+from foldyn.cli.runs import Run, Task
 from foldyn.cli.speech import speech
+from foldyn.cli.stamp import Owner
 from foldyn.cli.vibrations import Modes, Responses
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, FoldynError, InputError, MotionInterrupted
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
@@ -43,10 +45,14 @@ def run(
     quiet: bool = False,
     read: Callable[[Path], CaseFile] = read_case,
     results: str = "results",
+    command: str = "run",
+    replace: bool = False,
 ) -> Path:
     """Run a case file and write its results; returns their folder, by default NAME-`results`.
 
-    Everything is checked before the first step is computed and before anything is written.
+    Everything is checked before the first step is computed and before anything is written. The
+    folder is stamped with the command and the case file: others' results in it are refused, or
+    replaced where that is asked for.
     """
     path = find_case(case)
     folder = Path(f"{path.stem}-{results}" if out is None else out)
@@ -55,36 +61,56 @@ def run(
         task = KINDS[case_file.analysis.kind](case_file, figures)
         if figures:
             _check_video(case_file)
-        names = [run.file for run in task.runs.values()]
-        check_folder(folder, out, [*names, *(["report.html"] if figures else [])])
+    names = [run.file for run in task.runs.values()]
     say = speech(quiet)
-    progress = not quiet and sys.stderr.isatty()
     introduction = _Introduction(case_file, task, told, say)
+    owner = Owner.of(command, path, folder)
+    pages = ["report.html"] if figures else []
+    with held(folder, out, [*names, *pages], owner, replace) as kept:
+        done = _computed(task, kept, introduction, not quiet and sys.stderr.isatty(), say)
+        say(f"wrote {', '.join(kept.kept)}")
+        if figures:
+            say("drawing figures")
+            page = _drawn(path, task, done, folder)
+            say(f"wrote figures and {page}")
+    return folder
+
+
+def _computed(
+    task: Task, results: Results, introduction: Callable[[], None], progress: bool,
+    say: Callable[[str], None],
+) -> dict[str, xarray.Dataset]:  # fmt: skip
+    """Compute all there is, and save each result as soon as it is there."""
     done: dict[str, xarray.Dataset] = {}
-    kept: list[str] = []
     for name, one in task.runs.items():
         try:
             done[name] = one.compute(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
+            failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
-                kept.append(_keep(error.partial, folder, one.file, kept))
-            failed = _failed(one.place, str(error), kept, error.partial)
-            if isinstance(error, MotionInterrupted):
-                raise MotionInterrupted(str(failed), error.partial) from None
+                _keep(error.partial, one, results)
             raise failed from None
-        kept.append(_keep(done[name], folder, one.file, kept))
+        _keep(done[name], one, results)
         say(one.line(done[name]))
-    if not figures:
-        say(f"wrote {', '.join(kept)}")
-        return folder
-    say("drawing figures")
+    return done
+
+
+def _keep(result: xarray.Dataset, one: Run, results: Results) -> None:
+    from foldyn.results import save
+
+    results.keep(one.file, partial(save, result))
+
+
+def _drawn(path: Path, task: Task, done: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+    """Draw the figures; whatever keeps them from being drawn, the results are there."""
     try:
-        page = task.write(done, folder)
-    except (InputError, ComputationError) as error:
-        raise _failed(f"{path}: figures: ", str(error), kept) from None
-    say(f"wrote {', '.join(kept)}, figures and {page}")
-    return folder
+        return task.write(done, folder)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("interrupted while figures were drawn") from None
+    except Exception as error:
+        kind = "" if isinstance(error, FoldynError | OSError) else f"{type(error).__name__}: "
+        raise ComputationError(f"{path}: figures: {kind}{reason(error)}") from None
 
 
 def _check_video(case_file: CaseFile) -> None:
@@ -127,17 +153,3 @@ class _Introduction:
                 "compiling the kernels: first use, up to half a minute; they are kept for later "
                 "runs"
             )
-
-
-def _keep(result: xarray.Dataset, folder: Path, file: str, kept: list[str]) -> str:
-    """Write a result; with the first one the figures of an earlier run go."""
-    if not kept:
-        remove_drawn(folder)
-    return save_result(result, folder / file)
-
-
-def _failed(
-    place: str, reason: str, kept: list[str], partial: xarray.Dataset | None = None
-) -> ComputationError:
-    told = f"\nfoldyn: kept what was computed: {', '.join(kept)}" if kept else ""
-    return ComputationError(f"{place}{reason}{told}", partial)

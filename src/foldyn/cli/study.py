@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from foldyn.cli.folder import check_folder
+from foldyn.cli.folder import Results, held
 from foldyn.cli.speech import silence
+from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 Say = Callable[[str], None]
 PROCESSES = 2
+INSIDE = ("runs", "runs/specimen", "sensitivity")  # folders that are written to
 
 
 def study(
@@ -26,6 +28,7 @@ def study(
     quiet: bool = False,
     sensitivity: bool = False,
     data: Sequence[str] | None = None,
+    replace: bool = False,
 ) -> Path:
     """Compute what a study has not computed yet and write its page; returns its path.
 
@@ -41,6 +44,8 @@ def study(
         The combinations of what the paper leaves unsaid, instead of the study itself.
     data : sequence of str, optional
         Files with measurements of the specimen; synthetic ones by default.
+    replace : bool
+        Whether another study in the folder is replaced.
 
     Raises
     ------
@@ -51,24 +56,33 @@ def study(
     """
     from tqdm import tqdm
 
-    folder = Path(out or (f"{name}-quick" if quick else f"{name}-study"))
-    check_folder(folder, out, ["sensitivity.html" if sensitivity else "report.html"])
     say = silence if quiet else tqdm.write
-    hidden = quiet or not sys.stderr.isatty()
-    if sensitivity:
-        if data:
-            raise InputError("--data: belongs to the study; leave out --sensitivity")
-        page, ended = _vary(quick, folder, say, hidden)
-    else:
-        page, ended = _study(quick, folder, _data(data, say), say, hidden)
-    say(f"wrote {page}")
+    if sensitivity and data:
+        raise InputError("--data: belongs to the study; leave out --sensitivity")
+    plan = "quick" if quick else "study"
+    folder = Path(f"{name}-{plan}" if out is None else out)
+    page = "sensitivity.html" if sensitivity else "report.html"
+    owner = Owner("study --quick" if quick else "study", name)
+    with held(folder, out, [page], owner, replace, [page], INSIDE) as results:
+        measured = None if sensitivity else _data(data, say)
+        hidden = quiet or not sys.stderr.isatty()
+        if sensitivity:
+            written, ended = _vary(quick, results, say, hidden)
+        else:
+            written, ended = _study(quick, results, measured, say, hidden)
+        say(f"wrote {written}")
+        _check(ended, results)
+    return written
+
+
+def _check(ended: Sequence[Done], results: Results) -> None:
+    """Raise where computations failed."""
     failed = [done for done in ended if done.failure]
     if failed:
         raise ComputationError(
             f"{len(failed)} of {len(ended)} runs failed, the first of them {failed[0].task.name}: "
-            f"{failed[0].failure}\nfoldyn: kept what was computed: {page}"
+            f"{failed[0].failure}"
         )
-    return page
 
 
 def _data(names: Sequence[str] | None, say: Say) -> Data | None:
@@ -87,12 +101,12 @@ def _data(names: Sequence[str] | None, say: Say) -> Data | None:
 
 
 def _study(
-    quick: bool, folder: Path, data: Data | None, say: Say, hidden: bool
+    quick: bool, results: Results, data: Data | None, say: Say, hidden: bool
 ) -> tuple[Path, Sequence[Done]]:
     from foldyn.studies.herkal import report
-    from foldyn.studies.herkal.study import FULL, QUICK, Study
+    from foldyn.studies.herkal.study import FULL, QUICK, RESULTS, Study
 
-    one = Study(QUICK if quick else FULL, folder, data)
+    one = Study(QUICK if quick else FULL, results.folder, data)
     n = one.plan.numerics
     say(
         f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} mass "
@@ -101,18 +115,19 @@ def _study(
     if data is not None:
         given = "a synthetic film" if data.synthetic else ", ".join(data.names)
         say(f"the specimen: calibrated to {given}")
-    ended = _told(one.compute, one.count, folder, say, hidden)
+    ended = _told(one.compute, one.count, results, RESULTS, say, hidden)
     say("drawing figures")
     return report.write(one), ended
 
 
-def _vary(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
+def _vary(quick: bool, results: Results, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
     from foldyn.studies.herkal import pool, report, variations
     from foldyn.studies.herkal import sensitivity as how
     from foldyn.studies.herkal.study import CASES, QUICK, VARIED
 
     numerics = QUICK.numerics if quick else VARIED
     tasks = how.tasks(CASES, numerics)
+    folder = results.folder
     inside = folder / report.SENSITIVITY
     inside.mkdir(parents=True, exist_ok=True)
     say(
@@ -123,7 +138,7 @@ def _vary(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequ
     def compute(tell: Callable[[Done], None], processes: int) -> list[Done]:
         return pool.run(tasks, inside, tell, processes)
 
-    ended = _told(compute, len(tasks), folder, say, hidden)
+    ended = _told(compute, len(tasks), results, report.SENSITIVITY, say, hidden)
     found = how.variations(inside, CASES, numerics)
     variations.write(inside, found)
     if not found.motions:
@@ -132,8 +147,8 @@ def _vary(quick: bool, folder: Path, say: Say, hidden: bool) -> tuple[Path, Sequ
 
 
 def _told(
-    compute: Callable[[Callable[[Done], None], int], list[Done]], count: int, folder: Path,
-    say: Say, hidden: bool,
+    compute: Callable[[Callable[[Done], None], int], list[Done]], count: int, results: Results,
+    inside: str, say: Say, hidden: bool,
 ) -> list[Done]:  # fmt: skip
     """Compute with a progress bar, and say what took long, failed or was skipped."""
     from tqdm import tqdm
@@ -141,6 +156,9 @@ def _told(
     with tqdm(total=count, unit="run", disable=hidden, leave=False) as bar:
 
         def tell(done: Done) -> None:
+            if not done.failure and not results.kept:
+                results.begin(inside)
+                results.clear()
             bar.update()
             if done.failure:
                 say(f"  {done.task.name}: failed: {done.failure}")
@@ -152,5 +170,5 @@ def _told(
         ended = compute(tell, PROCESSES)
     skipped = sum(done.skipped for done in ended)
     if skipped:
-        say(f"skipped {skipped} of {len(ended)} runs: their results are in {folder}")
+        say(f"skipped {skipped} of {len(ended)} runs: their results are in {results.folder}")
     return ended

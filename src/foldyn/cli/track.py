@@ -9,10 +9,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import check_folder
+from foldyn.cli.folder import check_folder, elsewhere, reason, unwritten
+from foldyn.cli.signals import ENDINGS
 from foldyn.cli.speech import speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.studies import find_case
+from foldyn.writing import whole
 
 if TYPE_CHECKING:
     import argparse
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from foldyn.experiment import Model, Tracking
 
 _SHOWN = 3  # nodes in the figure of histories
+_KEPT = "\nfoldyn: kept what was computed: "
 
 
 def add_track(commands: Any) -> None:
@@ -99,14 +102,27 @@ def track(given: Namespace) -> Path:
     finally:
         close()
     out.parent.mkdir(parents=True, exist_ok=True)
-    experiment.save_tracks(ds, out)
-    experiment.write_csv(ds, out.with_suffix(".csv"))
+    _save(ds, out)
     say(summary(ds))
-    written = [str(out), str(out.with_suffix(".csv"))]
+    say(f"wrote {out}, {out.with_suffix('.csv')}")
     if not given.no_figures:
-        written += _figures(ds, out, given.inputs, film)
-    say(f"wrote {', '.join(written)}")
+        say(f"wrote {', '.join(_figures(ds, out, given.inputs, film))}")
     return out
+
+
+def _save(ds: xarray.Dataset, out: Path) -> None:
+    """Save the tracks and their table, the tracks elsewhere where there is no room."""
+    from foldyn import experiment
+
+    try:
+        with ENDINGS.saving():
+            experiment.save_tracks(ds, out)
+            experiment.write_csv(ds, out.with_suffix(".csv"))
+    except (OSError, InputError) as error:
+        saved = elsewhere(out, lambda path: experiment.save_tracks(ds, path), reason(error))
+        raise ComputationError(f"{unwritten(out, reason(error))}{_KEPT}{saved}") from None
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted{_KEPT}{out}") from None
 
 
 def numbers(name: str, text: str, count: int | None = None) -> list[float]:
@@ -239,14 +255,18 @@ def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) ->
                 for k, name in enumerate(inputs)
             }
         for name, (picture, at) in pictures.items():
-            plots.draw_overlay(picture, ds, at).savefig(out.with_name(name))
+            with whole(out.with_name(name)) as part:
+                plots.draw_overlay(picture, ds, at).savefig(part)
             written.append(str(out.with_name(name)))
         if "displacement" in ds:
             history = plots.plot_tracks(ds, _best(ds))
-            history.savefig(out.with_name(f"{out.stem}-history.png"))
+            with whole(out.with_name(f"{out.stem}-history.png")) as part:
+                history.savefig(part)
             written.append(str(out.with_name(f"{out.stem}-history.png")))
-    except InputError as error:
-        raise ComputationError(f"figures: {error}\nfoldyn: kept what was computed: {out}") from None
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted while figures were drawn{_KEPT}{out}") from None
+    except (InputError, OSError) as error:
+        raise ComputationError(f"figures: {reason(error)}{_KEPT}{out}") from None
     return written
 
 

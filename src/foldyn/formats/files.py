@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
 from foldyn.formats.registry import FORMATS, Format
 from foldyn.patterns import Pattern
+from foldyn.writing import write_bytes
 
 
 def read_pattern(path: str | os.PathLike[str]) -> Pattern:
@@ -76,17 +76,9 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
     if not isinstance(pattern, Pattern):
         raise InputError(f"pattern = {pattern!r}: give a Pattern to write.")
     content = fmt.write(pattern).encode()
-    part = None
     try:
-        # Through a link to the file it stands for, so that the link stays one.
-        target = Path(os.path.realpath(file))
-        part = target.with_name(f".{target.name}.{os.getpid()}.part")
-        part.write_bytes(content)
-        part.replace(target)
+        write_bytes(file, content)
     except (OSError, ValueError) as error:
-        with suppress(OSError, ValueError):
-            if part is not None:
-                part.unlink()
         raise InputError(
             f"{file}: cannot be written: {_reason(error)}; check that its directory exists and "
             "may be written to."

@@ -16,7 +16,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, runs, way
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
-from foldyn.plots.writers import WRITERS, find_ffmpeg
+from foldyn.plots.writers import WRITERS, filmed, find_ffmpeg
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,7 +116,7 @@ def animate(
     writer = WRITERS[kind](fps=fps)
     moments = _times(places, writer.rate) if "time" in result.sizes else _factors(places, result)
     note = f", displacement times {scale:g}" if scale != 1.0 else ""
-    with writer.saving(figure, str(path), dpi=DPI[kind]):
+    with filmed(writer, figure, path, DPI[kind]):
         for index, (moment, points) in enumerate(zip(moments, moving, strict=True)):
             drawn.move(points)
             for dot, course in dots:

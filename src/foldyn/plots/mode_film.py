@@ -13,7 +13,7 @@ from foldyn.plots.animation import DPI, checked_kind
 from foldyn.plots.modes import ShownModes
 from foldyn.plots.scene import View
 from foldyn.plots.side_by_side import side_by_side
-from foldyn.plots.writers import WRITERS
+from foldyn.plots.writers import WRITERS, filmed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +80,7 @@ def animate_modes(
         width=_WIDTH, most_columns=_COLUMNS,
     )  # fmt: skip
     writer = WRITERS[kind](fps=fps)
-    with writer.saving(film.figure, str(path), dpi=DPI[kind]):
+    with filmed(writer, film.figure, path, DPI[kind]):
         for phase in 2.0 * np.pi * np.arange(frames) / frames:
             for drawn, swing in zip(film.sheets, swings, strict=True):
                 drawn.move(rest + np.cos(phase) * swing)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
+from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.figure import Figure
 from PIL import Image
 
 from foldyn.errors import ComputationError, InputError
+from foldyn.writing import whole
 
 _COLORS = 128  # of a GIF, for all its pictures: 256 for each would take three times the space
 _SAMPLES = 8  # pictures from which these colors are taken
@@ -92,26 +97,29 @@ class Mp4Writer(FFMpegWriter):
         """Return the path of ffmpeg."""
         return find_ffmpeg()
 
-    def finish(self) -> None:
-        """Wait for ffmpeg to write the file.
-
-        Raises
-        ------
-        ComputationError
-            It could not.
-        """
-        try:
-            super().finish()
-        except CalledProcessError as error:
-            said = (error.stderr or "").strip().splitlines()
-            raise ComputationError(
-                f"{self.outfile}: ffmpeg could not write it ({said[-1] if said else error}); "
-                "write .gif, or an ffmpeg with H.264: pip install imageio-ffmpeg"
-            ) from None
-
 
 WRITERS = {".gif": GifWriter, ".mp4": Mp4Writer}
 """Writers of an animation by the end of the file's name."""
+
+
+@contextmanager
+def filmed(writer: GifWriter | Mp4Writer, figure: Figure, path: Path, dpi: float) -> Iterator[None]:
+    """Make a file of the pictures that the writer grabs meanwhile; it appears when complete.
+
+    Raises
+    ------
+    ComputationError
+        ffmpeg could not write it.
+    """
+    try:
+        with whole(path) as part, writer.saving(figure, str(part), dpi):
+            yield
+    except CalledProcessError as error:
+        said = (error.stderr or "").strip().splitlines()
+        raise ComputationError(
+            f"{path}: ffmpeg could not write it ({said[-1] if said else error}); "
+            "write .gif, or an ffmpeg with H.264: pip install imageio-ffmpeg"
+        ) from None
 
 
 def find_ffmpeg() -> str:

@@ -12,6 +12,7 @@ from foldyn import plots
 from foldyn.cases import Case
 from foldyn.report.sections import Heading, Picture, Section, Text
 from foldyn.shells import Shell
+from foldyn.writing import whole
 
 if TYPE_CHECKING:
     import xarray
@@ -30,7 +31,8 @@ class Album:
     def figure(self, name: str, caption: str, draw: Callable[[], Any]) -> Picture:
         """Draw a figure, write it as NAME.png, and return it for the page."""
         path = self.folder / f"{name}.png"
-        draw().savefig(path, dpi=DPI)
+        with whole(path) as part:
+            draw().savefig(part, dpi=DPI)
         return Picture(path, caption)
 
     def structure(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from foldyn.errors import InputError
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.writing import write_text
 
 _CSS = """
 :root { color-scheme: light; }
@@ -93,5 +94,5 @@ def write_report(path: str | PathLike[str], title: str, sections: Iterable[Secti
         f"<title>{escape(title)}</title>\n<style>{_CSS}</style>\n</head>\n<body>\n<main>\n"
         f"<h1>{escape(title)}</h1>\n{listed}" + "\n".join(body) + "\n</main>\n</body>\n</html>\n"
     )
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
     return path

@@ -8,6 +8,8 @@ from pathlib import Path
 import xarray as xr
 
 from foldyn.errors import InputError
+from foldyn.results.sink import Sink
+from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
 
@@ -19,20 +21,30 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     ------
     InputError
         The path cannot be written.
+    OSError
+        The disk is full, or fails.
     """
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        ds.to_netcdf(partial, engine=ENGINE)
-        os.replace(partial, path)
+        with whole(path) as part, Sink(part, "w+") as sink:
+            _fill(sink, ds)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
-    finally:
-        partial.unlink(missing_ok=True)
+
+
+def _fill(sink: Sink, ds: xr.Dataset) -> None:
+    """Write a dataset; what went wrong with the file comes before what HDF5 made of it."""
+    try:
+        ds.to_netcdf(sink, engine=ENGINE)
+    except Exception:
+        if sink.failure is None:
+            raise
+    if sink.failure is not None:
+        raise sink.failure
 
 
 def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import zipfile
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 from pathlib import Path
 from threading import Lock
 from typing import Any, Self
@@ -18,6 +16,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.fit_problem import Problem
+from foldyn.workers import Workers
+from foldyn.writing import remove_leftovers, whole
 
 Outcome = NDArray[np.float64] | str
 """All predictions in a row, or why there are none."""
@@ -54,43 +54,50 @@ class Evaluations:
         self._pool = None
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(folder)
         if processes > 1:
-            self._pool = ProcessPoolExecutor(
-                processes, get_context("spawn"), initializer=_begin, initargs=(problem,)
-            )
+            self._pool = Workers(processes, _begin, problem)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *raised: Any) -> None:
         if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+            self._pool.__exit__(*raised)
+
+    def stop(self) -> None:
+        """End what the processes compute: threads that wait for it go on with an error."""
+        if self._pool is not None:
+            self._pool.stop()
 
     def at(self, points: Sequence[NDArray]) -> list[Outcome]:
         """Predictions at several points, at the same time where there are processes."""
-        waiting: dict[str, Any] = {}
-        for point in points:
-            key = self._key(point)
-            if key in waiting or self._look(key):
-                continue
-            values = tuple(map(float, point))
-            waiting[key] = (
-                _evaluate(self.problem, values)
-                if self._pool is None
-                else self._pool.submit(_evaluate_own, values)
-            )
-            if self._pool is None:
-                self._keep(key, waiting[key])
-        if self._pool is not None:
-            for key, future in waiting.items():
-                try:
-                    self._keep(key, future.result())
-                except BrokenProcessPool:
-                    raise ComputationError(
-                        "a process that evaluates the model ended at once; in a script, call fit "
-                        'below if __name__ == "__main__": (or use processes=1)'
-                    ) from None
+        wanted = {self._key(point): tuple(map(float, point)) for point in points}
+        new = {key: values for key, values in wanted.items() if not self._look(key)}
+        if self._pool is None:
+            for key, values in new.items():
+                self._keep(key, _evaluate(self.problem, values))
+        else:
+            self._at_a_time(self._pool, new)
         return [self._known[self._key(point)] for point in points]
+
+    def _at_a_time(self, pool: Workers, new: Mapping[str, tuple[float, ...]]) -> None:
+        """Compute in processes; each evaluation is kept as soon as it is there."""
+        waiting: dict[Future[Outcome], str] = {}
+        try:
+            waiting = {pool.submit(_evaluate_own, values): key for key, values in new.items()}
+            for future in as_completed(list(waiting)):
+                self._keep(waiting.pop(future), future.result())
+        except BrokenProcessPool:
+            raise ComputationError(
+                "a process that evaluates the model ended at once; in a script, call fit "
+                'below if __name__ == "__main__": (or use processes=1)'
+            ) from None
+        except KeyboardInterrupt:
+            for future, key in waiting.items():
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    self._keep(key, future.result())
+            raise
 
     def _key(self, point: NDArray) -> str:
         values = np.asarray(point, dtype=np.float64).tobytes()
@@ -118,10 +125,9 @@ class Evaluations:
         self._known[key] = outcome
         if self.folder is not None:
             failed = isinstance(outcome, str)
-            partial = self.folder / f".{key}.{os.getpid()}.npz"
             values = np.zeros(0) if failed else outcome
-            np.savez(partial, values=values, failure=np.array(outcome if failed else ""))
-            os.replace(partial, self.folder / f"{key}.npz")
+            with whole(self.folder / f"{key}.npz") as part:
+                np.savez(part, values=values, failure=np.array(outcome if failed else ""))
         with self._lock:
             self.computed += 1
             self.tell(self.computed, self.found)

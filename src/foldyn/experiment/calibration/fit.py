@@ -135,8 +135,7 @@ def fit(
     with Evaluations(made, processes, kept, tell) as evaluations:
         searches = [_Search(made, evaluations, best) for _ in points]
         if processes > 1 and starts > 1:
-            with ThreadPoolExecutor(min(starts, processes)) as threads:
-                descents = list(threads.map(_Search.descend, searches, points))
+            descents = _at_a_time(min(starts, processes), evaluations, searches, points)
         else:
             descents = [one.descend(point) for one, point in zip(searches, points, strict=True)]
         lowest = min(descents, key=lambda one: one.cost)
@@ -164,6 +163,23 @@ def fit(
         spent,
         time.perf_counter() - began,
     )
+
+
+def _at_a_time(
+    count: int,
+    evaluations: Evaluations,
+    searches: Sequence[_Search],
+    points: NDArray[np.float64],
+) -> list[Descent]:
+    """Search from several starts in threads, which end where this one is interrupted."""
+    threads = ThreadPoolExecutor(count)
+    try:
+        return list(threads.map(_Search.descend, searches, points))
+    except BaseException:
+        evaluations.stop()
+        raise
+    finally:
+        threads.shutdown(cancel_futures=True)
 
 
 class _Search:

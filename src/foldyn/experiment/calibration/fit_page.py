@@ -26,6 +26,7 @@ from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.plots import style
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.writing import whole
 
 POINTS = 25
 """Points of the curve that is drawn through measured forces."""
@@ -156,7 +157,8 @@ def _draw(fit: Fit, number: int, one: Measurement, folder: Path, note: str) -> P
 
 def _save(figure: Figure, picture: Path, note: str) -> None:
     style.title_above(figure, note)
-    style.finish(figure).savefig(picture)
+    with whole(picture) as part:
+        style.finish(figure).savefig(part)
 
 
 def _curve(

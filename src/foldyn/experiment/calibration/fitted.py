@@ -18,6 +18,7 @@ from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import netcdf
+from foldyn.writing import write_text
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,7 @@ class Fit:
         path = Path(path)
         moved = os.path.relpath(self.problem.path.parent.resolve(), path.parent.resolve())
         text = f"# Fitted by Foldyn {foldyn.__version__} from {self.problem.path.name}.\n"
-        path.write_text(text + tomli_w.dumps(_moved(self.document(), moved)), encoding="utf-8")
+        write_text(path, text + tomli_w.dumps(_moved(self.document(), moved)))
 
     def summary(self) -> dict[str, Any]:
         """All numbers but the measured and predicted values, as JSON has them (nan is null)."""
@@ -232,7 +233,7 @@ class Fit:
             raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
         if path.suffix == ".json":
             text = json.dumps(self.summary(), indent=2, allow_nan=False)
-            path.write_text(text + "\n", encoding="utf-8")
+            write_text(path, text + "\n")
         elif path.suffix == ".nc":
             netcdf.write(self.dataset(), path)
         else:

@@ -10,6 +10,7 @@ import xarray as xr
 
 from foldyn.errors import InputError
 from foldyn.results import netcdf
+from foldyn.writing import whole
 
 
 def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -64,7 +65,7 @@ def write_csv(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
             for k, axis in enumerate("uv"):
                 names.append(f"point {point} {axis} [px]")
                 columns.append(ds["position_px"].values[:, point, k])
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(names)
         for row in zip(*columns, strict=True):

@@ -38,6 +38,7 @@ from foldyn.results import save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings, trace
 from foldyn.studies import find_case
+from foldyn.writing import write_text
 
 FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
 DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
@@ -183,7 +184,7 @@ def released_case(
         "output": {"nodes": [WATCHED], "axis": "x", "every": step},
     }
     path = folder / "released.toml"
-    path.write_text(tomli_w.dumps(document), encoding="utf-8")
+    write_text(path, tomli_w.dumps(document))
     return path
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Protocol
 
-from foldyn.errors import FoldynError, FoldynWarning
+from foldyn.errors import ComputationError, FoldynError, FoldynWarning
+from foldyn.workers import Workers
 
 
 class Task(Protocol):
@@ -102,18 +103,15 @@ def run(
 def _in_processes(
     tasks: Sequence[Task], folder: Path, end: Callable[[Done], None], processes: int
 ) -> None:
-    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
     try:
-        running = {pool.submit(_make, task, folder) for task in tasks}
-        while running:
-            finished, running = wait(running, return_when=FIRST_COMPLETED)
-            for one in finished:
+        with Workers(processes) as workers:
+            for one in as_completed([workers.submit(_make, task, folder) for task in tasks]):
                 end(one.result())
-    except KeyboardInterrupt:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    except BrokenProcessPool:
+        raise ComputationError(
+            "a process that computes was ended from outside, perhaps for lack of memory; the same "
+            "command goes on with what is left"
+        ) from None
 
 
 def _make(task: Task, folder: Path) -> Done:

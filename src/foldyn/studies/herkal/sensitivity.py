@@ -24,6 +24,7 @@ from foldyn.studies.herkal.partners import partners
 from foldyn.studies.herkal.program import program
 from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute
 from foldyn.studies.herkal.variations import Variations
+from foldyn.writing import write_text
 
 PULSES = (0.1, 0.25, 0.5, 1.0)  # s
 BEND_LAWS = ("superlinear", "linear")
@@ -82,7 +83,7 @@ class _Kept:
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
         text = json.dumps({"settings": self.settings(), "rows": list(self.rows())}, indent=1)
-        (folder / f"{self.name}.json").write_text(text + "\n", "utf-8")
+        write_text(folder / f"{self.name}.json", text + "\n")
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Compute the rows."""

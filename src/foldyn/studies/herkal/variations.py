@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from foldyn.studies.herkal.metric import best, ranks
+from foldyn.writing import whole
 
 STORED = Path(__file__).with_name("results")
 """Tables that come with the package."""
@@ -67,7 +68,7 @@ class Variations:
 def write(folder: Path, variations: Variations) -> None:
     """Write the tables into a folder; a first line says what they are of."""
     for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
-        with (folder / name).open("w", encoding="utf-8", newline="") as file:
+        with whole(folder / name) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(f"# {variations.about}\n")
             table = csv.writer(file, lineterminator="\n")
             if rows:

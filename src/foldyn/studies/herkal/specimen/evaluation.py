@@ -22,6 +22,7 @@ from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
 from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
+from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
 UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
@@ -251,7 +252,7 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
     for support, case in released.cases.items():
         damping = released.fits.get(support, released.fits[FILM_SUPPORT]).values
         document = replaced(read_document(case), damping)
-        case.with_name("fitted.toml").write_text(tomli_w.dumps(document), encoding="utf-8")
+        write_text(case.with_name("fitted.toml"), tomli_w.dumps(document))
         found[support] = calibration.motion_of(case_of_document(case, document))
     return found
 

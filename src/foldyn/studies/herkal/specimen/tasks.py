@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from foldyn import experiment, plots
 from foldyn.errors import ComputationError
@@ -23,6 +23,7 @@ from foldyn.studies.herkal.program import specimen_program
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
+from foldyn.writing import scratch, whole, write_text
 
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
@@ -86,7 +87,7 @@ class Part:
             raise ComputationError(f"it needs {missing[0].name}, which failed")
         self._stamp(folder).unlink(missing_ok=True)
         PARTS[self.part](self, inside)
-        self._stamp(folder).write_text(self._text(), encoding="utf-8")
+        write_text(self._stamp(folder), self._text())
 
     def _needed(self) -> list[Part]:
         seen, then = parts(self.shot, self.data)
@@ -115,12 +116,12 @@ def _model() -> experiment.Model:
 
 def _photographs(part: Part, folder: Path) -> None:
     loads = [0.0, *calibration.WEIGHTS]
-    with tempfile.TemporaryDirectory(dir=folder) as there:
-        files = synthetic.photograph(Path(there), PAPERS)
+    with scratch(folder, PHOTOS) as there:
+        files = synthetic.photograph(there, PAPERS)
         tracks = experiment.track_photos(files, _model(), loads=loads)
         picture = experiment.read_photo(files[-1])
     last = len(loads) - 1
-    plots.draw_overlay(picture, tracks, last, part.note).savefig(folder / "photograph.png")
+    _draw(plots.draw_overlay(picture, tracks, last, part.note), folder / "photograph.png")
     experiment.save_tracks(tracks, folder / PHOTOS)
 
 
@@ -128,9 +129,9 @@ def _film(part: Part, folder: Path) -> None:
     if part.data.film is not None:
         _tracked(part, part.data.film, folder)
         return
-    with tempfile.TemporaryDirectory(dir=folder) as there:  # it takes most of a gigabyte
-        file = Path(there) / synthetic.TRACKED
-        film = synthetic.film(Path(there), part.shot)
+    with scratch(folder, FILM) as there:  # it takes most of a gigabyte
+        file = there / synthetic.TRACKED
+        film = synthetic.film(there, part.shot)
         experiment.write_film(film, file)
         netcdf.write(film.truth(), folder / TRUTH)
         _tracked(part, file, folder)
@@ -140,8 +141,7 @@ def _tracked(part: Part, file: Path, folder: Path) -> None:
     film = experiment.open_film(str(file))
     tracks = experiment.track_film(film, _model())
     at = int(tracks.attrs["match_frame"])
-    picture = plots.draw_overlay(film.picture(at), tracks, at, part.note)
-    picture.savefig(folder / "film.png")
+    _draw(plots.draw_overlay(film.picture(at), tracks, at, part.note), folder / "film.png")
     experiment.save_tracks(tracks, folder / FILM)
 
 
@@ -191,14 +191,19 @@ def _fit(part: Part, folder: Path) -> None:
         truth = netcdf.read(folder / TRUTH, "") if part.data.synthetic else None
         front = evaluation.compared(released, evaluation.motions(released), truth)
         netcdf.write(front, folder / COMPARED)
-        plots.plot_steps(released.free.steps, title=part.note).savefig(folder / "steps.png")
+        _draw(plots.plot_steps(released.free.steps, title=part.note), folder / "steps.png")
         found |= {
             "press": released.press,
             "damping": {support: one.summary() for support, one in released.fits.items()},
         }
         changes |= released.fits[evaluation.FILM_SUPPORT].values
     found["changes"] = changes
-    (folder / FOUND).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    write_text(folder / FOUND, json.dumps(found, indent=2) + "\n")
+
+
+def _draw(figure: Figure, picture: Path) -> None:
+    with whole(picture) as part:
+        figure.savefig(part)
 
 
 def _weights(static: list[Measurement]) -> dict[str, list[float]]:

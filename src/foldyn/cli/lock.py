@@ -1,0 +1,90 @@
+"""A lock on a folder that the system lifts when its process ends, however that happens."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from foldyn.errors import FoldynWarning
+
+NAME = ".foldyn.lock"
+
+
+class LockedError(Exception):
+    """Another process has the lock; the message says which."""
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder.
+
+    Raises
+    ------
+    LockedError
+        Another process holds it.
+    """
+    path = folder / NAME
+    held = _take(path)
+    try:
+        with suppress(OSError):
+            os.truncate(held, 0)
+            here = f"process {os.getpid()} on {socket.gethostname()}"
+            os.write(held, f"{here}, since {time.strftime('%Y-%m-%d %H:%M:%S')}".encode())
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        os.close(held)
+
+
+def _take(path: Path) -> int:
+    while True:
+        opened = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(opened)
+            if _is(path, opened):  # its holder may have removed it just before
+                return opened
+            os.close(opened)
+        except BlockingIOError:
+            said = os.read(opened, 200).decode("utf-8", "replace") or "another process"
+            os.close(opened)
+            raise LockedError(said) from None
+        except OSError as error:  # a file system without locks
+            warnings.warn(
+                f"{path.parent}: cannot be locked ({error.strerror}): see that no other run "
+                "writes to it",
+                FoldynWarning,
+                stacklevel=4,
+            )
+            return opened
+
+
+def _lock(opened: int) -> None:
+    """Lock an open file; BlockingIOError where another process has it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(opened, 1 << 20, os.SEEK_SET)  # locked bytes cannot be read
+        try:
+            msvcrt.locking(opened, msvcrt.LK_NBLCK, 1)
+        except PermissionError:
+            raise BlockingIOError from None
+        finally:
+            os.lseek(opened, 0, os.SEEK_SET)
+    else:
+        import fcntl
+
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _is(path: Path, opened: int) -> bool:
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(opened))
+    except FileNotFoundError:
+        return False

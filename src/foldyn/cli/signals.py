@@ -1,0 +1,74 @@
+"""What ends a run from outside: Ctrl-C, and the signals of batch systems and closed terminals.
+
+Each raises KeyboardInterrupt, on which what was computed is kept, but not while something is saved:
+then it waits. A second Ctrl-C does not.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+HEEDED = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+
+
+class Endings:
+    """Signals that were received."""
+
+    def __init__(self) -> None:
+        self.first: int | None = None
+        self._saving = False
+        self._due = False
+
+    @property
+    def status(self) -> int:
+        """Exit status of a process that was ended: 128 and the signal's number."""
+        return 128 + (self.first or signal.SIGINT)
+
+    @contextmanager
+    def heeded(self) -> Iterator[None]:
+        """Heed signals meanwhile; those that are ignored, as by nohup, stay ignored."""
+        self.first, self._due = None, False
+        before = {}
+        if threading.current_thread() is threading.main_thread():
+            before = {
+                one: signal.signal(one, self._receive)
+                for one in HEEDED
+                if signal.getsignal(one) not in (signal.SIG_IGN, None)
+            }
+        try:
+            yield
+        finally:
+            for one, handler in before.items():
+                signal.signal(one, handler)
+
+    @contextmanager
+    def saving(self) -> Iterator[None]:
+        """Have the first signal wait meanwhile."""
+        self._saving = True
+        try:
+            yield
+        finally:
+            self._saving = False
+            if self._due:
+                self._due = False
+                raise KeyboardInterrupt
+
+    def _receive(self, number: int, _: FrameType | None) -> None:
+        again, self.first = self.first is not None, self.first or number
+        if again and number != signal.SIGINT:  # some send it to a process and to its group
+            return
+        if self._saving and not again:
+            self._due = True
+            return
+        self._due = False
+        raise KeyboardInterrupt
+
+
+ENDINGS = Endings()
+"""Those of this process."""

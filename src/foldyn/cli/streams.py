@@ -1,0 +1,76 @@
+"""Standard output and error that a run can rely on, be they closed, full or short of letters."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
+
+
+class Outlet:
+    """A stream that loses what it cannot write.
+
+    Attributes
+    ----------
+    failure : OSError or None
+        Why something was lost.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.failure: OSError | None = None
+        with suppress(AttributeError, OSError, ValueError):  # letters that its encoding lacks
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
+
+    def write(self, text: str) -> int:
+        """Write, or lose it."""
+        try:
+            return self._stream.write(text)
+        except OSError as failure:
+            return self._lose(failure, len(text))
+
+    def flush(self) -> None:
+        """Flush, or lose it."""
+        try:
+            self._stream.flush()
+        except OSError as failure:
+            self._lose(failure, 0)
+
+    def _lose(self, failure: OSError, size: int) -> int:
+        """From now on nothing is written; what waits in the buffer goes nowhere, too."""
+        self.failure = failure
+        with suppress(OSError, ValueError):
+            place = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(place, self._stream.fileno())
+            os.close(place)
+        return size
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def steady_streams() -> Iterator[Outlet]:
+    """Make both streams steady meanwhile; gives standard output."""
+    _fill_closed()
+    before = sys.stdout, sys.stderr
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # for one that was closed before
+        out, err = Outlet(sys.stdout or nowhere), Outlet(sys.stderr or nowhere)
+        sys.stdout, sys.stderr = out, err  # type: ignore[assignment]
+        try:
+            yield out
+        finally:
+            out.flush()
+            err.flush()
+            sys.stdout, sys.stderr = before
+
+
+def _fill_closed() -> None:
+    """Take the numbers of closed streams: a file that gets one would be written to by others."""
+    while True:
+        place = os.open(os.devnull, os.O_RDWR)
+        if place > 2:
+            os.close(place)
+            return

@@ -1,0 +1,92 @@
+"""Files that appear only when they are complete, whatever ends the process that writes them."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_LEFT = re.compile(r"\..+\.(\d+)\.tmp(\.\w+)?")
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Path of a file to write instead of `path`, which takes its place when all went well.
+
+    Until then `path` is as it was; where something is raised, nothing of the new file stays. Its
+    content is on the disk before it appears. A link is followed.
+    """
+    target = Path(os.path.realpath(path))
+    part = _beside(target, target.suffix)
+    try:
+        yield part
+        with part.open("r+b") as written:
+            os.fsync(written.fileno())
+        os.replace(part, target)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file whole or not at all."""
+    with whole(path) as part:
+        part.write_bytes(content)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    r"""Write a text file in UTF-8, whole or not at all.
+
+    What UTF-8 has no letter for, bytes of a file's name for one, becomes an escape, "\udcff".
+    """
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+@contextmanager
+def scratch(folder: Path, name: str) -> Iterator[Path]:
+    """A temporary folder in another one, which is removed at the end."""
+    made = _beside(folder / name)
+    made.mkdir()
+    try:
+        yield made
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+
+
+def remove_leftovers(*folders: Path) -> None:
+    """Remove what `whole` and `scratch` of processes that are no more have left in folders."""
+    for folder in folders:
+        with suppress(OSError):
+            for path in list(folder.iterdir()):
+                found = _LEFT.fullmatch(path.name)
+                if found and not _alive(int(found[1])):
+                    _remove(path)
+
+
+def _beside(target: Path, suffix: str = "") -> Path:
+    """Name of a temporary file, with the process in it; the suffix tells writers the format."""
+    return target.with_name(f".{target.name[:40]}.{os.getpid()}.tmp{suffix}")
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+        return
+    with suppress(OSError):
+        path.unlink()
+
+
+def _alive(process: int) -> bool:
+    """Whether a process runs; where that cannot be told, its files are held open and so kept."""
+    if os.name != "posix":
+        return False
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

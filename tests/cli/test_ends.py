@@ -1,0 +1,247 @@
+"""Runs that are killed, interrupted, out of space, or four at once: each in a real process."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from processes import (
+    COMMAND,
+    SOURCE,
+    children,
+    ended,
+    running,
+    start,
+    wait_for,
+    wait_for_line,
+)
+from test_cli_fit import CASE, FIT
+
+import foldyn as fd
+from foldyn.cli import stamp
+from foldyn.cli.main import main
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+LONG = ("duration = 0.1", "duration = 1e4")  # half an hour
+KEPT = "foldyn: kept what was computed: "
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def limited(size: int):
+    """Function that limits the size of the files that a process can write (bytes)."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edited) -> None:
+    (tmp_path / "case.toml").write_text(edited(LONG))
+    run = ("run", "case.toml", "--no-figures")
+    others = {signal.SIGHUP: "other"}
+    runs = {signal.SIGHUP: start(tmp_path, *run, "--out", "other")}
+    four = [start(tmp_path, *run) for _ in range(4)]
+    wait_for(lambda: sum(one.poll() is None for one in four) == 1)
+    for one in four:
+        if one.poll() is not None:
+            status, out, err = ended(one)
+            assert (status, out) == (2, "")
+            assert "foldyn: results folder case-results: another run writes to it (process" in err
+            four = [other for other in four if other is not one]
+    (runs[signal.SIGTERM],) = four
+    others[signal.SIGTERM] = "case-results"
+    for number, one in runs.items():
+        wait_for_line(one, "13 nodes")
+        one.send_signal(number)
+    for number, one in runs.items():
+        status, _, err = ended(one)
+        folder = tmp_path / others[number]
+        assert status == 128 + number
+        reason, kept = err.splitlines()[-2:]
+        assert reason.startswith("foldyn: case.toml: interrupted at t = ")
+        assert kept == f"{KEPT}{others[number]}/result.nc"
+        assert names(folder) == [stamp.NAME, "result.nc"]
+        assert "interrupted" in fd.load(folder / "result.nc").attrs["stopped_because"]
+
+
+def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) -> None:
+    """Then the next run takes the folder over, and clears what the dead one left."""
+    folder = tmp_path / "case-results"
+    text = edited(('"circumcenter"', '["panel", "centroid"]'))
+    assert workplace.run(text).status == 0
+    workplace.write(text.replace(*LONG).replace("1e4", "30.0"))  # seconds each
+    killed = start(tmp_path, "run", "case.toml", "--no-figures")
+    wait_for_line(killed, "  panel: ")
+    killed.kill()
+    killed.wait()
+    assert not (folder / "result-centroid.nc").exists()
+    assert fd.load(folder / "result-panel.nc").sizes["time"] > 11
+    assert '"state": "running"' in (folder / stamp.NAME).read_text()
+    (folder / f".result-centroid.nc.{killed.pid}.tmp.nc").write_text("cut")
+    workplace.write(text)
+    assert main(["run", "case.toml", "--no-figures"]) == 0
+    assert names(folder) == [stamp.NAME, "result-centroid.nc", "result-panel.nc"]
+
+
+def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
+    workplace.run(edited(("every = 0.01", "every = 0.001")), "--out", "before")  # compiles
+    stopped = start(tmp_path, "run", "case.toml", "--out", "stopped")
+    full = start(tmp_path, "run", "case.toml", "--out", "full", preexec_fn=limited(120_000))
+    wait_for_line(stopped, "drawing figures")
+    wait_for(lambda: (tmp_path / "stopped" / "motion.png").exists())  # motion.gif is next
+    stopped.send_signal(signal.SIGINT)
+    status, _, err = ended(stopped)
+    assert (status, err) == (
+        130,
+        f"foldyn: interrupted while figures were drawn\n{KEPT}stopped/result.nc\n",
+    )
+    status, _, err = ended(full)
+    assert status == 1
+    reason, kept = err.splitlines()[-2:]
+    assert reason.startswith("foldyn: case.toml: figures: ")
+    assert "File too large" in reason
+    assert kept == f"{KEPT}full/result.nc"
+    for folder in (tmp_path / "stopped", tmp_path / "full"):
+        there = names(folder)
+        assert "report.html" not in there and "motion.gif" not in there
+        assert not [name for name in there if name.endswith((".tmp.gif", ".tmp.png", ".tmp.html"))]
+        assert fd.load(folder / "result.nc").sizes["time"] == 101
+
+
+def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
+    """Neither HDF5 nor the interpreter falls over, and nothing cut stays."""
+    workplace.run(miura, "--out", "before")  # compiles
+    run = start(tmp_path, "run", "case.toml", "--no-figures", preexec_fn=limited(20_000))
+    status, _, err = ended(run)
+    assert status == 1
+    (line,) = err.splitlines()
+    assert line.startswith("foldyn: case-results/result.nc: cannot be written (File too large)")
+    assert not (tmp_path / "case-results").exists()
+
+
+def test_a_disk_that_is_full(tmp_path, miura) -> None:
+    """A real one, of 24 kB: the result goes to the temporary folder, and is named."""
+    small = ["unshare", "-rm", "sh", "-c", 'mount -t tmpfs -o size=24k none small && exec "$@"', ""]
+    (tmp_path / "small").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    if (
+        shutil.which("unshare") is None
+        or subprocess.run(
+            [*small, "true"], cwd=tmp_path, capture_output=True, check=False
+        ).returncode
+    ):
+        pytest.skip("no file system may be mounted here")
+    (tmp_path / "case.toml").write_text(miura)
+    done = subprocess.run(
+        [*small, *COMMAND, "run", "case.toml", "--no-figures", "--out", "small/r"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": SOURCE, "TMPDIR": str(tmp_path / "elsewhere")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    reason, kept = done.stderr.splitlines()
+    assert reason.startswith("foldyn: small/r/result.nc: cannot be written (")
+    assert "No space left on device" in reason
+    (saved,) = (tmp_path / "elsewhere").rglob("*.nc")
+    assert kept == f"{KEPT}{saved}"
+    assert fd.load(saved).sizes["time"] == 11
+
+
+HOLD = """
+import ctypes, os
+from pathlib import Path
+from foldyn.workers import Workers
+
+def hold():
+    Path(f"{os.getpid()}.begun").touch()
+    ctypes.PyDLL(None).sleep(100)  # with the interpreter's lock, as compiled code may
+
+if __name__ == "__main__":
+    with Workers(2) as workers:
+        [workers.submit(hold) for _ in range(2)][0].result()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT"])
+def test_workers_end_with_their_parent(tmp_path, how) -> None:
+    (tmp_path / "hold.py").write_text(HOLD)
+    parent = subprocess.Popen(
+        [sys.executable, "hold.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": SOURCE},
+        stderr=subprocess.DEVNULL,
+    )
+    wait_for(lambda: len(list(tmp_path.glob("*.begun"))) == 2)
+    both = children(parent.pid)
+    assert len(both) == 2
+    parent.send_signal(getattr(signal, how))
+    parent.wait(timeout=5)
+    wait_for(lambda: not any(map(running, both)), 5.0)
+
+
+def watched(process: subprocess.Popen[str], folder: Path, kind: str) -> list[int]:
+    """Workers of a process, as soon as they have kept something more in a folder."""
+    before = set(folder.glob(kind))
+    wait_for(lambda: set(folder.glob(kind)) - before or process.poll() is not None, 300.0)
+    assert process.poll() is None
+    return children(process.pid)
+
+
+FORCES = "displacement [mm],force [mN]\n-75,1.6\n-150,4.4\n-225,8.1\n-300,13.0\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 9))]
+)
+def test_a_fit_that_is_ended_keeps_its_evaluations_and_no_workers(tmp_path, number) -> None:
+    for name, text in (("case.toml", CASE), ("fit.toml", FIT), ("forces.csv", FORCES)):
+        (tmp_path / name).write_text(text)
+    kept = tmp_path / "fit-fit" / "evaluations"
+    fit = ("fit", "fit.toml", "--starts", "400", "--processes", "2", "--no-figures")
+    one = start(tmp_path, *fit)
+    workers = watched(one, kept, "*.npz")
+    assert len(workers) == 2
+    one.send_signal(number)
+    one.wait(timeout=10)
+    wait_for(lambda: not any(map(running, workers)), 5.0)
+    there = set(kept.iterdir())
+    err = one.communicate()[1]
+    if number != signal.SIGKILL:
+        assert one.returncode == 128 + number
+        assert "Traceback" not in err
+        named = f"{KEPT}fit-fit/evaluations; the same command goes on from there"
+        assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
+        assert not [path for path in there if path.suffix != ".npz"]
+    assert set(kept.iterdir()) == there
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_a_study_that_is_ended_goes_on(tmp_path) -> None:
+    runs = tmp_path / "herkal-quick" / "runs"
+    for number in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM):
+        one = start(tmp_path, "study", "herkal", "--quick")
+        workers = watched(one, runs, "*.nc")
+        assert len(workers) == 2
+        one.send_signal(number)
+        one.wait(timeout=10)
+        wait_for(lambda: not any(map(running, workers)), 5.0)  # noqa: B023
+        there = set(runs.rglob("*"))
+        out, err = one.communicate()
+        if number != signal.SIGKILL:
+            assert one.returncode == 128 + number
+            assert "Traceback" not in err
+            named = f"{KEPT}herkal-quick/runs; the same command goes on from there"
+            assert err.splitlines()[-2:] == ["foldyn: interrupted", named]
+            assert not [path for path in there if ".tmp" in path.name]
+        assert set(runs.rglob("*")) == there, out

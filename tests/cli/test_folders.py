@@ -1,0 +1,182 @@
+"""A folder of results belongs to one command on one file, and to one run at a time."""
+
+from __future__ import annotations
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+
+import foldyn as fd
+from foldyn.cli import stamp
+from foldyn.cli.lock import NAME as LOCK
+from foldyn.cli.lock import locked
+from foldyn.cli.main import main
+from foldyn.dynamics import Motion
+
+RULES = '["panel", "centroid"]'
+OLD = ("case-results/result-panel.nc", "case-results/result-centroid.nc")
+
+
+def stamped(folder: str = "case-results") -> dict:
+    return json.loads(Path(folder, stamp.NAME).read_text())
+
+
+def test_the_stamp_says_what_the_folder_is_of(workplace, edited) -> None:
+    assert workplace.run(edited(('"circumcenter"', RULES))).status == 0
+    told = stamped()
+    assert (told["command"], told["source"], told["state"]) == ("run", "../case.toml", "complete")
+    assert told["results"] == ["result-panel.nc", "result-centroid.nc"]
+    assert told["outdated"] == []
+    assert told["foldyn_version"] == fd.__version__
+
+
+def test_results_of_rules_that_are_no_longer_asked_for_go(workplace, edited, miura) -> None:
+    workplace.run(edited(('"circumcenter"', RULES)))
+    workplace.write(miura)
+    assert main(["run", "case.toml", "--no-figures"]) == 0
+    assert sorted(path.name for path in Path("case-results").iterdir()) == [
+        stamp.NAME,
+        "result.nc",
+    ]
+
+
+def test_an_interruption_leaves_old_or_new_and_no_mixture(workplace, edited, monkeypatch) -> None:
+    workplace.run(edited(('"circumcenter"', RULES)))
+    before = {name: Path(name).read_bytes() for name in OLD}
+    run = Motion.run
+
+    def stopped_at(rule):
+        def interrupted(self, progress=None):
+            if self.case.structure.options.mass == rule:
+                raise KeyboardInterrupt
+            return run(self, progress)
+
+        return interrupted
+
+    text = edited(('"circumcenter"', RULES), ("duration = 0.1", "duration = 0.2"))
+    workplace.write(text)
+    monkeypatch.setattr(Motion, "run", stopped_at("panel"))  # the first one: nothing new yet
+    assert main(["run", "case.toml", "--no-figures"]) == 130
+    assert {name: Path(name).read_bytes() for name in OLD} == before
+    assert stamped()["state"] == "complete"
+    monkeypatch.setattr(Motion, "run", stopped_at("centroid"))
+    assert main(["run", "case.toml", "--no-figures"]) == 130
+    assert fd.load(OLD[0]).sizes["time"] == 21
+    assert not Path(OLD[1]).exists()
+    assert (stamped()["state"], stamped()["results"]) == ("stopped", ["result-panel.nc"])
+
+
+def test_others_are_refused_by_name(workplace, miura) -> None:
+    workplace.write(miura)
+    workplace.write(miura, "other.toml")
+    assert workplace.call("run", "case.toml", "--no-figures", "--out", "r").status == 0
+    for command in (["run", "other.toml"], ["modes", "case.toml"]):
+        bad = workplace.call(*command, "--no-figures", "--out", "r")
+        assert (bad.status, bad.out, bad.new) == (2, "", [])
+        assert bad.err == (
+            "foldyn: --out r: holds the results of foldyn run case.toml; name another folder, or "
+            "replace them with --replace\n"
+        )
+    assert main(["modes", "case.toml", "--no-figures", "--out", "r", "--replace"]) == 0
+    assert "frequency" in fd.load("r/result.nc")
+    assert (stamped("r")["command"], stamped("r")["state"]) == ("modes", "complete")
+    Path("r/result.nc").unlink()  # then nothing is lost
+    assert workplace.call("run", "other.toml", "--no-figures", "--out", "r").status == 0
+
+
+def test_what_fails_before_its_first_result_leaves_the_others(
+    workplace, miura, monkeypatch
+) -> None:
+    workplace.write(miura)
+    workplace.write(miura, "other.toml")
+    assert workplace.call("run", "case.toml", "--no-figures", "--out", "r").status == 0
+    old = stamped("r")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("foldyn.results.save", full)
+    failed = workplace.call("run", "other.toml", "--no-figures", "--out", "r", "--replace")
+    assert (failed.status, failed.new) == (1, [])
+    assert stamped("r") == old
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{", b"[1]", b'{"command": 1}', b"\xff" * 9, b"[" * 9999]
+)
+def test_a_damaged_stamp_is_none(workplace, miura, content) -> None:
+    Path("case-results").mkdir()
+    Path("case-results", stamp.NAME).write_bytes(content)
+    assert workplace.run(miura).status == 0
+    assert stamped()["state"] == "complete"
+
+
+def test_a_stamp_does_not_reach_beyond_its_folder(workplace, miura) -> None:
+    workplace.write("mine", "notes.txt")
+    Path("case-results").mkdir()
+    told = {"command": "run", "source": "../case.toml", "state": "complete"}
+    told |= {"results": ["../notes.txt"], "outdated": []}
+    Path("case-results", stamp.NAME).write_text(json.dumps(told))
+    assert workplace.run(miura).status == 0
+    assert Path("notes.txt").read_text() == "mine"
+
+
+def test_results_without_a_stamp_that_would_stay_beside_new_ones(workplace, edited, miura) -> None:
+    workplace.run(edited(('"circumcenter"', RULES)))
+    Path("case-results", stamp.NAME).unlink()
+    bad = workplace.run(miura)
+    assert (bad.status, bad.new) == (2, [])
+    assert "holds result-centroid.nc, which this run does not write" in bad.err
+    assert main(["run", "case.toml", "--no-figures", "--replace"]) == 0
+    assert not Path(OLD[0]).exists()
+
+
+def test_a_folder_that_another_run_holds(workplace, miura) -> None:
+    Path("case-results").mkdir()
+    with locked(Path("case-results")):
+        bad = workplace.run(miura)
+        assert (bad.status, bad.out, bad.new) == (2, "", [])
+        assert "results folder case-results: another run writes to it (process " in bad.err
+        assert "wait for its end, or name another folder" in bad.err
+    assert not Path("case-results", LOCK).exists()
+    Path("case-results", LOCK).write_text("process 1 on a machine that lost its current")
+    assert main(["run", "case.toml", "--no-figures"]) == 0
+    assert not Path("case-results", LOCK).exists()
+
+
+def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_factory) -> None:
+    """What cannot be saved where it was to go is saved in the temporary folder, and named."""
+    save, elsewhere = fd.results.save, tmp_path_factory.mktemp("elsewhere")
+
+    def full(ds, path):
+        if path.name == "result-centroid.nc" and elsewhere not in path.parents:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        save(ds, path)
+
+    monkeypatch.setattr("foldyn.results.save", full)
+    monkeypatch.setattr("tempfile.tempdir", str(elsewhere))
+    failed = workplace.run(edited(('"circumcenter"', RULES)))
+    assert failed.status == 1
+    reason, kept = failed.err.splitlines()
+    assert reason.startswith(f"foldyn: {OLD[1]}: cannot be written (")
+    assert "No space left on device): make room, or name another place with --out" in reason
+    (saved,) = elsewhere.rglob("*.nc")
+    assert kept == f"foldyn: kept what was computed: {OLD[0]}, {saved}"
+    assert fd.load(saved).sizes["time"] == 11
+    assert failed.new == ["case-results", OLD[0]]
+    assert stamped()["results"] == ["result-panel.nc"]
+
+
+def test_figures_that_cannot_be_drawn_do_not_hide_the_result(workplace, edited) -> None:
+    Path("r/structure.png").mkdir(parents=True)
+    workplace.write(edited(("every = 0.01", "every = 0.02")))
+    failed = workplace.call("run", "case.toml", "--out", "r")
+    assert failed.status == 1
+    assert "wrote r/result.nc" in failed.out
+    reason, kept = failed.err.splitlines()
+    assert reason.startswith("foldyn: case.toml: figures: ")
+    assert "structure.png" in reason
+    assert kept == "foldyn: kept what was computed: r/result.nc"
+    assert failed.new == ["r/result.nc"]

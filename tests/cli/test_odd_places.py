@@ -1,0 +1,104 @@
+"""Streams that are closed, full or short of letters, and names, folders and variables that are odd.
+
+Each ends with a sensible status and no traceback; what was computed is there.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from processes import ended, start
+
+import foldyn as fd
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="streams and names of POSIX")
+FEW = ("every = 0.01", "every = 0.02")
+ODD = b"f\xffall"
+TITLE = ('title = "a Miura unit cell"', 'title = "F\u00e4lle \u6298 $x^{$"')
+
+
+def result_of(folder: bytes) -> int:
+    """Number of samples of the result in a folder."""
+    return fd.load(Path(os.fsdecode(folder)) / "result.nc").sizes["time"]
+
+
+def close_streams() -> None:
+    for number in (0, 1, 2):
+        os.close(number)
+
+
+def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
+    """Letters that the terminal lacks, names that are no UTF-8, no HOME, a backend that is none."""
+    file = os.fsencode(tmp_path) + b"/" + ODD + b".toml"
+    Path(os.fsdecode(file)).write_text(edited(FEW, TITLE), encoding="utf-8")
+    odd = {"PYTHONIOENCODING": "ascii", "HOME": None, "MPLBACKEND": "bogus", "TMPDIR": "/nowhere"}
+    odd["LC_ALL"] = "xx_YY.none"
+    run = start(tmp_path, "run", ODD + b".toml", "--out", b"o/" + ODD, changes=odd)
+    status, out, err = ended(run)
+    assert status == 0, err
+    assert "F\\xe4lle \\u6298 $x^{$: 13 nodes" in out
+    assert "wrote o/f\\udcffall/result.nc\n" in out
+    assert "wrote figures and o/f\\udcffall/report.html" in out
+    folder = os.fsencode(tmp_path) + b"/o/" + ODD
+    assert result_of(folder) == 6
+    assert os.path.exists(folder + b"/motion.gif")
+
+
+def test_streams_that_are_closed_or_full(tmp_path, miura) -> None:
+    (tmp_path / "case.toml").write_text(miura)
+    run = ("run", "case.toml", "--no-figures", "--out")
+    nowhere = {"stdin": None, "stdout": None, "stderr": None}
+    closed = start(tmp_path, *run, "closed", preexec_fn=close_streams, **nowhere)
+    with open("/dev/full", "w") as full:
+        lost = start(tmp_path, *run, "lost", stdout=full)
+    assert ended(closed)[0] == 0
+    assert result_of(os.fsencode(tmp_path / "closed")) == 11
+    status, _, err = ended(lost)
+    assert status == 1  # the result is there, what was said is not
+    assert err == "foldyn: cannot write to standard output: No space left on device\n"
+    assert result_of(os.fsencode(tmp_path / "lost")) == 11
+
+
+def test_a_working_folder_that_is_gone(tmp_path, miura) -> None:
+    (tmp_path / "case.toml").write_text(miura)
+    gone = tmp_path / "gone"
+
+    def leave() -> None:
+        gone.mkdir(exist_ok=True)
+        os.chdir(gone)
+        shutil.rmtree(gone)
+
+    case, out = str(tmp_path / "case.toml"), str(tmp_path / "r")
+    there = start(tmp_path, "run", case, "--no-figures", "--out", out, preexec_fn=leave)
+    assert ended(there)[0] == 0
+    nowhere = start(tmp_path, "run", case, "--no-figures", preexec_fn=leave)
+    status, _, err = ended(nowhere)
+    assert status == 2
+    assert err.startswith("foldyn: results folder case-results: cannot be written (No such file")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "how"),
+    [
+        ({"PYTHONIOENCODING": "ascii"}, {}),
+        ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {}),
+        ({"LC_ALL": "xx_YY.none"}, {}),
+        ({"MPLBACKEND": "bogus"}, {}),
+        ({"HOME": None}, {}),
+        ({"MPLCONFIGDIR": "/proc/none", "TMPDIR": "/nowhere"}, {}),
+        ({}, {"preexec_fn": lambda: os.close(1)}),
+        ({}, {"preexec_fn": lambda: os.close(2)}),
+    ],
+    ids=str,
+)
+def test_one_by_one(tmp_path, edited, changes, how) -> None:
+    (tmp_path / "case.toml").write_text(edited(FEW, TITLE), encoding="utf-8")
+    status, _, err = ended(start(tmp_path, "run", "case.toml", changes=changes, **how))
+    assert status == 0, err
+    assert (tmp_path / "case-results" / "report.html").exists()
+    bad = start(tmp_path, "run", "none.toml", changes=changes, **how)
+    assert ended(bad)[0] == 2
