@@ -205,6 +205,7 @@ def test_panels_that_pass_through_each_other_stop_the_motion(method, options):
     assert folds[0] > np.radians(300)
 
 
+@pytest.mark.filterwarnings("ignore:the history of a load is a function")
 @pytest.mark.parametrize("options", [{"dt": 0.01}, {"every": 0.01}])
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_what_goes_wrong_is_named_and_the_motion_until_then_kept(method, options):
