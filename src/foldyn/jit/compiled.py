@@ -23,7 +23,7 @@ def _decorator(**options: Any) -> Callable[..., Any]:
     compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
 
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = compiled(function)
+        dispatcher: Any = compiled(function)
         dispatcher._cache = Kept(function)  # as njit(cache=True) sets Numba's own
         return dispatcher
 

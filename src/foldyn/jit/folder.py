@@ -31,20 +31,20 @@ def folder_for(source: Path) -> Path | None:
     """Folder for the kernels of a folder of sources; None where nothing can be written."""
     named = str(getattr(config, "CACHE_DIR", ""))
     inside = UserProvidedCacheLocator.get_suitable_cache_subpath(str(source / "__init__.py"))
-    for folder in _usual(source, named, inside):
+    if named:
+        folder = Path(named).absolute() / inside
         if _writable(folder):
-            if named and not folder.is_relative_to(named):
-                tell(
-                    f"NUMBA_CACHE_DIR = {named!r} cannot be written, so that compiled kernels are "
-                    f"kept elsewhere; {REMEDY}"
-                )
+            return folder
+        tell(f"NUMBA_CACHE_DIR = {named!r} cannot be written: kernels are kept elsewhere; {REMEDY}")
+    for folder in _usual(source, inside):
+        if _writable(folder):
             return folder
     private = _private()
     if private is None or not _writable(private / inside):
         tell(f"compiled kernels cannot be kept anywhere: each start compiles anew; {REMEDY}")
         return None
     tell(
-        f"compiled kernels cannot be kept beside the package or in the home folder: they go to "
+        "compiled kernels cannot be kept beside the package or in the home folder: they go to "
         f"{private}, which may not last; {REMEDY}"
     )
     return private / inside
@@ -56,12 +56,10 @@ def tell(text: str) -> None:
     warnings.warn(text, FoldynWarning, stacklevel=2)
 
 
-def _usual(source: Path, named: str, inside: str) -> Iterator[Path]:
-    if named:
-        yield Path(named) / inside
+def _usual(source: Path, inside: str) -> Iterator[Path]:
     yield source / "__pycache__"
     home = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    if home.is_absolute():  # else nobody knows whose it is
+    if home.is_absolute():  # else there is no home
         yield home / inside
 
 

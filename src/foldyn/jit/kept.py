@@ -15,6 +15,7 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -92,24 +93,25 @@ class Kept(_Cache):
     def _remove_old(self) -> None:
         """Remove what earlier sources were compiled to, but for the last few."""
         assert self._folder is not None
-        times: dict[str, float] = {}
-        files = [path for path in self._folder.glob(f"{self._stem}*.nb[ci]")]
-        for path in files:
-            made_from = path.name.split(".")[-3]
-            times[made_from] = max(times.get(made_from, 0.0), path.stat().st_mtime)
-        old = sorted(times, key=lambda made_from: times[made_from])[: -1 - OTHERS]
-        for path in files:
-            if path.name.split(".")[-3] in old:
-                path.unlink(missing_ok=True)
+        files: dict[str, list[Path]] = {}
+        for path in self._folder.glob(f"{self._stem}*"):
+            made_from = path.name[len(self._stem) :].split(".")[1:2]
+            files.setdefault("".join(made_from), []).append(path)
+        with suppress(OSError):  # another process does the same
+            by_age = sorted(files, key=lambda made: max(p.stat().st_mtime for p in files[made]))
+            for path in (path for made_from in by_age[: -1 - OTHERS] for path in files[made_from]):
+                path.unlink()
 
 
 def _spelled(kind: Any) -> str:
     """A type in full: the name that Numba gives to a named tuple lacks those of its fields."""
-    if hasattr(kind, "instance_class") and hasattr(kind, "fields"):
-        fields = (f"{name}: {_spelled(of)}" for name, of in zip(kind.fields, kind, strict=True))
-        owner = kind.instance_class
-        return f"{owner.__module__}.{owner.__qualname__}({', '.join(fields)})"
-    return repr(kind)
+    if not hasattr(kind, "types"):
+        return repr(kind)
+    inside = [_spelled(of) for of in kind.types]
+    if hasattr(kind, "fields"):
+        inside = [f"{name}: {of}" for name, of in zip(kind.fields, inside, strict=True)]
+    owner = getattr(kind, "instance_class", type(kind))
+    return f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
 
 
 def _read(path: Path) -> Any:

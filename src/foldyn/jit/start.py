@@ -24,7 +24,7 @@ def start() -> None:
     for warning in said:
         text = str(warning.message)
         if UNREADABLE in text:
-            text = f"{text.splitlines()[0]}; Numba ignores it"
+            text = f"{text.splitlines()[0].rstrip('.')}; Numba ignores it"
             warnings.warn(text, FoldynWarning, stacklevel=2)
         else:
             warnings.warn_explicit(text, warning.category, warning.filename, warning.lineno)
