@@ -161,11 +161,11 @@ import numpy as np, foldyn as fd
 sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
 pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
 for word in sys.argv[1:]:
-    kind, method = word.split("-")
+    kind, method, law = word.split("-")
     model = fd.discretize if kind == "bars" else functools.partial(fd.shell, divisions=2)
     push = fd.Force(nodes=[7], vector=(0.01, 0.0, 0.0), history=fd.HalfSine(duration=0.1))
     held = fd.Fix(nodes=[0, 1, 2], axes="xyz")
-    case = fd.Case(model(pattern, sheet), supports=[held], loads=[push])
+    case = fd.Case(model(pattern, sheet, fold_law=law), supports=[held], loads=[push])
     motion = fd.simulate(case, duration=0.2, method=method)
     found = hashlib.sha256()
     for name in sorted(motion.data_vars):
@@ -185,7 +185,8 @@ def motions(package: Path, *words: str, **variables: str) -> dict[str, tuple[str
 @pytest.mark.slow
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     package = copy_package(tmp_path)
-    words = ("shell-newmark", "bars-rk4", "bars-energy_momentum", "bars-dormand_prince")
+    methods = ("shell-newmark", "bars-rk4", "bars-energy_momentum", "bars-dormand_prince")
+    words = [f"{method}-enhanced" for method in methods]
     kept, again = str(tmp_path / "kept"), str(tmp_path / "again")
     compiled = motions(package, *words, NUMBA_CACHE_DIR=kept)
     assert motions(package, *words, NUMBA_CACHE_DIR=kept) == compiled
@@ -198,13 +199,10 @@ def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
 @pytest.mark.slow
 def test_motions_follow_histories_and_shells_follow_laws(tmp_path):
     package = copy_package(tmp_path)
-    words = ("bars-rk4", "shell-newmark")
-    before = motions(package, *words)
+    bars, shell = "bars-rk4-linear", "shell-newmark-linear"
+    before = motions(package, bars, shell)
     edit(package / "cases" / "waveforms.py", *HALF_SINE)
-    after = motions(package, *words)
-    for word in words:
-        assert after[word][1] > 2.0 * before[word][1]
-    edit(package / "materials" / "linear.py", "return theta - rest", "return 5.0 * (theta - rest)")
-    stiff = motions(package, *words)
-    for word in words:
-        assert stiff[word][1] != after[word][1]
+    assert motions(package, bars)[bars][1] > 2.0 * before[bars][1]
+    edit(package / "cases" / "waveforms.py", *HALF_SINE[::-1])
+    edit(package / "materials" / "linear.py", "return theta - rest", "return 1.2 * (theta - rest)")
+    assert motions(package, shell)[shell][1] != before[shell][1]
