@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import re
 import shutil
 import subprocess
@@ -15,7 +14,6 @@ import pytest
 import foldyn as fd
 from foldyn.cases import analyses, vibrations
 from foldyn.cases.reading import SETTINGS
-from foldyn.kernel_cache import remove_stale_caches
 from foldyn.linear import METHODS as RESPONSES
 from foldyn.linear.burst_random import ESTIMATORS
 from foldyn.linear.quantity import PER_FORCE
@@ -149,24 +147,3 @@ def test_every_top_level_name_is_in_the_api_page():
     public = [name for name in fd.__all__ if not name.startswith("_")]
     missing = [name for name in public if not re.search(rf"\b{name}\b", text)]
     assert not missing, f"docs/api.md does not show {missing}"
-
-
-@pytest.mark.parametrize("folder", ["mechanics", "dynamics/implicit"])
-def test_stale_caches_are_removed(tmp_path, folder):
-    layer = tmp_path / folder
-    (layer / "__pycache__").mkdir(parents=True)
-    source, index, data = (
-        layer / "force.py",
-        layer / "__pycache__" / "force.f-1.py311.nbi",
-        layer / "__pycache__" / "force.f-1.py311.1.nbc",
-    )
-    for path in (source, index, data):
-        path.write_text("", "utf-8")
-    os.utime(source, (100, 100))
-    os.utime(index, (200, 200))
-    assert remove_stale_caches(tmp_path) == 0
-    assert index.exists()
-    os.utime(source, (300, 300))
-    assert remove_stale_caches(tmp_path) == 2
-    assert not index.exists()
-    assert not data.exists()

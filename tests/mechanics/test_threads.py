@@ -14,12 +14,13 @@ from test_blocks import random_model
 
 import foldyn as fd
 from foldyn import mechanics
+from foldyn.jit.compiled import shared
 from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics import force as force_module
 from foldyn.mechanics import threads as threads_module
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.strips import reach, shares, strips
-from foldyn.mechanics.threads import BROKEN, run_together, shared, team, wait
+from foldyn.mechanics.threads import BROKEN, run_together, team, wait
 
 # relative to the norm of the force: sums of some ten numbers in another order
 ROUNDING = 1e-14

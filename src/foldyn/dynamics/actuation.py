@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.kinds import folds_of
 from foldyn.dynamics.numbering import Numbering
+from foldyn.jit.compiled import kernel
 from foldyn.materials import EnhancedLinear
-from foldyn.materials.compiled import kernel
 from foldyn.materials.enhanced_linear import TWO_PI, energy, moment
 from foldyn.materials.switch import hinge_rest_slope
 from foldyn.shells.kernels import ShellModel

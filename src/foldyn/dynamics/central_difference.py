@@ -12,7 +12,7 @@ import numpy as np
 from foldyn.dynamics.course import observe, tell
 from foldyn.dynamics.outcome import DONE
 from foldyn.dynamics.system import acceleration
-from foldyn.mechanics import shared
+from foldyn.jit.compiled import shared
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 

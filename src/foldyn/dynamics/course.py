@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.dynamics.system import record
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics import largest, part, total, wait
 
 WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team

@@ -31,7 +31,7 @@ from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.implicit.tangent import expected_stress
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import moving_energy
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from foldyn.errors import InputError
-from foldyn.materials.compiled import kernel, scalar, summing
+from foldyn.jit.compiled import kernel, scalar, summing
 
 
 class Inertia(NamedTuple):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from foldyn.cases import Case
@@ -23,6 +21,7 @@ from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.stability import Growth
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
+from foldyn.jit.compiled import ready
 from foldyn.shells import Shell
 
 
@@ -126,8 +125,5 @@ def suited(name: str, structure: Any) -> Method:
 
 
 def compiled(name: str) -> bool:
-    """Whether a method's kernels are in Numba's cache on disk (else its first use compiles)."""
-    loop: Any = method_of(name).loop
-    folder, function = Path(loop.stats.cache_path), loop.py_func
-    stem = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-"
-    return any(folder.glob(f"{stem}*py{sys.version_info.major}{sys.version_info.minor}*.nbi"))
+    """Whether a method's kernels are kept on disk (else its first use compiles)."""
+    return ready(method_of(name).loop)

@@ -30,7 +30,7 @@ from foldyn.dynamics.inertia import (
 )
 from foldyn.dynamics.kinds import energies_of, fold_angles, force_of
 from foldyn.dynamics.numbering import Numbering, renumbered
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics import Workspace, wait
 from foldyn.mechanics.flat import flat
 

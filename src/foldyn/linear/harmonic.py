@@ -24,6 +24,7 @@ from foldyn.cases.values import number
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.jit.compiled import kernel
 from foldyn.linear.answer import Answer
 from foldyn.linear.direct import dynamic_stiffness, solve, warn_of_resonances
 from foldyn.linear.excitation import Drive
@@ -31,7 +32,6 @@ from foldyn.linear.linearized import Linearized
 from foldyn.linear.secant import equivalent_slope
 from foldyn.linear.transmissibility import drive_factor, drive_shape
 from foldyn.materials import Superlinear
-from foldyn.materials.compiled import kernel
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.structures import Structure
 

@@ -1,5 +1,6 @@
 """Scalar laws: stress of a bar, moment of a hinge, their slopes and energies."""
 
+import foldyn.jit  # noqa: F401 - starts Numba, before anything is imported from it
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
 from foldyn.materials.law import BarLaw, HingeLaw

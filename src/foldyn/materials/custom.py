@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
-from numba import cfunc
 from numba.core.errors import NumbaError
 
 from foldyn.errors import InputError
+from foldyn.jit.compiled import callback
 from foldyn.materials.law import BarLaw, HingeLaw
 
 CUSTOM = -1
@@ -23,9 +23,7 @@ CUSTOM = -1
 
 def _compile(law: str, function: str, signature: str, source: Callable[..., float]) -> Any:
     try:
-        # as in the built-in kernels, a division by zero gives inf or nan: an exception cannot
-        # leave compiled code through an address
-        return cfunc(signature, error_model="numpy")(source)
+        return callback(signature, source)
     except (NumbaError, TypeError, AttributeError) as error:
         raise InputError(
             f"law {law!r}: {function} cannot be compiled by Numba; write it as a Python function "

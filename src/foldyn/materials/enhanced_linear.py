@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
 
 TWO_PI = 2.0 * math.pi

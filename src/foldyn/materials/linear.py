@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from foldyn.materials.compiled import scalar
+from foldyn.jit.compiled import scalar
 from foldyn.materials.law import BarLaw, HingeLaw
 
 

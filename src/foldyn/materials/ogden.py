@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from foldyn.materials.compiled import scalar
+from foldyn.jit.compiled import scalar
 from foldyn.materials.law import BarLaw
 
 

@@ -11,8 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from foldyn.jit.compiled import scalar
 from foldyn.materials.bits import bits_of, float_of
-from foldyn.materials.compiled import scalar
 from foldyn.materials.law import HingeLaw
 
 

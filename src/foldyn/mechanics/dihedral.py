@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 
 PI = math.pi
 TAN_PI_8 = math.sqrt(2.0) - 1.0

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.switch import bar_energy, hinge_energy
 from foldyn.mechanics.dihedral import dihedral_gradient
 

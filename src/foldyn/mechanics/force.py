@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.ogden import stress_of_excess as ogden_stress
 from foldyn.materials.superlinear import moment as superlinear_moment
 from foldyn.materials.switch import bar_stress, hinge_moment

@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-from foldyn.materials.compiled import scalar
+from foldyn.jit.compiled import scalar
 
 LINE = 64  # bytes that come into the cache together
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress, hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.energy import bar_extension, hinge_dihedral

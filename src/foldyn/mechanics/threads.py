@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import config, njit, types
+from numba import config, types
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
 
@@ -31,9 +31,6 @@ HINGES_EACH = 4000  # hinges for each thread: with half of that it pays on an id
 MOST = 8  # threads: more have not been measured
 SPINS = 100  # looks at the others before the processor is offered to other programs
 ARRIVED, ROUND, BROKEN = 0, 8, 16  # places in `Team.state`, each in a cache line of its own
-
-# as `compiled.kernel`, and without Python's lock: for functions that threads run together
-shared = njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
 
 
 class Team(NamedTuple):

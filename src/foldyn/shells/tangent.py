@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.materials.compiled import kernel, scalar
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.switch import hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.shells.kernels import ShellModel, ShellWork, fold, side_rotations, side_strains

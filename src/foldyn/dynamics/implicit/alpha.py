@@ -28,7 +28,7 @@ from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.kinds import fold_angles
 from foldyn.dynamics.system import acceleration, moving_energy
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.flat import flat
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from threadpoolctl import ThreadpoolController
 
-from foldyn.materials.compiled import summing
+from foldyn.jit.compiled import summing
 from foldyn.statics.linear_solver import SingularTangentError
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
 GROWTH = 1e8  # of the residual, at which the iteration has lost its way

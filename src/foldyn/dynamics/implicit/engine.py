@@ -25,7 +25,7 @@ from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import Bench, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 
 TIME, NEXT, ERROR, SCALE, LAST, SMALLEST, LARGEST = range(7)  # places in `Course.clock`
 STEPS, SAMPLED, REFUSED, EVALUATIONS = range(4)  # places in `Course.count`

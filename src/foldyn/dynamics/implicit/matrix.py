@@ -17,7 +17,7 @@ from scipy import sparse
 from foldyn.dynamics.implicit.banded import BandLU, Cholesky
 from foldyn.dynamics.implicit.blocks import blocks_of
 from foldyn.dynamics.system import Packed
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.mechanics import Sparsity
 from foldyn.mechanics.flat import flat
 from foldyn.statics.backends import factorizer

@@ -20,7 +20,7 @@ from foldyn.dynamics.kinds import (
     workspace_of,
 )
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.mechanics.flat import flat
 
 EPS = float(np.finfo(float).eps)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.compiled import kernel
+from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress
 from foldyn.mechanics import BarsHinges, Sparsity, add_tangent
 from foldyn.mechanics.energy import bar_extension

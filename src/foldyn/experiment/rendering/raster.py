@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from foldyn.jit.compiled import strict, strict_inlined
 
 _MARGIN = 3  # pixels around a triangle's box: with distortion its edges are slightly curved
 
 
-@njit(cache=True, error_model="numpy")
+@strict
 def draw(
     slopes: Any,
     nearness: Any,
@@ -129,12 +130,12 @@ def draw(
                 bright[row, column] = value * shade[t]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@strict_inlined
 def _plane(c0: float, c1: float, c2: float, area: float) -> tuple[float, float, float]:
     return c0 / area, c1 / area, c2 / area
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@strict_inlined
 def _mix(a: Any, b: Any, c: Any, va: float, vb: float, vc: float) -> tuple[float, float, float]:
     """Coefficients of the linear function with these values at the three corners."""
     return (
@@ -144,7 +145,7 @@ def _mix(a: Any, b: Any, c: Any, va: float, vb: float, vc: float) -> tuple[float
     )
 
 
-@njit(cache=True, error_model="numpy")
+@strict
 def _span(pu: Any, pv: Any, row: int, before: int, after: int) -> tuple[int, int]:
     """Columns of a row that a triangle may cover, a margin around it."""
     low, high = 1e30, -1e30
@@ -166,7 +167,7 @@ def _span(pu: Any, pv: Any, row: int, before: int, after: int) -> tuple[int, int
     return max(before, first), min(after, last)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@strict_inlined
 def _grain(grain: Any, mask: int, s: float, q: float) -> float:
     """Reflectance of the paper between four texels."""
     i, j = int(np.floor(s)), int(np.floor(q))

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from foldyn.jit.compiled import strict
 
 _DIRECTIONS = 120  # around a point, in which edges are looked for
 _APART = 4  # directions, at least, between two edges of a corner (12 degrees)
@@ -28,8 +29,6 @@ _ROUNDS = 3
 _NARROWEST = 1.6  # pixels of room on each side of an edge
 _STRAIGHT = 0.35  # pixels, rms, by which an edge may leave its line
 _FLATTEST = 0.02  # of the smaller to the larger eigenvalue: edges that are nearly parallel
-
-_compiled = njit(cache=True, error_model="numpy")
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def refine(image: NDArray[np.uint8], points: ArrayLike, reach: float, moved: flo
     return Junctions(found[:, :2].copy(), found[:, 2].copy(), edges)
 
 
-@_compiled
+@strict
 def _refine_all(image: Any, start: Any, reach: float, moved: float, found: Any) -> None:
     inner = max(2.5, 0.28 * reach)
     for p in range(len(start)):
@@ -98,14 +97,14 @@ def _refine_all(image: Any, start: Any, reach: float, moved: float, found: Any) 
             found[p, 0], found[p, 1], found[p, 2], found[p, 3] = u, v, error, count
 
 
-@_compiled
+@strict
 def _inside(image: Any, u: float, v: float, margin: float) -> bool:
     height, width = image.shape
     inside = margin <= u <= width - 1 - margin and margin <= v <= height - 1 - margin
     return inside  # False for NaN
 
 
-@_compiled
+@strict
 def _gray(image: Any, u: float, v: float) -> float:
     """Gray value between four pixels; the border goes on outside."""
     height, width = image.shape
@@ -117,7 +116,7 @@ def _gray(image: Any, u: float, v: float) -> float:
     return top * (1.0 - fv) + bottom * fv
 
 
-@_compiled
+@strict
 def _directions(image: Any, u: float, v: float, inner: float, reach: float, found: Any) -> int:
     """Directions of the edges around a point (rad) and their signs, into `found`; their number."""
     n = _DIRECTIONS
@@ -151,7 +150,7 @@ def _directions(image: Any, u: float, v: float, inner: float, reach: float, foun
     return edges
 
 
-@_compiled
+@strict
 def _meet(
     image: Any, u: float, v: float, inner: float, reach: float, width: float
 ) -> tuple[float, float, float, int]:
@@ -176,7 +175,7 @@ def _meet(
     return _intersection(lines[:count])
 
 
-@_compiled
+@strict
 def _intersection(lines: Any) -> tuple[float, float, float, int]:
     """Point nearest to the lines; one that misses the others does not count."""
     weight = 1.0 / np.maximum(lines[:, 3], 0.02) ** 2
@@ -205,7 +204,7 @@ def _intersection(lines: Any) -> tuple[float, float, float, int]:
     return x, y, error, count
 
 
-@_compiled
+@strict
 def _line(
     image: Any,
     u: float,
@@ -257,7 +256,7 @@ def _line(
     return offset, slope, error
 
 
-@_compiled
+@strict
 def _edge_place(
     image: Any, u: float, v: float, nu: float, nv: float, sign: float, side: float
 ) -> float:

@@ -1,0 +1,140 @@
+"""Compiled functions on disk: a file for each function and types of its arguments.
+
+Numba's own files know a function again by the text of its file alone: with a change in a compiled
+function or a constant imported from another file, the old one goes on; two processes that write at
+once may exchange their kernels; and a damaged file is a traceback. Here the name of a file says
+what was compiled: from which sources (`sources.digest`), for which arguments and processor. So what
+is found is what would be compiled, whoever wrote it, and a check sum tells whether it is whole.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+from numba.core.sigutils import normalize_signature
+
+from foldyn.jit.folder import REMEDY, folder_for, tell
+from foldyn.jit.sources import digest
+
+OTHERS = 3  # versions of a function that are kept beside the present one
+_SEAL = hashlib.sha256().digest_size
+
+
+class Kept(_Cache):
+    """The compiled versions of a function on disk: what Numba asks before it compiles."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        source = Path(inspect.getfile(function)).resolve()
+        name = function.__qualname__.replace("<", "").replace(">", "")
+        self._code = function.__code__.co_code
+        self._folder = folder_for(source.parent)
+        self._stem = f"{source.stem}.{name}-"
+        self._version = f"{self._stem}{function.__code__.co_firstlineno}.{digest(source)}"
+        self.enable()
+
+    @property
+    def cache_path(self) -> str | None:
+        """Folder of the files."""
+        return None if self._folder is None else str(self._folder)
+
+    def enable(self) -> None:
+        """Load and save."""
+        self._enabled = self._folder is not None
+
+    def disable(self) -> None:
+        """Neither load nor save."""
+        self._enabled = False
+
+    def ready(self) -> bool:
+        """Whether a version for some arguments is on disk."""
+        return self._folder is not None and any(self._folder.glob(f"{self._version}.*.nbc"))
+
+    def flush(self) -> None:
+        """Remove the present versions."""
+        for path in self._folder.glob(f"{self._version}.*.nbc") if self._folder else ():
+            path.unlink(missing_ok=True)
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """Compiled function for a signature, if it is on disk and whole."""
+        target_context.refresh()
+        path = self._file(sig, target_context.codegen())
+        data = None if path is None else _read(path)
+        return None if data is None else CompileResult._rebuild(target_context, *data)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function; where that fails, it is compiled again next time."""
+        path = self._file(sig, data.codegen)
+        if path is None or data.library.has_dynamic_globals:
+            return
+        try:
+            _write(path, data._reduce())
+            self._remove_old()
+        except OSError as error:
+            tell(f"compiled kernels cannot be kept in {path.parent}: {error.strerror}; {REMEDY}")
+
+    def _file(self, sig: Any, codegen: Any) -> Path | None:
+        arguments = "; ".join(_spelled(kind) for kind in normalize_signature(sig)[0])
+        if self._folder is None or not self._enabled or " at 0x" in arguments:
+            return None  # an address means another thing in another process
+        key = repr((arguments, codegen.magic_tuple(), self._code)).encode()
+        return self._folder / f"{self._version}.{hashlib.sha256(key).hexdigest()[:16]}.nbc"
+
+    def _remove_old(self) -> None:
+        """Remove what earlier sources were compiled to, but for the last few."""
+        assert self._folder is not None
+        files: dict[str, list[Path]] = {}
+        for path in self._folder.glob(f"{self._stem}*"):
+            made_from = path.name[len(self._stem) :].split(".")[1:2]
+            files.setdefault("".join(made_from), []).append(path)
+        with suppress(OSError):  # another process does the same
+            by_age = sorted(files, key=lambda made: max(p.stat().st_mtime for p in files[made]))
+            for path in (path for made_from in by_age[: -1 - OTHERS] for path in files[made_from]):
+                path.unlink()
+
+
+def _spelled(kind: Any) -> str:
+    """A type in full: the name that Numba gives to a named tuple lacks those of its fields."""
+    if not hasattr(kind, "types"):
+        return repr(kind)
+    inside = [_spelled(of) for of in kind.types]
+    if hasattr(kind, "fields"):
+        inside = [f"{name}: {of}" for name, of in zip(kind.fields, inside, strict=True)]
+    owner = getattr(kind, "instance_class", type(kind))
+    return f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
+
+
+def _read(path: Path) -> Any:
+    """Content of a file; None where there is none, or a damaged one, which is removed."""
+    try:
+        whole = path.read_bytes()
+        if hashlib.sha256(whole[_SEAL:]).digest() == whole[:_SEAL]:
+            return pickle.loads(whole[_SEAL:])
+        path.unlink()
+    except OSError:  # not there, or removed by another process
+        pass
+    return None
+
+
+def _write(path: Path, content: Any) -> None:
+    """Write a file; others see it whole or not at all."""
+    data = dumps(content)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    number, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem)
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(hashlib.sha256(data).digest() + data)
+        os.replace(name, path)
+    except OSError:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,208 @@
+"""No kernel that was made from other sources is ever run."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+from jit_lab import ask, copy_package, edit, environment
+
+from foldyn.jit import sources
+from foldyn.jit.sources import PACKAGE, digest, imports, made_from
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+KERNELS = [path for path in FILES if "foldyn.jit.compiled import" in path.read_text("utf-8")]
+HALF_SINE = ("s = math.sin(math.pi * t / a)", "s = 3.0 * math.sin(math.pi * t / a)")
+LAW = (
+    "def moment(theta, rest):",
+    "def moment(theta, rest):\n    return 7.0\n\n\ndef was(theta, rest):",
+)
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("named", [True, False], ids=["NUMBA_CACHE_DIR", "beside the sources"])
+def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):
+    package = copy_package(tmp_path)
+    where = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")} if named else {}
+    before = ask(package, **where)
+    assert before == (1.0, 1.0, 0)
+    edit(package / "cases" / "waveforms.py", *HALF_SINE)
+    edit(package / "materials" / "superlinear.py", *LAW)
+    assert ask(package, **where) == (3.0, 7.0, 0)
+    if named:  # both versions stay side by side
+        edit(package / "cases" / "waveforms.py", *HALF_SINE[::-1])
+        edit(package / "materials" / "superlinear.py", *LAW[::-1])
+        assert ask(package, **where) == (1.0, 1.0, 1)
+
+
+def test_what_a_kernel_is_made_from():
+    def names(path: str) -> set[str]:
+        return {found.relative_to(PACKAGE).as_posix() for found in made_from(PACKAGE / path)}
+
+    law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
+    assert {law, switch, fields, "jit/compiled.py"} <= names("shells/kernels.py")
+    assert {law, switch, fields, "cases/waveforms.py", "shells/kernels.py"} <= names(
+        "dynamics/rk4.py"
+    )
+    # and not from what only tells or draws, which would compile all anew with every change
+    assert not {"cases/document.py", "dynamics/driver.py"} & names("dynamics/rk4.py")
+    assert "dynamics/rk4.py" not in names("mechanics/force.py")
+
+
+def test_imports_are_read_as_python_reads_them():
+    for path in FILES:
+        wanted = set()
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{path}: a relative import"
+                if (node.module or "").partition(".")[0] == "foldyn":
+                    wanted |= {(node.module, name.name) for name in node.names}
+            elif isinstance(node, ast.Import):
+                wanted |= {(name.name, "") for name in node.names if name.name[:6] == "foldyn"}
+        assert wanted <= set(imports(path)), path
+
+
+def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_path):
+    for name, text in {
+        "__init__.py": "",
+        "kernels.py": "from foldyn.laws import law\nfrom foldyn import tools\n",
+        "laws/__init__.py": "from foldyn.laws.one import law, other\nfrom foldyn.laws.two import b",
+        "laws/one.py": "from foldyn.values import (\n    A,  # the first\n    B,\n)\n",
+        "laws/two.py": "",
+        "values.py": "",
+        "tools/__init__.py": "",
+        "tools/deep/more.py": "",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, "utf-8")
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
+    for cached in (sources.imported, sources._home):
+        monkeypatch.setattr(sources, cached.__name__, cached.__wrapped__)
+    found = {path.relative_to(tmp_path).as_posix() for path in made_from(tmp_path / "kernels.py")}
+    wanted = {"kernels.py", "laws/one.py", "values.py", "tools/__init__.py", "tools/deep/more.py"}
+    assert found == wanted
+
+
+def test_tools_and_their_variables_count(monkeypatch):
+    source = KERNELS[0]
+    before = digest.__wrapped__(source)
+    for module, version in ((sources.numba, "0.1"), (sources.np, "0.1"), (sources.llvmlite, "0.1")):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "__version__", version)
+            patch.setattr(sources, "_tools", sources._tools.__wrapped__)
+            assert digest.__wrapped__(source) != before
+    reader = sources.config._env_reloader
+    for name, counts in (("NUMBA_OPT", True), ("NUMBA_CACHE_DIR", False)):
+        with monkeypatch.context() as patch:
+            patch.setattr(reader, "old_environ", reader.old_environ | {name: "other"})
+            patch.setattr(sources, "_tools", sources._tools.__wrapped__)
+            assert (digest.__wrapped__(source) != before) == counts
+
+
+def test_all_that_compiles_is_compiled_in_one_place():
+    decorators = {"jit", "njit", "cfunc", "vectorize", "guvectorize", "stencil", "prange"}
+    for path in FILES:
+        if path.relative_to(PACKAGE).as_posix() == "jit/compiled.py":
+            continue
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("numba"):
+                assert not decorators & {name.name for name in node.names}, path
+            elif isinstance(node, ast.Import):
+                whole = [name.name for name in node.names if name.name.startswith("numba")]
+                assert not whole or path.parent == PACKAGE / "jit", path
+
+
+def test_what_stands_in_for_a_function_is_in_its_file():
+    """Kernels that call it import this file, so that they are made from it."""
+    for path in FILES:
+        defined = {node.name for node in tree(path).body if isinstance(node, ast.FunctionDef)}
+        stands_for = re.findall(r"^@overload\w*\((\w+)", path.read_text("utf-8"), re.MULTILINE)
+        assert set(stands_for) <= defined, path
+
+
+THREE = """
+import sys
+import numpy as np
+from foldyn.jit.compiled import kernel
+from foldyn.probes.sums import total
+kinds = [np.float64, np.float32, np.int64]
+turn = int(sys.argv[1])
+for kind in kinds[turn:] + kinds[:turn]:
+    assert total(np.arange(5, dtype=kind)) == 10
+"""
+
+
+def test_processes_that_compile_the_same_at_once(tmp_path):
+    package = copy_package(tmp_path)
+    (package / "probes" / "sums.py").write_text(
+        "from foldyn.jit.compiled import kernel\n\n@kernel\ndef total(x):\n    return x.sum()\n"
+    )
+    where = environment(package, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    processes = [
+        subprocess.Popen([sys.executable, "-c", THREE, str(turn)], env=where) for turn in range(3)
+    ]
+    assert [process.wait() for process in processes] == [0, 0, 0]
+    files = [path for path in (tmp_path / "kept").rglob("*") if path.is_file()]
+    assert len(files) == 3 and all(path.suffix == ".nbc" for path in files)
+
+
+RUN = """
+import functools, hashlib, sys
+import numpy as np, foldyn as fd
+sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01, density=1.0)
+pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+for word in sys.argv[1:]:
+    kind, method, law = word.split("-")
+    model = fd.discretize if kind == "bars" else functools.partial(fd.shell, divisions=2)
+    push = fd.Force(nodes=[7], vector=(0.01, 0.0, 0.0), history=fd.HalfSine(duration=0.1))
+    held = fd.Fix(nodes=[0, 1, 2], axes="xyz")
+    case = fd.Case(model(pattern, sheet, fold_law=law), supports=[held], loads=[push])
+    motion = fd.simulate(case, duration=0.2, method=method)
+    found = hashlib.sha256()
+    for name in sorted(motion.data_vars):
+        found.update(np.ascontiguousarray(motion[name].values).tobytes())
+    print(word, found.hexdigest(), float(abs(motion.displacement).max()))
+"""
+
+
+def motions(package: Path, *words: str, **variables: str) -> dict[str, tuple[str, float]]:
+    command = [sys.executable, "-c", RUN, *words]
+    where = environment(package, **variables)
+    said = subprocess.run(command, env=where, capture_output=True, text=True, check=True).stdout
+    lines = [line.split() for line in said.splitlines()]
+    return {word: (bits, float(largest)) for word, bits, largest in lines}
+
+
+@pytest.mark.slow
+def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
+    package = copy_package(tmp_path)
+    methods = ("shell-newmark", "bars-rk4", "bars-energy_momentum", "bars-dormand_prince")
+    words = [f"{method}-enhanced" for method in methods]
+    kept, again = str(tmp_path / "kept"), str(tmp_path / "again")
+    compiled = motions(package, *words, NUMBA_CACHE_DIR=kept)
+    assert motions(package, *words, NUMBA_CACHE_DIR=kept) == compiled
+    assert motions(package, *words[::-1], NUMBA_CACHE_DIR=kept) == compiled
+    assert motions(package, *words[::-1], NUMBA_CACHE_DIR=again) == compiled
+    for word in words:  # alone in its process
+        assert motions(package, word, NUMBA_CACHE_DIR=kept)[word] == compiled[word]
+
+
+@pytest.mark.slow
+def test_motions_follow_histories_and_shells_follow_laws(tmp_path):
+    package = copy_package(tmp_path)
+    bars, shell = "bars-rk4-linear", "shell-newmark-linear"
+    before = motions(package, bars, shell)
+    edit(package / "cases" / "waveforms.py", *HALF_SINE)
+    assert motions(package, bars)[bars][1] > 2.0 * before[bars][1]
+    edit(package / "cases" / "waveforms.py", *HALF_SINE[::-1])
+    edit(package / "materials" / "linear.py", "return theta - rest", "return 1.2 * (theta - rest)")
+    assert motions(package, shell)[shell][1] != before[shell][1]
