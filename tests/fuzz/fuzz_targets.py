@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fuzz_of_patterns
+import fuzz_of_results
 import fuzz_of_selections
 import fuzz_of_tables
 from fuzz_target import Target
@@ -11,6 +12,7 @@ TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
         fuzz_of_patterns.TARGET,
+        *fuzz_of_results.TARGETS,
         fuzz_of_selections.TARGET,
         fuzz_of_tables.TARGET,
     )

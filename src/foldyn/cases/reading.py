@@ -30,9 +30,9 @@ from foldyn.cases.until import Reached
 from foldyn.cases.vibrations import DriveSection, FrfSection
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import read_pattern
+from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.structures import Sheet
-from foldyn.input_files import from_toml, read_text
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""

@@ -9,8 +9,8 @@ from typing import Any
 
 from foldyn.errors import InputError
 from foldyn.formats.registry import FORMATS, Format
-from foldyn.patterns import Pattern
 from foldyn.input_files import read_text
+from foldyn.patterns import Pattern
 
 MOST = 32
 """Size of a pattern file (MiB)."""

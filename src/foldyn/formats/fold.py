@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.patterns import Pattern
 from foldyn.input_files import from_json
+from foldyn.patterns import Pattern
 
 _ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 # Units per meter of `frame_unit`; "unit" means none, taken as meters.
