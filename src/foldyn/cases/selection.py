@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.expressions import parse, shortened, written
-from foldyn.cases.values import indices, show
+from foldyn.cases.expressions import parse, written
+from foldyn.cases.values import indices, shortened, show
 from foldyn.errors import InputError
 
 TOLERANCE = 1e-9

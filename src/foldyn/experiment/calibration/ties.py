@@ -11,8 +11,8 @@ import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from foldyn.cases.expressions import parse, shortened, written
-from foldyn.cases.values import show, suggest
+from foldyn.cases.expressions import parse, written
+from foldyn.cases.values import shortened, show, suggest
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
 
