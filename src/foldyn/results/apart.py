@@ -48,6 +48,7 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
         os.close(reading)
         _answer(make, seconds, memory, writing)
     os.close(writing)
+    value: Any
     try:
         with os.fdopen(reading, "rb") as pipe:
             made, value = pickle.load(pipe)

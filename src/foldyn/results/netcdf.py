@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
+from typing import Any
 
 import h5py
 import xarray as xr
@@ -95,7 +96,8 @@ def _check_header(path: Path) -> None:
     declared = 0
     with h5py.File(path) as file:
         for name in file:
-            item = file[name] if isinstance(file.get(name, getlink=True), h5py.HardLink) else None
+            own = isinstance(file.get(name, getlink=True), h5py.HardLink)
+            item: Any = file[name] if own else None
             if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
                 raise InputError(f"{path}: is no file of ours: {name} is not a variable in it")
             if item.size and not _is_bare(item):
