@@ -35,12 +35,16 @@ def main() -> int:
         return _show(names[0], chosen.seed, chosen.show)
     wrong = 0
     for name in names:
-        report = fuzz(name, chosen.mutations, chosen.seed)
+        report = fuzz(name, chosen.mutations, chosen.seed, tell=_say)
         print(report, flush=True)
         wrong += len(report.findings)
         if report.mutations >= MANY:
             store(report)
     return min(wrong, 1)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def store(report: Report) -> None:

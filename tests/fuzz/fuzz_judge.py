@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,8 @@ class Report:
         Longest time (s) that an input took.
     memory : int
         Most memory (MiB) that an input took.
+    tell : callable
+        Called with each finding.
     """
 
     target: str
@@ -46,6 +48,7 @@ class Report:
     findings: list[tuple[int, str]] = field(default_factory=list)
     slowest: float = 0.0
     memory: int = 0
+    tell: Callable[[str], None] = lambda text: None
 
     @property
     def mutations(self) -> int:
@@ -63,9 +66,18 @@ class Report:
         return "\n".join(lines)
 
 
-def fuzz(target: str, mutations: int, seed: int = 0, worker: Path = WORKER) -> Report:
-    """Read damaged inputs with a target of `fuzz_targets`, each number from 0 on."""
-    report = Report(target, seed)
+def fuzz(
+    target: str,
+    mutations: int,
+    seed: int = 0,
+    worker: Path = WORKER,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Report:
+    """Read damaged inputs with a target of `fuzz_targets`, each number from 0 on.
+
+    `tell` is called with each finding at once.
+    """
+    report = Report(target, seed, tell=tell)
     number = 0
     with tempfile.TemporaryDirectory() as folder:
         while number < mutations and len(report.findings) < MOST_FINDINGS:
@@ -113,6 +125,7 @@ def _count(report: Report, line: dict[str, Any]) -> None:
     report.memory = max(report.memory, line.get("memory", 0))
     if "finding" in line:
         report.findings.append((line["number"], line["finding"]))
+        report.tell(f"{report.target} {line['number']}: {line['finding']}")
 
 
 def _lines(process: subprocess.Popen[bytes]) -> Iterator[dict[str, Any] | str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -90,7 +91,8 @@ def damage(random: Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             name = random.choice(list(file))
             if file.get(name) is None:  # a link that leads nowhere
                 continue
-            random.choice(_OF_PARTS)(random, file, name)
+            with suppress(KeyError, OSError, RuntimeError, TypeError, ValueError):
+                random.choice(_OF_PARTS)(random, file, name)  # HDF5 itself refuses some
             if not len(file):
                 break
     return whole.getvalue()
@@ -182,10 +184,8 @@ def _attribute(random: Random, file: h5py.File, name: str) -> None:
 
 
 def _set(holder: Any, key: str, value: Any) -> None:
-    try:
+    with suppress(TypeError, ValueError, OSError, RuntimeError):
         holder.attrs[key] = value
-    except (TypeError, ValueError, OSError, RuntimeError):  # HDF5 does not take this one here
-        return
 
 
 def _huge(random: Random, file: h5py.File, name: str) -> None:

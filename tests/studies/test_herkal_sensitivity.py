@@ -176,6 +176,12 @@ def test_tables_are_read_as_they_were_written(tmp_path):
     assert found.about == given.about and found.motions == given.motions
     assert math.isnan(found.frequencies[0].pop("frequency"))
     assert found.frequencies[0].items() <= frequency.items()
+    file = tmp_path / variations.METRIC
+    sound = file.read_bytes()
+    for damaged in (b"\xff" + sound, sound[:-20], sound.replace(b",", b",x,", 40), b"#\na\n1,2\n"):
+        file.write_bytes(damaged)
+        with pytest.warns(FoldynWarning, match=r"is damaged.*left out"):
+            assert variations.read(tmp_path) is None
 
 
 # ---------------------------------------------------------------------- stored tables and page

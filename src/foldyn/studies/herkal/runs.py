@@ -170,7 +170,7 @@ def stored(folder: Path, job: Job) -> xarray.Dataset | None:
     return found if found.attrs.get(SETTINGS) == _text(job) else None
 
 
-def warn_of_damage(path: Path) -> None:
+def warn_of_damage(path: Path, then: str = "it is computed again") -> None:
     """Tell that a file cannot be used, and what happens then."""
-    text = f"{path}: is damaged, or no file of this study; it is computed again"
+    text = f"{path}: is damaged, or no file of this study; {then}"
     warnings.warn(text, FoldynWarning, stacklevel=3)
