@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import show, suggest
+from foldyn.cases.values import shortened, show, suggest
 from foldyn.errors import InputError
+from foldyn.input_files import read_text
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),
@@ -35,6 +36,8 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
 _NUMBER = "number without unit"
 _SPELLINGS = {"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"}
 _DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
+MOST = 64
+"""Size of a file (MiB)."""
 _MANY = 10  # names listed in a message
 _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
@@ -47,6 +50,11 @@ class _Column:
     heading: str
     name: str
     unit: str | None
+
+    @property
+    def shown(self) -> str:
+        """Its heading for messages."""
+        return shortened(self.heading)
 
 
 def read_columns(
@@ -66,24 +74,15 @@ def read_columns(
         file = Path(path)
     except TypeError:
         raise InputError(f"path = {show(path)}: must be the path of a CSV file") from None
+    text = _text(file)
     try:
-        return _columns(_text(file), time, value, wanted)
+        return _columns(text, time, value, wanted)
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
 
 
 def _text(file: Path) -> str:
-    try:
-        return file.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError("there is no such file") from None
-    except IsADirectoryError:
-        raise InputError("is a folder; give a CSV file") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, UnicodeDecodeError):
-            raise InputError("is not a text file in UTF-8; save it as CSV in UTF-8") from None
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot be read: {reason}") from None
+    return read_text(file, "a CSV file in UTF-8", MOST, "take fewer lines or columns")
 
 
 def read_numbers(
@@ -114,8 +113,9 @@ def read_numbers(
         As `Table.from_csv`, but for the order of the lines.
     """
     file = Path(path)
+    text = _text(file)
     try:
-        columns, rows = _lines(_text(file))
+        columns, rows = _lines(text)
         found = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
         ratios = [
             _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
@@ -135,8 +135,9 @@ def read_numbers(
 def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
     """Names and units of the columns of a CSV file; None where a column has no unit."""
     file = Path(path)
+    text = _text(file)
     try:
-        return [(column.name, column.unit) for column in _lines(_text(file))[0]]
+        return [(column.name, column.unit) for column in _lines(text)[0]]
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
 
@@ -178,7 +179,7 @@ def _columns(
     columns, lines = _lines(text)
     found = _find("time", time, columns, 0), _find("value", value, columns, 1)
     if found[0] == found[1]:
-        raise InputError(f'time and value: are both the column "{found[0].heading}"; name two')
+        raise InputError(f'time and value: are both the column "{found[0].shown}"; name two')
     ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
     rows = [
         [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
@@ -210,8 +211,8 @@ def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
         raise InputError(f"line {number}: holds numbers, no names; {_HEADER} (without # before it)")
     if len(cells) < 2:
         raise InputError(
-            f'line {number}: "{cells[0]}" is one column, a table needs two; {_HEADER} (comma, '
-            "semicolon or tab between them)"
+            f'line {number}: "{shortened(cells[0])}" is one column, a table needs two; {_HEADER} '
+            "(comma, semicolon or tab between them)"
         )
     columns = []
     for place, cell in enumerate(cells):
@@ -228,11 +229,11 @@ def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: i
     found = [column for column in columns if wanted.strip() in (column.heading, column.name)]
     if len(found) == 1:
         return found[0]
-    listed = some([f'"{column.heading}"' for column in columns])
+    listed, asked = some([f'"{column.shown}"' for column in columns]), shortened(wanted)
     if found:
-        raise InputError(f'{field} = "{wanted}": names {len(found)} of the columns {listed}')
+        raise InputError(f'{field} = "{asked}": names {len(found)} of the columns {listed}')
     hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
-    raise InputError(f'{field} = "{wanted}": is no column; {hint}there are {listed}')
+    raise InputError(f'{field} = "{asked}": is no column; {hint}there are {listed}')
 
 
 def _quantity(unit: str) -> str | None:
@@ -243,12 +244,13 @@ def _time_ratio(column: _Column) -> Fraction:
     listed = ", ".join(TIME_UNITS)
     if column.unit is None:
         raise InputError(
-            f'column "{column.heading}": has no unit of time; write it in the header, as in '
-            f'"{column.name or "time"} [s]" (known: {listed})'
+            f'column "{column.shown}": has no unit of time; write it in the header, as in '
+            f'"{shortened(column.name) or "time"} [s]" (known: {listed})'
         )
     if column.unit not in TIME_UNITS:
         raise InputError(
-            f'column "{column.heading}": [{column.unit}] is no unit of time; use one of {listed}'
+            f'column "{column.shown}": [{shortened(column.unit)}] is no unit of time; use one of '
+            f"{listed}"
         )
     return TIME_UNITS[column.unit]
 
@@ -257,16 +259,16 @@ def _value_ratio(column: _Column, wanted: str) -> Fraction:
     """Size of the column's unit in the unit that the caller wants."""
     quantity = _quantity(wanted) or _NUMBER
     listed = ", ".join(UNITS[quantity])
-    place = f'column "{column.heading}"'
+    place = f'column "{column.shown}"'
     if column.unit is None and quantity != _NUMBER:
         raise InputError(
             f'{place}: has no unit, unit = "{wanted}" asks for {_article(quantity)}; write the '
-            f'unit in the header, as in "{column.name} [{wanted}]"'
+            f'unit in the header, as in "{shortened(column.name)} [{wanted}]"'
         )
     unit = column.unit or "-"
     own = _quantity(unit)
     if own is None:
-        raise InputError(f"{place}: the unit [{unit}] is not known; use one of {listed}")
+        raise InputError(f"{place}: the unit [{shortened(unit)}] is not known; use one of {listed}")
     if own != quantity and quantity == _NUMBER:
         raise InputError(
             f"{place}: is {_article(own)}, but a history is a factor without unit; say "
@@ -298,7 +300,7 @@ def _number(
 ) -> float:
     """Number in a cell; NaN for an empty one where there may be gaps."""
     cell = cells[column.place]
-    place = f'line {number}, column "{column.heading}"'
+    place = f'line {number}, column "{column.shown}"'
     remedy = "; leave the cell empty where a node was lost" if gap else ""
     if not cell and gap:
         return np.nan
@@ -306,9 +308,9 @@ def _number(
         raise InputError(f"{place}: is empty; every line needs a number there")
     if not _is_number(cell):
         hint = " (decimals are written with a point)" if "," in cell else ""
-        raise InputError(f'{place}: "{cell}" is not a number{hint}{remedy}')
+        raise InputError(f'{place}: "{shortened(cell)}" is not a number{hint}{remedy}')
     # an exact ratio of whole numbers: 5 ms become the double nearest to 0.005 s
     value = float(cell) * ratio.numerator / ratio.denominator
     if not np.isfinite(value):
-        raise InputError(f'{place}: "{cell}" is not a finite number{remedy}')
+        raise InputError(f'{place}: "{shortened(cell)}" is not a finite number{remedy}')
     return value

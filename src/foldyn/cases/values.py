@@ -38,6 +38,12 @@ def show(value: Any) -> str:
     return text if len(text) <= 80 else text[:76] + " ..."
 
 
+def shortened(text: str) -> str:
+    """Text for a message, in one line, of a long one only the beginning."""
+    text = " ".join(text.splitlines())
+    return text if len(text) <= 60 else f"{text[:56]} ..."
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word nearest to `word`, if any is near."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)

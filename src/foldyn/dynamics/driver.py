@@ -221,9 +221,8 @@ def _plan(
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
-        floor = FLOOR * longest(case.structure.model)
-        stops = knots(case)
-        return variable_steps(duration, dt, every, largest, start, tolerance or default, floor, stops)
+        tolerance, floor = tolerance or default, FLOOR * longest(case.structure.model)
+        return variable_steps(duration, dt, every, largest, start, tolerance, floor, knots(case))
     return fixed_steps(duration, dt, every, critical, start)
 
 

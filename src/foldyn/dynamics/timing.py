@@ -69,8 +69,8 @@ def variable_steps(
 ) -> Plan:  # fmt: skip
     """Plan of a motion whose steps follow their error; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that lie
-    within the motion and that time can tell apart.
+    Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that
+    lie within the motion and that time can tell apart.
     """
     duration = positive("duration", duration)
     in_seconds = counted_in_seconds(duration, every)

@@ -15,6 +15,8 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry
 from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
 
+FARTHEST = 1e50
+"""Largest coordinate (m): squares of areas are numbers still."""
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
 _CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
 _LETTERS = ("M", "V", "F", "U")
@@ -162,6 +164,12 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
         v = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise InputError(
             f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
+        )
+    far = np.abs(points.astype(np.float64)).max(axis=1)
+    if far.max() > FARTHEST:
+        v = int(far.argmax())
+        raise InputError(
+            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {FARTHEST:g} m."
         )
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points

@@ -1,17 +1,29 @@
-"""Datasets in NetCDF files: written whole or not at all."""
+"""Datasets in NetCDF files: written whole or not at all, and read whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
+from typing import Any
 
+import h5py
 import xarray as xr
 
 from foldyn.errors import InputError
+from foldyn.input_files import check_file
+from foldyn.results import seal
+from foldyn.results.apart import apart
 from foldyn.results.sink import Sink
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
+MOST_PACKED = 1100
+"""Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
+LEAST_MEMORY = 2**29
+"""Bytes that a file without a seal may take beside what it holds."""
+LEAST_SECONDS, PER_SECOND = 4, 50_000
+"""Time that a file without a seal may take, and the bytes that take a second more."""
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -30,8 +42,10 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:
-        with whole(path) as part, Sink(part, "w+") as sink:
-            _fill(sink, ds)
+        with whole(path) as part:
+            with Sink(part, "w+") as sink:
+                _fill(sink, ds)
+            seal.seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
 
@@ -53,12 +67,63 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
     Raises
     ------
     InputError
-        There is no such file, or it is no NetCDF: the message then says `unreadable`.
+        There is no such file, or it is damaged, or it is no NetCDF: the message then says
+        `unreadable`.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+    path = check_file(path, "a NetCDF file")
     try:
-        return xr.load_dataset(path, engine=ENGINE, decode_times=False)
-    except (OSError, ValueError, KeyError):
-        raise InputError(f"{path}: {unreadable}") from None
+        sealed = seal.sound(path)
+        if sealed is False:
+            raise InputError(
+                f"{path}: is damaged: its checksum does not match its content; restore it from a "
+                "copy, or compute it again"
+            )
+        if sealed:
+            return _load(path)
+        size = path.stat().st_size  # HDF5 may crash on what is damaged
+        seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
+        return apart(lambda: _load(path), seconds, memory)
+    except InputError:
+        raise
+    except PermissionError:
+        raise InputError(f"{path}: may not be read") from None
+    except Exception as error:  # what libraries raise on damaged files is of any kind
+        raise InputError(
+            f"{path}: {unreadable}; if it was one, it is damaged: restore it from a copy, or "
+            "compute it again"
+        ) from error
+
+
+def _load(path: Path) -> xr.Dataset:
+    _check_header(path)
+    with warnings.catch_warnings():  # of xarray, on what it finds odd
+        warnings.simplefilter("ignore")
+        return xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+
+
+def _check_header(path: Path) -> None:
+    """Refuse a file that is not all there is, or declares more than it can hold.
+
+    Before anything is read: a link may lead to a file that has no end, and a size take all memory.
+    """
+    declared = 0
+    with h5py.File(path) as file:
+        for name in file:
+            own = isinstance(file.get(name, getlink=True), h5py.HardLink)
+            item: Any = file[name] if own else None
+            if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
+                raise InputError(f"{path}: is no file of ours: {name} is not a variable in it")
+            if item.size and not _is_bare(item):
+                declared += item.size * item.dtype.itemsize
+    size = path.stat().st_size
+    if declared > MOST_PACKED * size:
+        raise InputError(
+            f"{path}: is damaged: it declares {declared:.3g} bytes of numbers in a file of {size}; "
+            "restore it from a copy, or compute it again"
+        )
+
+
+def _is_bare(item: h5py.Dataset) -> bool:
+    """Whether this stands for a dimension alone, without any numbers."""
+    name = item.attrs.get("NAME")
+    return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")

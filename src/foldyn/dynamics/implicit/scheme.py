@@ -172,7 +172,7 @@ class Bench:
         return self.push(new, self._gap) if self._gap.any() else None
 
     def push(self, phase: Phase, change: NDArray) -> NDArray:
-        """Force (n, 3) that a change (h,) of the factors exerts at a phase, with `out` in use, N."""
+        """Force (n, 3) that a change (h,) of the factors exerts at a phase, N; uses `out`."""
         packed, s = self.packed, self.scratch
         model, system, mass = packed.model, packed.system, packed.mass
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):

@@ -11,12 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from foldyn.errors import InputError
+from foldyn.input_files import read_text
 from foldyn.studies.herkal.metric import best, ranks
+from foldyn.studies.herkal.runs import warn_of_damage
 from foldyn.writing import whole
 
 STORED = Path(__file__).with_name("results")
 """Tables that come with the package."""
 METRIC, FREQUENCIES = "sensitivity.csv", "frequencies.csv"
+WORDS = ("case", "loads", "bend_law", "calibration", "model")
+"""Columns that hold no numbers."""
 FILED = {
     "pulse": 0.5, "loads": "file", "bend_law": "superlinear", "calibration": "standard",
 }  # fmt: skip
@@ -77,17 +82,27 @@ def write(folder: Path, variations: Variations) -> None:
 
 
 def read(folder: Path) -> Variations | None:
-    """Read the tables of a folder; None where there are none."""
+    """Read the tables of a folder; None where there are none, or damaged ones."""
     if not (folder / METRIC).is_file() or not (folder / FREQUENCIES).is_file():
         return None
-    about, motions = _read(folder / METRIC)
-    return Variations(about, motions, _read(folder / FREQUENCIES)[1])
+    try:
+        about, motions = _read(folder / METRIC)
+        return Variations(about, motions, _read(folder / FREQUENCIES)[1])
+    except (InputError, csv.Error):
+        warn_of_damage(folder / METRIC, "it is left out")
+        return None
 
 
 def _read(path: Path) -> tuple[str, list[Row]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        about = file.readline().removeprefix("# ").strip()
-        return about, [{k: _value(v) for k, v in row.items()} for row in csv.DictReader(file)]
+    first, *lines = read_text(path, "a CSV file", 64, "compute it again").splitlines() or [""]
+    rows = []
+    for row in csv.DictReader(lines):
+        if None in row or None in row.values():
+            raise InputError(f"{path}: has lines of other lengths than the first")
+        rows.append({name: _value(cell) for name, cell in row.items()})
+        if any(isinstance(value, str) != (name in WORDS) for name, value in rows[-1].items()):
+            raise InputError(f"{path}: has a text for a number, or the other way round")
+    return first.removeprefix("# ").strip(), rows
 
 
 def _text(value: Any) -> Any:
