@@ -8,9 +8,27 @@ from __future__ import annotations
 
 from typing import Any
 
+MOST_LINES, LONGEST_LINE = 20, 600
+"""Limits of a message, in lines and in characters of a line."""
+
+
+def shortened(message: str) -> str:
+    """Return a message that a person can read: long ones lose lines, and the middle of lines."""
+    lines = message.split("\n")
+    if len(lines) > MOST_LINES:
+        kept = lines[: MOST_LINES - 1]
+        lines = [*kept, f"  ... and {len(lines) - len(kept)} lines more"]
+    end = LONGEST_LINE // 3
+    start = LONGEST_LINE - end - len(" ... ")
+    cut = [a if len(a) <= LONGEST_LINE else f"{a[:start]} ... {a[-end:]}" for a in lines]
+    return "\n".join(cut)
+
 
 class FoldynError(Exception):
     """Base of everything that Foldyn raises on purpose."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
 
 
 class InputError(FoldynError, ValueError):
@@ -49,3 +67,6 @@ class MotionInterrupted(KeyboardInterrupt):
 
 class FoldynWarning(UserWarning):
     """Something works, but perhaps not as intended."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import show, suggest
 from foldyn.errors import InputError
+from foldyn.values import show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.histories import Constant, History
-from foldyn.cases.values import show
 from foldyn.errors import InputError
+from foldyn.values import show
 
 
 @dataclass(frozen=True)

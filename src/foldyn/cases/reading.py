@@ -21,6 +21,7 @@ from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import call_from
 from foldyn.cases.initial import Initial
 from foldyn.cases.kinds import KINDS, schema_of
+from foldyn.cases.limits import check_values
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
 from foldyn.cases.models import MODELS, SHELL, remodeled
@@ -145,7 +146,7 @@ def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
     try:
         text = path.read_bytes().decode("utf-8-sig")  # some editors begin with a mark
-        return tomllib.loads(text)
+        document = tomllib.loads(text)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
     except IsADirectoryError:
@@ -156,6 +157,11 @@ def read_document(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is not a text file in UTF-8; give a case file (TOML)") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
+    except ValueError:  # Python reads no whole number of thousands of digits
+        raise InputError(f"{path}: is not valid TOML: a number in it has too many digits") from None
+    with placed(path, ""):
+        check_values(document)
+    return document
 
 
 def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.values import indices, show
 from foldyn.errors import InputError
+from foldyn.values import indices, show
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""

@@ -15,10 +15,13 @@ from typing import Any
 
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
+from foldyn.cli.force import add_force
 from foldyn.cli.track import add_track, track
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+NO_MEMORY = "foldyn: not enough memory: take fewer cells, divisions, steps or samples"
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: what decoders would say of a broken film is ours to say."""
 
@@ -120,6 +123,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
         "--divisions", type=int, metavar="N", help="pieces of every edge of a shell (16)"
     )
     command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    add_force(command)
 
 
 def _add_state(command: argparse.ArgumentParser) -> None:
@@ -146,8 +150,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("always", FoldynWarning)
         warnings.showwarning = _Warnings()
+        share = 1.0 if getattr(given, "force", True) else HALF
         try:
-            _call(given)
+            with at_most(share):
+                _call(given)
         except InputError as error:
             print(f"foldyn: {error}", file=sys.stderr)
             return BAD_INPUT
@@ -155,7 +161,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"foldyn: {error}", file=sys.stderr)
             return FAILED
         except MemoryError:
-            print("foldyn: not enough memory: take fewer cells or samples", file=sys.stderr)
+            print(
+                "foldyn: not enough memory: take fewer cells, divisions, steps or samples",
+                file=sys.stderr,
+            )
             return BAD_INPUT
         except BrokenPipeError:  # the reader of our output has left, as `head` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

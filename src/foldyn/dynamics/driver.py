@@ -6,7 +6,6 @@ import math
 import warnings
 from dataclasses import replace
 from functools import partial
-from numbers import Real
 from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
-    check_memory,
+    check_samples,
     counted_in_seconds,
     expected_samples,
     fixed_steps,
@@ -31,6 +30,8 @@ from foldyn.dynamics.timing import (
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.statics.fill import check_fill
+from foldyn.values import number
 
 if TYPE_CHECKING:
     import xarray
@@ -144,8 +145,7 @@ def prepare(
         raise InputError(
             "supports: hold every node along x, y and z, so that nothing can move: free one"
         )
-    if isinstance(start, bool) or not isinstance(start, Real) or not math.isfinite(start):
-        raise InputError(f"start = {start!r}: give a finite time (s)")
+    start = number("start", start, unit="s")
     u, v = check_start(case, initial)
     reason = ""
     if method == AUTO:
@@ -166,7 +166,9 @@ def prepare(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
             "one or leave dt out (force = true integrates all the same)"
         )
-    check_memory(expected_samples(plan), len(u), len(case.supported_dofs))
+    check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
+    if integrator.implicit:
+        check_fill(case.structure)
     check_steady(case, plan.start, plan.end)
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
@@ -191,10 +193,8 @@ def _with_radius(method: Method, spectral_radius: float | None) -> Method:
             f"spectral_radius = {spectral_radius!r}: {method.name} has none; leave it out, or "
             "choose generalized_alpha"
         )
-    number = isinstance(spectral_radius, Real) and not isinstance(spectral_radius, bool)
-    if not number or not 0.0 <= spectral_radius <= 1.0:
-        raise InputError(f"spectral_radius = {spectral_radius!r}: give a number from 0 to 1")
-    return method._replace(scheme=generalized_alpha.scheme(float(spectral_radius)))
+    radius = number("spectral_radius", spectral_radius, least=0.0, most=1.0)
+    return method._replace(scheme=generalized_alpha.scheme(radius))
 
 
 def _plan(

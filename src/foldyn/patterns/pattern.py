@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry
 from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
+from foldyn.values import LONGEST, SHORTEST
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
 _CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
@@ -165,6 +166,13 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
         )
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points
+    size = float(np.ptp(result, axis=0).max())
+    if not (np.abs(result).max() <= LONGEST and (size == 0.0 or size >= SHORTEST)):
+        raise InputError(
+            f"vertices: their largest coordinate is {np.abs(result).max():.3g} m and they span "
+            f"{size:.3g} m: give coordinates of at most {LONGEST:g} m that span at least "
+            f"{SHORTEST:g} m."
+        )
     return result
 
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measured_motions import History, Spectrum
 from foldyn.experiment.calibration.measured_paths import IMPOSED, ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement, axis_number
 from foldyn.experiment.tracking.store import load_tracks
+from foldyn.values import numbers, show
 
 
 def force_displacement(

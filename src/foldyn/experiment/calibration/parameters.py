@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import number, show, suggest
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import number_keys, parts, value_at
 from foldyn.experiment.calibration.ties import Tie
+from foldyn.values import number, show, suggest
 
 
 @dataclass(frozen=True)

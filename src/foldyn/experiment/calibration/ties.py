@@ -11,9 +11,9 @@ import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from foldyn.cases.values import suggest
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
+from foldyn.values import suggest
 
 _OPERATIONS = {
     ast.Add: operator.add,
