@@ -8,20 +8,26 @@ from __future__ import annotations
 
 from typing import Any
 
-MOST_LINES, LONGEST_LINE = 20, 600
-"""Limits of a message, in lines and in characters of a line."""
+MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
+"""Limits of a message: in lines, in characters of a line, and in all."""
 
 
 def shortened(message: str) -> str:
     """Return a message that a person can read: long ones lose lines, and the middle of lines."""
-    lines = message.split("\n")
-    if len(lines) > MOST_LINES:
-        kept = lines[: MOST_LINES - 1]
-        lines = [*kept, f"  ... and {len(lines) - len(kept)} lines more"]
+    if len(message) <= LONGEST_LINE and message.count("\n") < MOST_LINES:
+        return message
     end = LONGEST_LINE // 3
     start = LONGEST_LINE - end - len(" ... ")
-    cut = [a if len(a) <= LONGEST_LINE else f"{a[:start]} ... {a[-end:]}" for a in lines]
-    return "\n".join(cut)
+    lines = message.splitlines()
+    kept: list[str] = []
+    for line in lines[:MOST_LINES]:
+        kept.append(line if len(line) <= LONGEST_LINE else f"{line[:start]} ... {line[-end:]}")
+        if sum(map(len, kept)) > LONGEST - LONGEST_LINE:
+            break
+    left = len(lines) - len(kept)
+    if left:
+        kept[-1] = f"  ... and {left + 1} lines more"
+    return "\n".join(kept)
 
 
 class FoldynError(Exception):

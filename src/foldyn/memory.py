@@ -16,7 +16,7 @@ from pathlib import Path
 
 from foldyn.errors import InputError
 
-GIB = 2.0**30
+MEBI, GIB = 2.0**20, 2.0**30
 HALF = 0.5
 """Share of the memory that the command takes without being told to."""
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")

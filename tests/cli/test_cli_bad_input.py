@@ -158,7 +158,7 @@ BAD = {
     ),
     "pattern file that is missing": (
         [(KIND, 'file = "crane.fold"')],
-        'pattern.file = "crane.fold": crane.fold: no such file',
+        'pattern.file = "crane.fold": crane.fold: there is no such file',
     ),
     "pattern file of no known format": (
         [(KIND, 'file = "case.toml"')],

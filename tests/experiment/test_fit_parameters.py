@@ -66,7 +66,7 @@ def test_ties_are_arithmetic_on_keys() -> None:
         ("__import__('os').getcwd()", "is no number or key"),
         ("2 ** 3", "2 ** 3 is no number or key"),
         ("1 / 0", "divides by zero"),
-        (360, "must be a short text"),
+        (360, "= 360: must be a text"),
     ],
 )
 def test_ties_that_cannot_be_read(expression, message) -> None:

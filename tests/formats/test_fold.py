@@ -324,7 +324,7 @@ def test_not_a_fold_file(content, message, file):
 
 @pytest.mark.parametrize("name", ["missing.fold", "nowhere/missing.fold"])
 def test_missing_file(name, tmp_path):
-    with pytest.raises(InputError, match=r"missing\.fold: no such file; check the path"):
+    with pytest.raises(InputError, match=r"missing\.fold: there is no such file"):
         read_pattern(tmp_path / name)
 
 

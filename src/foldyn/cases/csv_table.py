@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.input_files import read_text
 from foldyn.values import show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
@@ -35,6 +36,8 @@ UNITS: Mapping[str, Mapping[str, Fraction]] = {
 _NUMBER = "number without unit"
 _SPELLINGS = {"µs": "us", "μs": "us", "m/s^2": "m/s2", "m/s²": "m/s2", "mm/s^2": "mm/s2"}
 _DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}  # the first in the header counts
+MOST = 64
+"""Size of a file (MiB)."""
 _MANY = 10  # names listed in a message
 _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
@@ -66,24 +69,15 @@ def read_columns(
         file = Path(path)
     except TypeError:
         raise InputError(f"path = {show(path)}: must be the path of a CSV file") from None
+    text = _text(file)
     try:
-        return _columns(_text(file), time, value, wanted)
+        return _columns(text, time, value, wanted)
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
 
 
 def _text(file: Path) -> str:
-    try:
-        return file.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError("there is no such file") from None
-    except IsADirectoryError:
-        raise InputError("is a folder; give a CSV file") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, UnicodeDecodeError):
-            raise InputError("is not a text file in UTF-8; save it as CSV in UTF-8") from None
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot be read: {reason}") from None
+    return read_text(file, "a CSV file in UTF-8", MOST, "take fewer lines or columns")
 
 
 def read_numbers(
@@ -114,8 +108,9 @@ def read_numbers(
         As `Table.from_csv`, but for the order of the lines.
     """
     file = Path(path)
+    text = _text(file)
     try:
-        columns, rows = _lines(_text(file))
+        columns, rows = _lines(text)
         found = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
         ratios = [
             _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
@@ -135,8 +130,9 @@ def read_numbers(
 def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
     """Names and units of the columns of a CSV file; None where a column has no unit."""
     file = Path(path)
+    text = _text(file)
     try:
-        return [(column.name, column.unit) for column in _lines(_text(file))[0]]
+        return [(column.name, column.unit) for column in _lines(text)[0]]
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,11 +31,14 @@ from foldyn.cases.until import Reached
 from foldyn.cases.vibrations import DriveSection, FrfSection
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import read_pattern
+from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.structures import Sheet
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
+MOST = 2
+"""Size of a case file (MiB)."""
 SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys of a path's analysis that are settings of its solver."""
 
@@ -144,24 +146,13 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
 
 def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
+    text = read_text(path, "a case file (TOML)", MOST, "put long tables into files of their own")
     try:
-        text = path.read_bytes().decode("utf-8-sig")  # some editors begin with a mark
-        document = tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give a case file (TOML)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file in UTF-8; give a case file (TOML)") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-    except ValueError:  # Python reads no whole number of thousands of digits
-        raise InputError(f"{path}: is not valid TOML: a number in it has too many digits") from None
-    with placed(path, ""):
+        document = from_toml(text)
         check_values(document)
-    return document
+        return document
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:

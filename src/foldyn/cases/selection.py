@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.cases.expressions import parse, shortened, written
 from foldyn.errors import InputError
 from foldyn.values import indices, show
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""
 
-_LONGEST = 1000
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
 _MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
@@ -64,7 +64,9 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
     if found.size == 0:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         ranges = ", ".join(f"{axis} {low[i]:.6g} to {high[i]:.6g}" for axis, i in _AXES.items())
-        raise InputError(f'"{expression}": selects no vertex; the pattern spans {ranges} (m)')
+        raise InputError(
+            f'"{shortened(expression)}": selects no vertex; the pattern spans {ranges} (m)'
+        )
     return found
 
 
@@ -122,14 +124,11 @@ class _Selector:
         self.tolerance = tolerance
 
     def mask(self) -> NDArray[np.bool_]:
-        text = self.expression.strip()
-        if len(text) > _LONGEST:
-            raise self._error(f"is longer than {_LONGEST} characters")
         try:
-            tree = ast.parse(text, mode="eval")
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise self._error("cannot be read (compare with ==, not =)") from None
-        return self._truth(tree.body)
+            tree = parse(self.expression.strip())
+        except InputError as error:
+            raise self._error(f"{error} (compare with ==, not =)") from None
+        return self._truth(tree)
 
     def _truth(self, node: ast.expr) -> NDArray[np.bool_]:
         if isinstance(node, ast.BoolOp):
@@ -146,7 +145,7 @@ class _Selector:
                 for left, operator, right in zip(sides, node.ops, sides[1:], strict=False)
             ]
             return np.logical_and.reduce(parts)
-        raise self._error(f"{ast.unparse(node)} is not a condition")
+        raise self._error(f"{written(node)} is not a condition")
 
     def _extreme(self, name: str) -> NDArray[np.bool_]:
         axis, which = _AXES.get(name[:1]), name[1:]
@@ -190,11 +189,11 @@ class _Selector:
             node = node.operand
         value = node.value if isinstance(node, ast.Constant) else None
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._error(f"{ast.unparse(node)} is not a number")
+            raise self._error(f"{written(node)} is not a number")
         try:
             return sign * float(value)
         except OverflowError:
-            raise self._error(f"{ast.unparse(node)} is not a finite number") from None
+            raise self._error(f"{written(node)} is not a finite number") from None
 
     def _error(self, what: str) -> InputError:
-        return InputError(f'"{self.expression}": {what}; {_REMEDY}')
+        return InputError(f'"{shortened(self.expression)}": {what}; {_REMEDY}')

@@ -9,7 +9,11 @@ from typing import Any
 
 from foldyn.errors import InputError
 from foldyn.formats.registry import FORMATS, Format
+from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
+
+MOST = 32
+"""Size of a pattern file (MiB)."""
 
 
 def read_pattern(path: str | os.PathLike[str]) -> Pattern:
@@ -35,16 +39,7 @@ def read_pattern(path: str | os.PathLike[str]) -> Pattern:
     fmt = _format_of(file)
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file; check the path.") from None
-    except UnicodeDecodeError:
-        raise InputError(
-            f"{file}: is not a text file in UTF-8; check that it is {fmt.name}."
-        ) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read: {_reason(error)}.") from None
+    text = read_text(file, f"a {fmt.name} file", MOST, "leave out what is no pattern")
     try:
         return fmt.read(text)
     except InputError as error:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
 
 _ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
@@ -119,9 +120,9 @@ def _json(value: Any) -> str:
 
 def _frame(text: str) -> dict[str, Any]:
     try:
-        frame = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"not valid JSON, as a FOLD file must be: {error}.") from None
+        frame = from_json(text)
+    except InputError as error:
+        raise InputError(f"{error}, as a FOLD file must be.") from None
     if not isinstance(frame, dict):
         raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
     for field, what in (("vertices_coords", "coordinates"), ("faces_vertices", "faces")):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
-
+import numpy as np
 import xarray as xr
 
 from foldyn.cases import Case
 from foldyn.cases.document import from_document
 from foldyn.errors import InputError
+from foldyn.input_files import from_toml
 
 
 def case_of(ds: xr.Dataset) -> Case:
@@ -30,15 +30,15 @@ def case_of(ds: xr.Dataset) -> Case:
         Not a result, or one that cannot be run again from itself (user's laws).
     """
     check_result(ds)
-    if not int(ds.attrs.get("rerunnable", 0)):
+    if not whole_attribute(ds, "rerunnable"):
         reason = ds.attrs.get("not_rerunnable_because", "the result says so")
         raise InputError(
             f"this result cannot be run again from itself: {reason}; make its case anew in Python"
         )
     try:
-        sections = tomllib.loads(str(ds["case"].values[()]))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"the stored case is damaged: {error}") from None
+        sections = from_toml(str(ds["case"].values[()]))
+    except InputError as error:
+        raise InputError(f"the stored case is damaged: it {error}") from None
     names = [name for name in ds.variables if name != "case"]
     return from_document(sections, {str(name): ds[name].values for name in names})
 
@@ -50,3 +50,15 @@ def check_result(ds: xr.Dataset, place: str = "") -> None:
             f"{place}is not a Foldyn result: it lacks the variable `case` or the attribute "
             "`foldyn_result` (arithmetic on a dataset drops attributes: keep them)"
         )
+    if not isinstance(ds.attrs["foldyn_result"], str) or ds["case"].ndim:
+        raise InputError(
+            f"{place}is damaged: its attribute `foldyn_result` or its variable `case` is no text"
+        )
+
+
+def whole_attribute(ds: xr.Dataset, name: str) -> int:
+    """Attribute that is a whole number; 0 where there is none."""
+    value = ds.attrs.get(name, 0)
+    if not isinstance(value, int | np.integer):
+        raise InputError(f"the result is damaged: its attribute {name} is no whole number")
+    return int(value)

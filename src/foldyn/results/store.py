@@ -15,7 +15,7 @@ import xarray as xr
 from foldyn.errors import InputError
 from foldyn.results import netcdf
 from foldyn.results.dataset import FORMAT
-from foldyn.results.origin import check_result
+from foldyn.results.origin import check_result, whole_attribute
 
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
@@ -62,12 +62,22 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     path = Path(path)
     ds = netcdf.read(path, "is not a Foldyn result (it cannot be read as NetCDF)")
     check_result(ds, f"{path}: ")
-    if int(ds.attrs.get("foldyn_format", 0)) > FORMAT:
+    try:
+        newer = whole_attribute(ds, "foldyn_format") > FORMAT
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if newer:
         raise InputError(
             f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
             "version does not know; update Foldyn"
         )
-    return _joined(ds)
+    try:
+        return _joined(ds)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: is damaged: a complex variable lacks its real or imaginary part; restore it "
+            "from a copy, or compute it again"
+        ) from None
 
 
 def _split(ds: xr.Dataset) -> xr.Dataset:

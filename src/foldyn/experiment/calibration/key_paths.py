@@ -10,6 +10,8 @@ from typing import Any
 from foldyn.errors import InputError
 from foldyn.values import show
 
+LONGEST = 200
+"""Characters of a path: no case file has one as deep."""
 _KEY = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*\Z")
 
 
@@ -21,7 +23,7 @@ def parts(key: Any) -> tuple[str | int, ...]:
     InputError
         The text is no path.
     """
-    if not isinstance(key, str) or not _KEY.match(key):
+    if not isinstance(key, str) or len(key) > LONGEST or not _KEY.match(key):
         raise InputError(
             f"{show(key)}: is no key of a case file; write the section and the key, as in "
             '"sheet.thickness" or "loads[0].force[2]"'

@@ -11,9 +11,10 @@ import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from foldyn.cases.expressions import parse, shortened, written
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
-from foldyn.values import suggest
+from foldyn.values import show, suggest
 
 _OPERATIONS = {
     ast.Add: operator.add,
@@ -42,16 +43,16 @@ class Tie:
     def __post_init__(self) -> None:
         """Check the arguments."""
         parts(self.key)
-        if not isinstance(self.expression, str) or len(self.expression) > 1000:
-            raise self._error("must be a short text")
+        if not isinstance(self.expression, str):
+            raise InputError(f"tie {self.key} = {show(self.expression)}: must be a text; {_REMEDY}")
         self.value(_Anything())
 
     def value(self, parameters: Mapping[str, float]) -> float:
         """Value for given values of the parameters."""
         try:
-            tree = ast.parse(self.expression.strip(), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise self._error("cannot be read") from None
+            tree = parse(self.expression.strip())
+        except InputError as error:
+            raise self._error(str(error)) from None
         return self._value(tree, parameters)
 
     def _value(self, node: ast.expr, parameters: Mapping[str, float]) -> float:
@@ -65,17 +66,21 @@ class Tie:
             return -self._value(node.operand, parameters)
         number = node.value if isinstance(node, ast.Constant) else None
         if isinstance(number, int | float) and not isinstance(number, bool):
-            return float(number)
+            try:
+                return float(number)
+            except OverflowError:
+                raise self._error(f"{written(node)} is not a finite number") from None
         if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
             key = ast.unparse(node)
             if key not in parameters:
                 known = ", ".join(parameters)
-                raise self._error(f"{key} is no parameter; {suggest(key, parameters)}use {known}")
+                hint = suggest(key, parameters)
+                raise self._error(f"{written(node)} is no parameter; {hint}use {known}")
             return parameters[key]
-        raise self._error(f"{ast.unparse(node)} is no number or key")
+        raise self._error(f"{written(node)} is no number or key")
 
     def _error(self, what: str) -> InputError:
-        return InputError(f'tie {self.key} = "{self.expression}": {what}; {_REMEDY}')
+        return InputError(f'tie {self.key} = "{shortened(self.expression)}": {what}; {_REMEDY}')
 
 
 class _Anything(dict[str, float]):

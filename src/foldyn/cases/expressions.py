@@ -1,0 +1,51 @@
+"""Short expressions in case files: read by Python's parser, never evaluated."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+
+from foldyn.errors import InputError
+
+LONGEST = 1000
+"""Characters of an expression."""
+DEEPEST = 50
+"""Operations in one another."""
+_SHOWN = 60
+
+
+def parse(text: str) -> ast.expr:
+    """Tree of an expression, shallow enough for functions that call themselves.
+
+    Raises
+    ------
+    InputError
+        The text cannot be read, or is too long or too deep; the message says that alone.
+    """
+    if len(text) > LONGEST:
+        raise InputError(f"is longer than {LONGEST} characters")
+    try:
+        with warnings.catch_warnings():  # Python's own opinions on how to write
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError("cannot be read") from None
+    level: list[ast.AST] = [tree]
+    for _ in range(DEEPEST):
+        level = [inner for node in level for inner in ast.iter_child_nodes(node)]
+        if not level:
+            return tree
+    raise InputError(f"has more than {DEEPEST} operations in one another")
+
+
+def written(node: ast.expr) -> str:
+    """Part of an expression as text for a message."""
+    try:
+        return shortened(ast.unparse(node))
+    except ValueError:  # a whole number of too many digits
+        return "a number"
+
+
+def shortened(text: str) -> str:
+    """Text for a message, of a long one only the beginning."""
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 4]} ..."

@@ -1,0 +1,132 @@
+"""The one door for files from outside: of any kind and size; TOML and JSON of any depth.
+
+Every message says what is wrong and what to do; the caller puts the place before it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from foldyn.errors import InputError
+
+DEEPEST = 50
+"""Tables and lists in one another that a TOML or JSON text may have."""
+
+MEBI = 2**20
+_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST},}}""")
+
+
+def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> str:
+    """Text of a file in UTF-8, with or without a mark at its beginning.
+
+    Parameters
+    ----------
+    path : path
+        A file; links are followed.
+    what : str
+        What it should be, for messages: "a CSV file".
+    most : int
+        Size (MiB) that it may have.
+    thin : str
+        What to do where it is larger, for messages.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is none (a folder, a pipe, a device), too large, or no text.
+    """
+    path = check_file(path, what)
+    try:
+        with path.open("rb") as file:
+            content = file.read(most * MEBI + 1)
+        if len(content) > most * MEBI:
+            raise InputError(f"{path}: is larger than {most} MiB; {thin}")
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not a text file in UTF-8; give {what}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def check_file(path: str | os.PathLike[str], what: str) -> Path:
+    """Path of a file that is one; links are followed.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is none: a folder, a pipe, a device.
+    """
+    path = Path(path)
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except (OSError, ValueError) as error:  # no such way, or no name of a file at all
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be read: {reason}") from None
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path}: is a folder; give {what}")
+    if not stat.S_ISREG(mode):  # reading it might never end
+        raise InputError(
+            f"{path}: is a pipe or a device, not a file; save its content, and give {what}"
+        )
+    return path
+
+
+def from_toml(text: str) -> dict[str, Any]:
+    """Tables of a TOML text.
+
+    Raises
+    ------
+    InputError
+        The text is not TOML, or nested deeper than any of ours; the message begins "is not".
+    """
+    deep = _DEEP_KEY.search(text)
+    if deep:  # tomllib would take minutes
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(f"is not valid TOML: a key of more than {DEEPEST} parts (at line {line})")
+    try:
+        return _shallow(tomllib.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is not valid TOML: {_told(error)}") from None
+
+
+def from_json(text: str) -> Any:
+    """Value of a JSON text.
+
+    Raises
+    ------
+    InputError
+        The text is not JSON, or nested deeper than any of ours; the message begins "is not".
+    """
+    try:
+        return _shallow(json.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is not valid JSON: {_told(error)}") from None
+
+
+def _told(error: Exception) -> str:
+    return f"nested deeper than {DEEPEST} levels" if isinstance(error, RecursionError) else (
+        str(error)
+    )  # fmt: skip
+
+
+def _shallow(value: Any) -> Any:
+    """Return `value` where it is not too deep for the functions that walk through it."""
+    level = [value]
+    for _ in range(DEEPEST + 1):
+        level = [
+            inner
+            for item in level
+            if isinstance(item, (dict, list))
+            for inner in (item.values() if isinstance(item, dict) else item)
+        ]
+        if not level:
+            return value
+    raise RecursionError
