@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from fuzz_target import Target
+from fuzz_toml import mutator
 
 from foldyn import memory
 from foldyn.cases.reading import read_case
@@ -44,4 +45,4 @@ def read(file: Path) -> None:
         KINDS[case_file.analysis.kind](case_file, True)
 
 
-TARGET = Target("case", seeds, read, ".toml", WORDS)
+TARGET = Target("case", seeds, read, ".toml", WORDS, mutator(WORDS))

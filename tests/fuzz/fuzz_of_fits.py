@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fuzz_of_cases import ROOM
 from fuzz_target import Target
+from fuzz_toml import mutator
 
 from foldyn import memory
 from foldyn.experiment.calibration.fit_file import read_fit
@@ -117,4 +118,4 @@ def read(file: Path) -> None:
         made.space.starts(plan.solver["starts"], plan.solver["seed"])
 
 
-TARGET = Target("fit", seeds, read, ".toml", WORDS)
+TARGET = Target("fit", seeds, read, ".toml", WORDS, mutator(WORDS))

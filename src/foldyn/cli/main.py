@@ -11,13 +11,13 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.force import add_force
 from foldyn.cli.track import add_track, track
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -26,11 +26,16 @@ SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: what decoders would say of a broken film is ours to say."""
 
 
+class _Parser(argparse.ArgumentParser):
+    """One whose messages have a length."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(shortened(message))
+
+
 def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
-    top = argparse.ArgumentParser(
-        prog="foldyn", description="Statics and dynamics of origami structures."
-    )
+    top = _Parser(prog="foldyn", description="Statics and dynamics of origami structures.")
     top.add_argument("--version", action="version", version=f"foldyn {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
 

@@ -75,6 +75,7 @@ def run(
             raise failed from None
         kept.append(_keep(done[name], folder, one.file, kept))
         say(one.line(done[name]))
+        _tell_missing(one.place, done[name], kept, say)
     if not figures:
         say(f"wrote {', '.join(kept)}")
         return folder
@@ -127,6 +128,18 @@ class _Introduction:
                 "compiling the kernels: first use, up to half a minute; they are kept for later "
                 "runs"
             )
+
+
+def _tell_missing(
+    place: str, result: xarray.Dataset, kept: list[str], say: Callable[[str], None]
+) -> None:
+    """Say which values a result lacks; it has failed where it may lack none."""
+    from foldyn.results.missing import REASONS, told
+
+    for name, text in told(result).items():
+        if name not in REASONS:
+            raise _failed(place, f"{name}: {text}", kept, result)
+        say(f"  {name}: {text}")
 
 
 def _keep(result: xarray.Dataset, folder: Path, file: str, kept: list[str]) -> str:

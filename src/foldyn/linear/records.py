@@ -153,7 +153,8 @@ def transform(
         responses *= window[:, None, None]
     size = np.abs(responses).max(axis=(2, 3))
     end = slice(int((1.0 - END) * record.samples), record.samples)
-    left = float((size[:, end].max(axis=1) / size.max(axis=1)).max())
+    whole = size.max(axis=1)
+    left = float((size[:, end].max(axis=1) / np.where(whole > 0.0, whole, 1.0)).max())
     if left > LEFT:
         decay = 2.0 * np.log(1.0 / LEFT) / record.duration
         warnings.warn(

@@ -131,7 +131,7 @@ def read_fit(
 
     def case_of(name: str) -> Path:
         there = path.parent / name
-        if there.is_file() or find is None:
+        if os.path.isfile(there) or find is None:  # false where a name is too long
             return there
         try:
             return find(name)
