@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     import xarray
 
 DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost their digits
 MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
@@ -161,6 +162,11 @@ def prepare(
     plan = _plan(integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, method, u, critical)
     warn_of_unstable_damping(case, u)
+    if plan.dt < SHARPEST * abs(plan.start):
+        raise InputError(
+            f"start = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
+            "nearer to 0"
+        )
     if not force and plan.dt > critical:
         raise InputError(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "

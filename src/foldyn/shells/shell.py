@@ -24,9 +24,9 @@ from foldyn.shells.sides import Sides, sides
 from foldyn.shells.sparsity import ShellPattern, shell_pattern
 from foldyn.shells.tangent import shell_tangent
 from foldyn.structures import Sheet
-from foldyn.structures.calibration import fold_stiffness
+from foldyn.structures.calibration import check_scale, fold_stiffness
+from foldyn.structures.discretize import edge_lengths, per_crease
 from foldyn.structures.discretize import fold_rest as rest_of
-from foldyn.structures.discretize import per_crease
 from foldyn.structures.mass import MASS_RULES, Surface
 from foldyn.values import show, whole
 
@@ -334,6 +334,7 @@ def shell(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
         PER_NODE * nodes, "take fewer",
     )  # fmt: skip
+    check_scale(sheet, edge_lengths(pattern))
     mesh = shell_mesh(pattern, divisions)
     found = sides(mesh, pattern, edges)
     x = mesh.nodes

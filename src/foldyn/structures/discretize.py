@@ -90,6 +90,7 @@ def discretize(
     check_mass_rule(mass)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
+    calibrate.check_scale(sheet, edge_lengths(pattern))
     points = _given_centers(centers or {}, pattern, scheme)
     mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
     calibrate.check_poisson(mesh, pattern, sheet)
@@ -147,6 +148,12 @@ def _given_centers(
             )
         points[int(panel)] = np.array(vector(f"centers: panel {panel}", point))
     return points
+
+
+def edge_lengths(pattern: Pattern) -> NDArray:
+    """Lengths (ne,) of all edges of a pattern, m."""
+    x = pattern.vertices
+    return np.linalg.norm(x[pattern.edges[:, 1]] - x[pattern.edges[:, 0]], axis=1)
 
 
 def per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
