@@ -40,8 +40,8 @@ WHY = {
 }
 """Why a search ended, by the status of `least_squares`."""
 
-MOST_STARTS, MOST_PROCESSES = 100_000, 1024
-"""Searches, and processes at a time: more are a slip of the finger."""
+MOST_PROCESSES = 1024
+"""Processes at a time: more are a slip of the finger."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,7 @@ def fit(
     interval of its output: steps chosen by their error would make the misfit jump.
     """
     confidence = number("confidence", confidence, above=0.0, below=1.0)
-    whole("starts", starts, least=1, most=MOST_STARTS)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
-    whole("seed", seed, least=0)
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
