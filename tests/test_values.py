@@ -183,5 +183,5 @@ def test_a_pattern_has_a_size():
     for scale in (1e-29, 1e29):
         assert fd.Pattern(scale * square, [(0, 1, 2, 3)]).size == pytest.approx(scale * 2**0.5)
     for scale in (1e-31, 1e31, 1e160, 1e308, 1e-310):
-        with pytest.raises(InputError, match="vertices: "):
+        with pytest.raises(InputError, match=r"vertices.*at (most|least) 1e"):
             fd.Pattern(scale * square, [(0, 1, 2, 3)])

@@ -5,6 +5,7 @@ Every message says what is wrong and what to do; the caller puts the place befor
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import re
@@ -45,6 +46,7 @@ def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> 
     try:
         with path.open("rb") as file:
             content = file.read(most * MEBI + 1)
+        codecs.getincrementaldecoder("utf-8")().decode(content[:MEBI])
         if len(content) > most * MEBI:
             raise InputError(f"{path}: is larger than {most} MiB; {thin}")
         return content.decode("utf-8-sig")

@@ -56,6 +56,12 @@ def _written(value: Any, depth: int) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
+def shortened(text: str) -> str:
+    """Text for a message, in one line, of a long one only the beginning."""
+    text = " ".join(text.splitlines())
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word nearest to `word`, if any is near."""
     close = difflib.get_close_matches(word[:SHOWN], list(known), n=1, cutoff=0.6)

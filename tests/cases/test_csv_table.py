@@ -128,6 +128,14 @@ BAD = {
     ),
     "short row": ("t [s]\tf\n0\t0\n1\n", "line 3: has 1 cells, the header has 2 (cells end at ev"),
     "not UTF-8": (b"t [\xb5s],f\n0,0\n1,1\n", "is not a text file in UTF-8"),
+    "long cell": (
+        "t [s],f\n0,0\n1," + 9999 * "-" + "\n",
+        'line 3, column "f": "' + 56 * "-" + " ...",
+    ),
+    "long name": (
+        "t [s" + 9999 * "s" + "],f\n0,0\n1,2\n",
+        'column "t [' + 53 * "s" + ' ...": [sss',
+    ),
     "huge cell": ("t [s],f\n0,0\n1," + 200_000 * "1", "line 3: cannot be read: field larger"),
 }
 
@@ -138,6 +146,7 @@ def test_a_bad_file_gets_one_message(table, tmp_path, name) -> None:
     with pytest.raises(InputError) as caught:
         table(text)
     assert str(caught.value).startswith(f"{tmp_path / 'pulse.csv'}: {message}")
+    assert len(str(caught.value)) < 600
 
 
 @pytest.mark.parametrize(

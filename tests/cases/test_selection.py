@@ -78,9 +78,15 @@ def test_selection_of_pattern_vertices() -> None:
         ("(" * 300 + "xmin" + ")" * 300, "cannot be read"),
         ("xmin or " * 200 + "xmin", "is longer than 1000 characters"),
         ("xmin\x00", "cannot be read"),
+        ("x" + ".a" * 480, "has more than 50 operations in one another"),
+        ("not " * 200 + "xmin", "has more than 50 operations in one another"),
+        ("x > " + "-" * 900 + "1", "has more than 50 operations in one another"),
+        ("x > 0x" + "f" * 900, "is not a finite number"),
+        ("x > 0ify", "cannot be read"),
         ("1", "1 is not a condition"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_expressions_that_cannot_be_used(expression, text) -> None:
     with pytest.raises(InputError, match=text):
         select(GRID, expression)

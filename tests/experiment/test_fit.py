@@ -210,6 +210,27 @@ def test_a_fit_goes_on_where_it_was_cut_off(pressed, tmp_path) -> None:
     assert third.evaluations == found.evaluations
 
 
+def test_damaged_evaluations_are_computed_again(pressed, tmp_path) -> None:
+    data = [forces(pressed)]
+    first = fd.fit(pressed, data, [RATIO], folder=tmp_path)
+    for number, file in enumerate(sorted(tmp_path.glob("*.npz"))):
+        sound = bytearray(file.read_bytes())
+        if number % 4 == 0:
+            sound[sound.index(b"NUMPY") + 130] ^= 1  # a number: the archive's checksum tells
+        elif number % 4 == 1:
+            sound[sound.index(b"PK\x01\x02") + 8] ^= 1  # "encrypted"
+        elif number % 4 == 2:
+            sound = sound[: len(sound) // 2]
+        else:
+            np.savez(file, values=np.array(["text"]), failure=np.array(""))
+            continue
+        file.write_bytes(sound)
+    course = []
+    again = fd.fit(pressed, data, [RATIO], folder=tmp_path, progress=course.append)
+    assert again.values == first.values
+    assert course[-1].found == 0
+
+
 def test_kept_evaluations_of_another_model_are_not_used(pressed, tmp_path) -> None:
     data = [forces(pressed)]
     fd.fit(pressed, data, [RATIO], folder=tmp_path)

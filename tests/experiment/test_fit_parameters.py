@@ -66,6 +66,9 @@ def test_ties_are_arithmetic_on_keys() -> None:
         ("__import__('os').getcwd()", "is no number or key"),
         ("2 ** 3", "2 ** 3 is no number or key"),
         ("1 / 0", "divides by zero"),
+        ("x" + ".a" * 480, "has more than 50 operations in one another"),
+        ("1" * 1001, "is longer than 1000 characters"),
+        ("2 * 0x" + "f" * 900, "is not a finite number"),
         (360, "= 360: must be a text"),
     ],
 )
@@ -73,6 +76,12 @@ def test_ties_that_cannot_be_read(expression, message) -> None:
     with pytest.raises(InputError, match=r"tie a\.b = ") as caught:
         Tie("a.b", expression)
     assert message in str(caught.value)
+
+
+def test_a_key_deeper_than_any_case_file_is_none() -> None:
+    for key in ("a" + ".a" * 480, "a[" + "9" * 5000 + "]"):
+        with pytest.raises(InputError, match="is no key of a case file"):
+            Tie(key, "1")
 
 
 def test_a_tie_to_what_is_no_parameter() -> None:

@@ -144,12 +144,14 @@ def _lines(process: subprocess.Popen[bytes]) -> Iterator[dict[str, Any] | str]:
 
 
 def _resident(pid: int) -> float:
-    """Memory of a process in MiB; 0 where the system does not tell."""
+    """Most memory of a process or one that it has started, in MiB; 0 if the system is silent."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     except (OSError, IndexError):
         return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+    own = pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return max([own, *(_resident(int(child)) for child in children)])
 
 
 def _status(code: int) -> str:

@@ -31,7 +31,8 @@ def mutate(random: Random, data: bytes, seeds: Sequence[bytes], words: Sequence[
             data = _words(random, data, seeds, words)
         else:
             data = _bytes(random, data, seeds)
-    return data[:LONGEST]
+        data = data[:LONGEST]
+    return data
 
 
 def _bytes(random: Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -118,8 +119,9 @@ def _words(random: Random, data: bytes, seeds: Sequence[bytes], words: Sequence[
     elif kind == "swap":
         pieces[i], pieces[j] = pieces[j], pieces[i]
     elif kind == "again":
-        many = random.choice((2, 3, 30, 1000))
-        pieces[i : i + 1] = pieces[i : i + random.randint(1, 6)] * many
+        repeated = pieces[i : i + random.randint(1, 6)]
+        many = min(random.choice((2, 3, 30, 1000)), LONGEST // sum(map(len, repeated)) + 1)
+        pieces[i : i + 1] = repeated * many
     elif kind == "deep":
         opened, closed = random.choice(((b"[", b"]"), (b"{", b"}"), (b"(", b")"), (b"-", b"")))
         depth = random.choice((1, 2, 100, 100000))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fuzz_of_cases
 import fuzz_of_fits
 import fuzz_of_patterns
+import fuzz_of_results
 import fuzz_of_selections
 import fuzz_of_tables
 from fuzz_target import Target
@@ -15,6 +16,7 @@ TARGETS: dict[str, Target] = {
         fuzz_of_cases.TARGET,
         fuzz_of_fits.TARGET,
         fuzz_of_patterns.TARGET,
+        *fuzz_of_results.TARGETS,
         fuzz_of_selections.TARGET,
         fuzz_of_tables.TARGET,
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import sys
 import time
 import traceback
@@ -53,7 +54,7 @@ def work(target: Target, seed: int, numbers: range, here: Path) -> None:
         start = time.perf_counter()
         outcome = _read(target, file)
         seconds = time.perf_counter() - start
-        memory = _memory("VmHWM") - first
+        memory = max(_memory("VmHWM"), _memory_of_children()) - first
         if seconds > SECONDS:
             outcome["finding"] = f"took {seconds:.1f} s"
         if memory > MEBIBYTES:
@@ -107,6 +108,11 @@ def _memory(name: str) -> int:
     except OSError:
         return 0
     return int(next((line.split()[1] for line in lines if line.startswith(name)), "0")) // 1024
+
+
+def _memory_of_children() -> int:
+    """Most memory of a process that this one had started, in MiB."""
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
 
 
 def _forget_peak() -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 
 import pytest
 
 from foldyn.cli.main import main
+from foldyn.errors import FoldynWarning
 from foldyn.program import digest
 from foldyn.studies.herkal import report, runs, sensitivity, sensitivity_page, variations
 from foldyn.studies.herkal import study as studies
@@ -73,8 +75,16 @@ def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(sensitivity, "program", lambda: "another")
         assert not task.there(tmp_path)
-    (tmp_path / f"{task.name}.json").write_text('{"settings": ')
-    assert not task.there(tmp_path)
+    file = tmp_path / f"{task.name}.json"
+    sound = file.read_text()
+    settings, key, rows = sound.partition('"rows"')
+    flipped = settings + key + re.sub(r"\.(\d)", lambda m: f".{9 - int(m[1])}", rows)
+    for damaged in ('{"settings": ', "[]", "[" * 9999, flipped, sound.replace("rows_sha256", "x")):
+        file.write_text(damaged)
+        with pytest.warns(FoldynWarning, match=f"{task.name}.json: is damaged.*computed again"):
+            assert not task.there(tmp_path)
+    file.write_text(sound)
+    assert task.there(tmp_path)
 
 
 def test_frequencies_are_those_of_partners(tmp_path):

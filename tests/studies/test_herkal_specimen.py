@@ -12,7 +12,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.cases.reading import case_of_document, read_document
 from foldyn.cli.main import main
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, History
 from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
@@ -412,6 +412,22 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
     assert "static: weights.csv" in text and "synthetic" not in text
     other = replace(fit, data=Data(static=tables / "film.csv"))
     assert not other.there(tables)
+    file = tables / tasks.FOLDER / tasks.FOUND
+    sound = file.read_text()
+    for damaged in (sound.replace("0.125", "0.126"), "{}", "[1]", "[" * 9999, '{"changes": 1}', ""):
+        file.write_text(damaged)
+        with pytest.warns(FoldynWarning, match=r"found\.json: is damaged.*computed again"):
+            assert not fit.there(tables)
+        if "folds" not in damaged:
+            with pytest.raises(InputError, match=r"found\.json: is damaged"):
+                tasks.read_found(tables / tasks.FOLDER)
+    file.write_text(sound)
+    for damaged in (b"\xff", b"", b"{}\n[]\n"):
+        stamp = fit._stamp(tables)
+        stamp.write_bytes(damaged)
+        assert not fit.there(tables)
+    fit.make(tables)
+    assert fit.there(tables)
     monkeypatch.setattr(tasks, "specimen_program", lambda: "another")
     assert not fit.there(tables)
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 import foldyn as fd
 from foldyn.cli.main import main
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.studies.herkal import pool, report, runs
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
@@ -150,10 +150,16 @@ def test_what_is_there_is_skipped(tmp_path):
 
 def test_other_settings_and_damaged_files_are_computed_again(tmp_path):
     job = Job("case1", "panel", "motion", SHORT)
-    (tmp_path / job.file).write_bytes(b"cut short")
-    assert runs.stored(tmp_path, job) is None
-    pool.run([job], tmp_path, processes=1)
-    assert runs.stored(tmp_path, job) is not None
+    for damage in (b"cut short", None):
+        if damage is None:  # one bit
+            sound = (tmp_path / job.file).read_bytes()
+            damage = sound[:3000] + bytes([sound[3000] ^ 1]) + sound[3001:]
+        (tmp_path / job.file).write_bytes(damage)
+        with pytest.warns(FoldynWarning, match=f"{job.file}: is damaged.*computed again"):
+            assert runs.stored(tmp_path, job) is None
+        with pytest.warns(FoldynWarning, match="computed again"):
+            pool.run([job], tmp_path, processes=1)
+        assert runs.stored(tmp_path, job) is not None
     finer = replace(job, numerics=replace(SHORT, divisions=4, dt=0.01))
     assert runs.stored(tmp_path, finer) is not None  # of the shell alone
     longer = replace(job, numerics=replace(SHORT, duration=0.6))

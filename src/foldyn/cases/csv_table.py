@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.input_files import read_text
-from foldyn.values import show, suggest
+from foldyn.values import shortened, show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),
@@ -50,6 +50,11 @@ class _Column:
     heading: str
     name: str
     unit: str | None
+
+    @property
+    def shown(self) -> str:
+        """Its heading for messages."""
+        return shortened(self.heading)
 
 
 def read_columns(
@@ -174,7 +179,7 @@ def _columns(
     columns, lines = _lines(text)
     found = _find("time", time, columns, 0), _find("value", value, columns, 1)
     if found[0] == found[1]:
-        raise InputError(f'time and value: are both the column "{found[0].heading}"; name two')
+        raise InputError(f'time and value: are both the column "{found[0].shown}"; name two')
     ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
     rows = [
         [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
@@ -206,8 +211,8 @@ def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
         raise InputError(f"line {number}: holds numbers, no names; {_HEADER} (without # before it)")
     if len(cells) < 2:
         raise InputError(
-            f'line {number}: "{cells[0]}" is one column, a table needs two; {_HEADER} (comma, '
-            "semicolon or tab between them)"
+            f'line {number}: "{shortened(cells[0])}" is one column, a table needs two; {_HEADER} '
+            "(comma, semicolon or tab between them)"
         )
     columns = []
     for place, cell in enumerate(cells):
@@ -224,11 +229,11 @@ def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: i
     found = [column for column in columns if wanted.strip() in (column.heading, column.name)]
     if len(found) == 1:
         return found[0]
-    listed = some([f'"{column.heading}"' for column in columns])
+    listed, asked = some([f'"{column.shown}"' for column in columns]), shortened(wanted)
     if found:
-        raise InputError(f'{field} = "{wanted}": names {len(found)} of the columns {listed}')
+        raise InputError(f'{field} = "{asked}": names {len(found)} of the columns {listed}')
     hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
-    raise InputError(f'{field} = "{wanted}": is no column; {hint}there are {listed}')
+    raise InputError(f'{field} = "{asked}": is no column; {hint}there are {listed}')
 
 
 def _quantity(unit: str) -> str | None:
@@ -239,12 +244,13 @@ def _time_ratio(column: _Column) -> Fraction:
     listed = ", ".join(TIME_UNITS)
     if column.unit is None:
         raise InputError(
-            f'column "{column.heading}": has no unit of time; write it in the header, as in '
-            f'"{column.name or "time"} [s]" (known: {listed})'
+            f'column "{column.shown}": has no unit of time; write it in the header, as in '
+            f'"{shortened(column.name) or "time"} [s]" (known: {listed})'
         )
     if column.unit not in TIME_UNITS:
         raise InputError(
-            f'column "{column.heading}": [{column.unit}] is no unit of time; use one of {listed}'
+            f'column "{column.shown}": [{shortened(column.unit)}] is no unit of time; use one of '
+            f"{listed}"
         )
     return TIME_UNITS[column.unit]
 
@@ -253,16 +259,16 @@ def _value_ratio(column: _Column, wanted: str) -> Fraction:
     """Size of the column's unit in the unit that the caller wants."""
     quantity = _quantity(wanted) or _NUMBER
     listed = ", ".join(UNITS[quantity])
-    place = f'column "{column.heading}"'
+    place = f'column "{column.shown}"'
     if column.unit is None and quantity != _NUMBER:
         raise InputError(
             f'{place}: has no unit, unit = "{wanted}" asks for {_article(quantity)}; write the '
-            f'unit in the header, as in "{column.name} [{wanted}]"'
+            f'unit in the header, as in "{shortened(column.name)} [{wanted}]"'
         )
     unit = column.unit or "-"
     own = _quantity(unit)
     if own is None:
-        raise InputError(f"{place}: the unit [{unit}] is not known; use one of {listed}")
+        raise InputError(f"{place}: the unit [{shortened(unit)}] is not known; use one of {listed}")
     if own != quantity and quantity == _NUMBER:
         raise InputError(
             f"{place}: is {_article(own)}, but a history is a factor without unit; say "
@@ -294,7 +300,7 @@ def _number(
 ) -> float:
     """Number in a cell; NaN for an empty one where there may be gaps."""
     cell = cells[column.place]
-    place = f'line {number}, column "{column.heading}"'
+    place = f'line {number}, column "{column.shown}"'
     remedy = "; leave the cell empty where a node was lost" if gap else ""
     if not cell and gap:
         return np.nan
@@ -302,9 +308,9 @@ def _number(
         raise InputError(f"{place}: is empty; every line needs a number there")
     if not _is_number(cell):
         hint = " (decimals are written with a point)" if "," in cell else ""
-        raise InputError(f'{place}: "{cell}" is not a number{hint}{remedy}')
+        raise InputError(f'{place}: "{shortened(cell)}" is not a number{hint}{remedy}')
     # an exact ratio of whole numbers: 5 ms become the double nearest to 0.005 s
     value = float(cell) * ratio.numerator / ratio.denominator
     if not np.isfinite(value):
-        raise InputError(f'{place}: "{cell}" is not a finite number{remedy}')
+        raise InputError(f'{place}: "{shortened(cell)}" is not a finite number{remedy}')
     return value

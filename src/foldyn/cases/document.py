@@ -86,9 +86,9 @@ def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) ->
     """
     try:
         return _read(_resolve(sections, arrays))
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except Exception as error:  # whatever a number or a table in the wrong place leads to
         raise InputError(f"the stored case is damaged ({type(error).__name__}: {error})") from error
 
 

@@ -6,12 +6,12 @@ import ast
 import warnings
 
 from foldyn.errors import InputError
+from foldyn.values import shortened
 
 LONGEST = 1000
 """Characters of an expression."""
 DEEPEST = 50
 """Operations in one another."""
-_SHOWN = 60
 
 
 def parse(text: str) -> ast.expr:
@@ -44,8 +44,3 @@ def written(node: ast.expr) -> str:
         return shortened(ast.unparse(node))
     except ValueError:  # a whole number of too many digits
         return "a number"
-
-
-def shortened(text: str) -> str:
-    """Text for a message, of a long one only the beginning."""
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 4]} ..."

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.expressions import parse, shortened, written
+from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError
-from foldyn.values import indices, show
+from foldyn.values import indices, shortened, show
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""

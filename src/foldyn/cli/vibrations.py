@@ -168,6 +168,7 @@ def stored_state(case_file: CaseFile, rule: str) -> dict[str, Any]:
         return {}
     from foldyn.dynamics import initial_state
     from foldyn.results import load
+    from foldyn.results.contents import check_variable
 
     factors: list[float] = []
 
@@ -175,7 +176,7 @@ def stored_state(case_file: CaseFile, rule: str) -> dict[str, Any]:
         result = load(path)
         state = initial_state(result, at)
         if "load_factor" in result:
-            factors.append(float(result["load_factor"][at]))
+            factors.append(float(check_variable(result, "load_factor", ("step",))[at]))
         return state
 
     state = case_file.initial(rule, read)

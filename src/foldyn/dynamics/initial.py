@@ -9,6 +9,7 @@ import numpy as np
 from foldyn.cases import CaseFile, State
 from foldyn.errors import InputError
 from foldyn.results import load
+from foldyn.results.contents import check_variable
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -32,8 +33,12 @@ def initial_state(result: Any, at: int = -1) -> State:
     if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
         raise InputError(f"at = {at!r}: the result has samples 0 to {count - 1}")
     sample = result.isel({dimension: at})
-    velocity = sample["velocity"].to_numpy() if "velocity" in sample else None
-    return State(sample["displacement"].to_numpy(), velocity)
+    found = {
+        name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
+        for name in ("displacement", "velocity")
+        if name == "displacement" or name in sample
+    }
+    return State(**found)
 
 
 def start_of(case_file: CaseFile, mass: str | None = None) -> State | None:

@@ -164,14 +164,18 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
         raise InputError(
             f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
         )
+    far = np.abs(points.astype(np.float64)).max(axis=1)
+    if far.max() > LONGEST:
+        v = int(far.argmax())
+        raise InputError(
+            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {LONGEST:g} m."
+        )
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points
     size = float(np.ptp(result, axis=0).max())
-    if not (np.abs(result).max() <= LONGEST and (size == 0.0 or size >= SHORTEST)):
+    if 0.0 < size < SHORTEST:
         raise InputError(
-            f"vertices: their largest coordinate is {np.abs(result).max():.3g} m and they span "
-            f"{size:.3g} m: give coordinates of at most {LONGEST:g} m that span at least "
-            f"{SHORTEST:g} m."
+            f"vertices: they span {size:.3g} m: give coordinates that span at least {SHORTEST:g} m."
         )
     return result
 

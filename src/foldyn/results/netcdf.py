@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
+from typing import Any
 
 import h5py
 import xarray as xr
@@ -12,10 +13,15 @@ import xarray as xr
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
 from foldyn.results import seal
+from foldyn.results.apart import apart
 
 ENGINE = "h5netcdf"
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
+LEAST_MEMORY = 2**29
+"""Bytes that a file without a seal may take beside what it holds."""
+LEAST_SECONDS, PER_SECOND = 4, 50_000
+"""Time that a file without a seal may take, and the bytes that take a second more."""
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -53,15 +59,17 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
     """
     path = check_file(path, "a NetCDF file")
     try:
-        if seal.broken(path):
+        sealed = seal.sound(path)
+        if sealed is False:
             raise InputError(
                 f"{path}: is damaged: its checksum does not match its content; restore it from a "
                 "copy, or compute it again"
             )
-        _check_size(path)
-        with warnings.catch_warnings():  # of xarray, on what it finds odd
-            warnings.simplefilter("ignore")
-            return xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+        if sealed:
+            return _load(path)
+        size = path.stat().st_size  # HDF5 may crash on what is damaged
+        seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
+        return apart(lambda: _load(path), seconds, memory)
     except InputError:
         raise
     except PermissionError:
@@ -73,14 +81,27 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
         ) from error
 
 
-def _check_size(path: Path) -> None:
-    """Refuse a file that declares more than it can hold, before memory is taken for that."""
+def _load(path: Path) -> xr.Dataset:
+    _check_header(path)
+    with warnings.catch_warnings():  # of xarray, on what it finds odd
+        warnings.simplefilter("ignore")
+        return xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+
+
+def _check_header(path: Path) -> None:
+    """Refuse a file that is not all there is, or declares more than it can hold.
+
+    Before anything is read: a link may lead to a file that has no end, and a size take all memory.
+    """
+    declared = 0
     with h5py.File(path) as file:
-        declared = sum(
-            item.size * item.dtype.itemsize
-            for item in file.values()
-            if isinstance(item, h5py.Dataset) and item.size and not _is_bare(item)
-        )
+        for name in file:
+            own = isinstance(file.get(name, getlink=True), h5py.HardLink)
+            item: Any = file[name] if own else None
+            if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
+                raise InputError(f"{path}: is no file of ours: {name} is not a variable in it")
+            if item.size and not _is_bare(item):
+                declared += item.size * item.dtype.itemsize
     size = path.stat().st_size
     if declared > MOST_PACKED * size:
         raise InputError(

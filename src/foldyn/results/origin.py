@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 
 from foldyn.cases import Case
 from foldyn.cases.document import from_document
 from foldyn.errors import InputError
 from foldyn.input_files import from_toml
+from foldyn.results.contents import whole_attribute
 
 
 def case_of(ds: xr.Dataset) -> Case:
@@ -54,11 +54,3 @@ def check_result(ds: xr.Dataset, place: str = "") -> None:
         raise InputError(
             f"{place}is damaged: its attribute `foldyn_result` or its variable `case` is no text"
         )
-
-
-def whole_attribute(ds: xr.Dataset, name: str) -> int:
-    """Attribute that is a whole number; 0 where there is none."""
-    value = ds.attrs.get(name, 0)
-    if not isinstance(value, int | np.integer):
-        raise InputError(f"the result is damaged: its attribute {name} is no whole number")
-    return int(value)

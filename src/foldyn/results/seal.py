@@ -21,19 +21,19 @@ def seal(path: Path) -> None:
         file.write(_MARK + digest.encode() + b"\n")
 
 
-def broken(path: Path) -> bool:
-    """Whether a file has a seal that what comes before it does not match."""
+def sound(path: Path) -> bool | None:
+    """Whether the seal of a file matches what comes before it; None where it has none."""
     left = path.stat().st_size - _LENGTH
     if left < 0:
-        return False
+        return None
     digest = hashlib.sha256()
     with path.open("rb") as file:
         file.seek(left)
         found = file.read()
         if not found.startswith(_MARK):
-            return False
+            return None
         file.seek(0)
         while left > 0 and (piece := file.read(min(left, _PIECE))):
             digest.update(piece)
             left -= len(piece)
-    return found != _MARK + digest.hexdigest().encode() + b"\n"
+    return found == _MARK + digest.hexdigest().encode() + b"\n"

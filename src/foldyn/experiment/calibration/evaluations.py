@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import zipfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -106,9 +105,12 @@ class Evaluations:
         try:
             with np.load(file) as kept:
                 failure = str(kept["failure"])
-                self._known[key] = failure or kept["values"]
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile):  # cut off while written
-            return False
+                values = kept["values"]
+            if values.dtype != np.float64 or values.ndim != 1:
+                return False
+        except Exception:  # what NumPy and zipfile raise on damaged files is of any kind
+            return False  # computed again
+        self._known[key] = failure or values
         with self._lock:
             self.found += 1
             self.tell(self.computed, self.found)

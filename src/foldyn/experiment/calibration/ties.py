@@ -11,10 +11,10 @@ import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from foldyn.cases.expressions import parse, shortened, written
+from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
-from foldyn.values import show, suggest
+from foldyn.values import shortened, show, suggest
 
 _OPERATIONS = {
     ast.Add: operator.add,

@@ -52,13 +52,18 @@ class Model:
     @classmethod
     def _of_result(cls, result: xr.Dataset) -> Model:
         from foldyn.results import case_of
+        from foldyn.results.contents import check_variable
 
         if "displacement" not in result or "rest_position" not in result:
             raise InputError("--model: the result has no displacements; give a case or a path")
         at_rest = cls.of(case_of(result))
-        rest = result["rest_position"].values
-        states = rest + result["displacement"].values
-        if states.ndim != 3:
+        if result["displacement"].ndim != 3:
             raise InputError("--model: give a path or a motion, not modes or responses")
+        place, along = ("node", "axis"), str(result["displacement"].dims[0])
+        rest = check_variable(result, "rest_position", place, place="--model: ").values
+        moved = check_variable(result, "displacement", (along, *place), place="--model: ").values
+        states = rest + moved
+        if not states.size or not np.isfinite(states).all():
+            raise InputError("--model: the result holds no finite displacements; compute it again")
         thin = np.unique(np.linspace(0, len(states) - 1, _MOST_STATES).round().astype(int))
         return replace(at_rest, rest=rest, states=states[thin])

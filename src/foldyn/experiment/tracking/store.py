@@ -10,6 +10,7 @@ import xarray as xr
 
 from foldyn.errors import InputError
 from foldyn.results import netcdf
+from foldyn.results.contents import TEXTS, WHOLES, check_variable
 
 
 def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -36,6 +37,15 @@ def load_tracks(path: str | os.PathLike[str]) -> xr.Dataset:
     ds = netcdf.read(path, "cannot be read as NetCDF")
     if "foldyn_tracks" not in ds.attrs:
         raise InputError(f"{path}: holds no tracks; foldyn track writes them")
+    if "displacement" in ds:
+        along, place = "photo" if "photo" in ds.dims else "time", f"{path}: "
+        check_variable(ds, "displacement", (along, "node", "axis"), place=place)
+        check_variable(ds, along, (along,), place=place)
+        check_variable(ds, "node", ("node",), WHOLES, place)
+        check_variable(ds, "axis", ("axis",), TEXTS, place)
+        for name in ("node", "axis"):
+            if not ds.indexes[name].is_unique:
+                raise InputError(f"{path}: is damaged: it has a {name} twice")
     return ds
 
 

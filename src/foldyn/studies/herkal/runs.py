@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from foldyn.cases import Case, CaseFile, read_case
 from foldyn.dynamics import simulate
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
@@ -163,6 +164,13 @@ def stored(folder: Path, job: Job) -> xarray.Dataset | None:
         return None
     try:
         found = load(path)
-    except InputError:  # cut short by a full disk, or no result at all: computed again
+    except InputError:  # cut short by a full disk, or no result at all
+        warn_of_damage(path)
         return None
     return found if found.attrs.get(SETTINGS) == _text(job) else None
+
+
+def warn_of_damage(path: Path) -> None:
+    """Tell that a file cannot be used, and what happens then."""
+    text = f"{path}: is damaged, or no file of this study; it is computed again"
+    warnings.warn(text, FoldynWarning, stacklevel=3)

@@ -8,7 +8,9 @@ record together.
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from itertools import product
@@ -17,12 +19,14 @@ from typing import Any, ClassVar
 
 import foldyn
 from foldyn.cases import CaseFile, read_case
+from foldyn.errors import InputError
+from foldyn.input_files import from_json, read_text
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO, errors
 from foldyn.studies.herkal.models import LOADS, OTHERS, REFERENCE, Variant, rules
 from foldyn.studies.herkal.partners import partners
 from foldyn.studies.herkal.program import program
-from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute
+from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, warn_of_damage
 from foldyn.studies.herkal.variations import Variations
 
 PULSES = (0.1, 0.25, 0.5, 1.0)  # s
@@ -30,6 +34,9 @@ BEND_LAWS = ("superlinear", "linear")
 CALIBRATIONS = ("standard", "merlin2")
 MODELS = (*rules(), *OTHERS)
 """What is compared with the shell: the distributions, and equi-inertial turned the other way."""
+
+MOST = 64
+"""Size of a kept file (MiB)."""
 
 
 def stiffnesses(pulse: float | None = None, loads: str = "file") -> list[Variant]:
@@ -41,6 +48,10 @@ def load_sets(case_file: CaseFile) -> tuple[str, ...]:
     """Sets of loaded nodes; one where the case file loads the whole edge."""
     loaded = {node for load in case_file.case().loads for node in getattr(load, "nodes", ())}
     return LOADS[:1] if loaded == set(case_file.output.nodes.tolist()) else LOADS
+
+
+def _digest(rows: Any) -> str:
+    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -73,16 +84,28 @@ class _Kept:
 
     def result(self, folder: Path) -> list[dict[str, Any]] | None:
         """Rows that it found; None where there are none, or some of other settings."""
-        try:
-            found = json.loads((folder / f"{self.name}.json").read_text("utf-8"))
-        except (OSError, ValueError):
+        file = folder / f"{self.name}.json"
+        if not file.exists():
             return None
-        return found["rows"] if found.get("settings") == self.settings() else None
+        try:
+            found = from_json(read_text(file, "what a study keeps", MOST, "compute it again"))
+            if found["settings"] != self.settings():
+                return None
+            if found["rows_sha256"] == _digest(found["rows"]):
+                return found["rows"]
+        except (InputError, TypeError, KeyError):
+            pass
+        warn_of_damage(file)
+        return None
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        text = json.dumps({"settings": self.settings(), "rows": list(self.rows())}, indent=1)
-        (folder / f"{self.name}.json").write_text(text + "\n", "utf-8")
+        rows = list(self.rows())
+        kept = {"settings": self.settings(), "rows": rows, "rows_sha256": _digest(rows)}
+        file = folder / f"{self.name}.json"
+        partial = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+        partial.write_text(json.dumps(kept, indent=1) + "\n", "utf-8")
+        partial.replace(file)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Compute the rows."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -13,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from foldyn import experiment, plots
-from foldyn.errors import ComputationError
+from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import Fit, History, Measurement
 from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.input_files import from_json, read_text
 from foldyn.linear import frf, modes
 from foldyn.results import netcdf, save
 from foldyn.studies.herkal import calibration, vibration
@@ -29,6 +32,13 @@ NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
 RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
+WRITES: Mapping[str, tuple[str, ...]] = {
+    "photographs": (PHOTOS,),
+    "film": (FILM, TRUTH),
+    "fit": (FOUND, COMPARED),
+    "response": (*RESPONSES.values(), MODES),
+}
+"""Files that a part leaves for others, or for the page."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +78,18 @@ class Part:
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
-        stamp = self._stamp(folder)
-        return stamp.is_file() and stamp.read_text(encoding="utf-8") == self._text()
+        try:
+            settings, kept = self._stamp(folder).read_text(encoding="utf-8").splitlines()
+            files = from_json(kept).items() if settings == self._text() else None
+        except (OSError, ValueError, AttributeError):  # not computed, or the stamp is damaged
+            return False
+        if files is None:
+            return False
+        damaged = [name for name, told in files if _digest(folder / FOLDER / name) != told]
+        if damaged:
+            text = f"{folder / FOLDER / damaged[0]}: is damaged or missing; it is computed again"
+            warnings.warn(text, FoldynWarning, stacklevel=2)
+        return not damaged
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder.
@@ -86,7 +106,9 @@ class Part:
             raise ComputationError(f"it needs {missing[0].name}, which failed")
         self._stamp(folder).unlink(missing_ok=True)
         PARTS[self.part](self, inside)
-        self._stamp(folder).write_text(self._text(), encoding="utf-8")
+        files = [inside / name for name in WRITES[self.part]]
+        kept = json.dumps({file.name: _digest(file) for file in files if file.is_file()})
+        self._stamp(folder).write_text(f"{self._text()}\n{kept}\n", encoding="utf-8")
 
     def _needed(self) -> list[Part]:
         seen, then = parts(self.shot, self.data)
@@ -232,4 +254,18 @@ PARTS: Mapping[str, Callable[[Part, Path], None]] = {
 
 def read_found(folder: Path) -> dict[str, Any]:
     """What the fits have found."""
-    return json.loads((folder / FOUND).read_text(encoding="utf-8"))
+    file = folder / FOUND
+    try:
+        found = from_json(read_text(file, "what a fit has found", 64, "compute it again"))
+        return {**found, "changes": {**found["changes"]}}
+    except (InputError, TypeError, KeyError) as error:
+        said = str(error) if isinstance(error, InputError) else "it lacks what a fit finds"
+        raise InputError(f"{file}: is damaged: {said}; remove it to compute it again") from None
+
+
+def _digest(file: Path) -> str:
+    """Digest of a file; "" where there is none."""
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError:
+        return ""

@@ -1,0 +1,94 @@
+"""A call in a process of its own: where a library crashes on damaged bytes, only that one ends."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import pickle
+import signal
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from foldyn.errors import FoldynError
+
+T = TypeVar("T")
+
+
+def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
+    """Return what a function makes, called in a fork of this process.
+
+    Elsewhere than on Linux, where a fork is not safe, it is called here.
+
+    Parameters
+    ----------
+    make : callable
+        Without arguments; what it returns can be pickled.
+    seconds : int
+        After which its process is ended.
+    memory : int
+        Bytes that it may take beside what this process has.
+
+    Raises
+    ------
+    FoldynError
+        The function raised it.
+    OSError
+        The function failed in another way, or its process crashed or took too much.
+    """
+    if sys.platform != "linux":
+        return make()
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():  # of threads, which the fork does not have and does not need
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        os.close(reading)
+        _answer(make, seconds, memory, writing)
+    os.close(writing)
+    value: Any
+    try:
+        with os.fdopen(reading, "rb") as pipe:
+            made, value = pickle.load(pipe)
+    except Exception:
+        made, value = False, OSError("its process crashed or took too much")
+    finally:
+        os.waitpid(child, 0)
+    if not made:
+        raise value
+    return value
+
+
+def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) -> None:
+    """Say what a function makes, and end this process, whatever happens."""
+    try:
+        for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        signal.alarm(seconds)
+        _limit(memory)
+        faulthandler.disable()
+        silent = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        try:
+            answer = True, make()
+        except FoldynError as error:
+            answer = False, error
+        except BaseException as error:
+            answer = False, OSError(f"{type(error).__name__}: {error}")
+        with os.fdopen(writing, "wb") as pipe:
+            pickle.dump(answer, pipe, protocol=5)
+    finally:
+        os._exit(0)
+
+
+def _limit(memory: int) -> None:
+    import resource  # there is none on Windows
+
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = pages * resource.getpagesize() + memory
+    if most == resource.RLIM_INFINITY or wanted < most:
+        resource.setrlimit(resource.RLIMIT_AS, (wanted, most))

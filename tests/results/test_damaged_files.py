@@ -1,0 +1,211 @@
+"""Damaged NetCDF files: noticed, refused with a remedy, and never read at any price."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import foldyn as fd
+from foldyn.dynamics import initial_state
+from foldyn.errors import ComputationError, InputError
+from foldyn.experiment import Model
+from foldyn.results import netcdf, seal, trajectory_dataset
+from foldyn.results.apart import apart
+
+SEAL = 80  # bytes at the end
+
+
+@pytest.fixture(scope="module")
+def motion() -> xr.Dataset:
+    pattern = fd.patterns.miura((1, 1))
+    case = fd.Case(fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1e3)), [fd.Fix("xmin")])
+    moved = np.zeros((3, len(case.structure.nodes), 3))
+    reaction = np.zeros((3, len(case.supported_dofs)))
+    return trajectory_dataset(case, [0.0, 0.1, 0.2], moved, moved, reaction, {}, {})
+
+
+@pytest.fixture
+def file(motion, tmp_path):
+    path = tmp_path / "run.nc"
+    fd.save(motion, path)
+    return path
+
+
+def unsealed(path):
+    """As older programs wrote it."""
+    path.write_bytes(path.read_bytes()[:-SEAL])
+    return path
+
+
+def refusal(path) -> str:
+    with pytest.raises(InputError) as caught:
+        fd.load(path)
+    assert str(caught.value).startswith(str(path))
+    return str(caught.value)
+
+
+def test_every_flipped_bit_shows(file, motion):
+    sound = file.read_bytes()
+    assert seal.sound(file)
+    random = np.random.default_rng(0)
+    for place in [*random.integers(0, len(sound), 60), 0, len(sound) - SEAL - 1, len(sound) - 2]:
+        damaged = bytearray(sound)
+        damaged[place] ^= 1 << int(random.integers(8))
+        file.write_bytes(damaged)
+        if seal.sound(file) is None:  # the seal itself: all before it is sound
+            assert place >= len(sound) - SEAL
+            xr.testing.assert_identical(fd.load(file), motion)
+        else:
+            assert "is damaged: its checksum does not match" in refusal(file)
+
+
+def test_files_without_a_seal_are_read(file, motion):
+    xr.testing.assert_identical(fd.load(unsealed(file)), motion)
+    assert seal.sound(file) is None
+    motion.to_netcdf(file, engine="h5netcdf")
+    xr.testing.assert_identical(fd.load(file), motion)
+
+
+def test_other_programs_read_and_change_sealed_files(file, motion):
+    xr.testing.assert_identical(xr.load_dataset(file, decode_times=False), motion)
+    with h5py.File(file, "r+") as changed:
+        changed.attrs["note"] = "mine"
+        changed["displacement"][1, 2, 0] = 0.5
+    found = fd.load(file)  # HDF5 has cut the seal off
+    assert found.attrs["note"] == "mine"
+    assert found["displacement"].values[1, 2, 0] == 0.5
+
+
+def test_a_file_cut_short_is_refused(file):
+    sound = file.read_bytes()
+    for left in (0, 5, 100, len(sound) // 2, len(sound) - SEAL - 1):
+        file.write_bytes(sound[:left])
+        assert "restore it from a copy, or compute it again" in refusal(file)
+
+
+def test_a_file_that_declares_more_than_it_holds_is_refused_at_once(tmp_path):
+    file = tmp_path / "huge.nc"
+    with h5py.File(file, "w") as made:
+        made.create_dataset("case", (3 * 10**9,), "f8")
+        made.attrs["foldyn_result"] = "trajectory"
+    assert file.stat().st_size < 8000
+    start = time.perf_counter()
+    assert "it declares 2.4e+10 bytes of numbers in a file of" in refusal(file)
+    assert time.perf_counter() - start < 3.0
+
+
+@pytest.mark.parametrize("kind", ["soft", "external", "stored elsewhere", "virtual", "group"])
+def test_nothing_but_variables_of_the_file_itself_is_read(kind, file, tmp_path):
+    with h5py.File(file, "r+") as made:
+        del made["displacement"]
+        if kind == "soft":
+            made["displacement"] = h5py.SoftLink("/velocity")
+        elif kind == "external":
+            made["displacement"] = h5py.ExternalLink("other.nc", "/displacement")
+        elif kind == "stored elsewhere":
+            made.create_dataset("displacement", (8,), "f8", external=[("/dev/zero", 0, 64)])
+        elif kind == "virtual":
+            layout = h5py.VirtualLayout((4,), "f8")
+            layout[:] = h5py.VirtualSource("/dev/zero", "x", (4,))
+            made.create_virtual_dataset("displacement", layout)
+        else:
+            made.create_group("displacement")
+    assert "displacement is not a variable in it" in refusal(file)
+
+
+def test_much_that_is_well_packed_is_read(tmp_path):
+    ds = xr.Dataset({"a": ("t", np.zeros(2_000_000))})
+    ds.to_netcdf(tmp_path / "a.nc", engine="h5netcdf", encoding={"a": {"zlib": True}})
+    assert (tmp_path / "a.nc").stat().st_size < 60_000
+    xr.testing.assert_identical(netcdf.read(tmp_path / "a.nc", ""), ds)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda ds: ds.assign_attrs(foldyn_result=1), "is damaged: its attribute `foldyn_result`"),
+        (lambda ds: ds.assign_attrs(foldyn_format="one"), "foldyn_format must be a whole number"),
+        (lambda ds: ds.assign_attrs(foldyn_format=0.5), "foldyn_format must be a whole number"),
+        (lambda ds: ds.assign(case=("few", ["a", "b"])), "its variable `case` is no text"),
+        (
+            lambda ds: ds.assign(x=((), 1.0, {"part_of_complex": "response"})),
+            "lacks its real or imaginary part",
+        ),
+    ],
+)
+def test_results_with_the_wrong_contents_are_refused(change, text, motion, tmp_path):
+    netcdf.write(change(motion), tmp_path / "run.nc")
+    assert text in refusal(tmp_path / "run.nc")
+
+
+@pytest.mark.parametrize(
+    ("make", "change", "text"),
+    [
+        (fd.case_of, lambda ds: ds.assign_attrs(rerunnable="x"), "rerunnable must be a whole"),
+        (
+            fd.case_of,
+            lambda ds: ds.assign(case=((), "a = " + "[" * 9999)),
+            "case is damaged",
+        ),
+        (
+            fd.case_of,
+            lambda ds: ds.assign(case=((), "a = " + "9" * 5000)),
+            "case is damaged",
+        ),
+        (fd.case_of, lambda ds: ds.assign(faces=ds["faces"] * 2**62), "vert|damaged"),
+        (fd.case_of, lambda ds: ds.assign(faces=ds["faces"].astype(str)), "damaged|vert"),
+        (initial_state, lambda ds: ds.assign(displacement=ds["node"]), "displacement must be numb"),
+        (
+            initial_state,
+            lambda ds: ds.assign(velocity=ds["velocity"].astype(str)),
+            "velocity must be numbers over node, axis; it has <U3",
+        ),
+        (
+            initial_state,
+            lambda ds: ds.transpose(..., "axis", "node"),
+            "displacement must be numbers over node, axis; it has float64 over axis, node",
+        ),
+        (Model.of, lambda ds: ds.isel(time=[]), "no finite displacements"),
+        (Model.of, lambda ds: ds.assign(displacement=ds["displacement"] * np.nan), "no finite"),
+        (Model.of, lambda ds: ds.assign(rest_position=ds["displacement"]), "rest|damaged"),
+    ],
+)
+def test_what_is_made_of_a_result_checks_it(make, change, text, motion):
+    with pytest.raises(InputError, match=text):
+        make(change(motion))
+
+
+# ------------------------------------------------------------------- a process of its own
+def test_a_call_apart_returns_what_it_makes_or_raises_it():
+    here = os.getpid()
+    assert apart(os.getpid, 5, 2**28) != here
+    assert apart(lambda: np.arange(3).tolist(), 5, 2**28) == [0, 1, 2]
+    with pytest.raises(ComputationError, match="told"):
+        apart(lambda: (_ for _ in ()).throw(ComputationError("told")), 5, 2**28)
+    with pytest.raises(OSError, match="KeyError: 'other'"):
+        apart(lambda: {}["other"], 5, 2**28)
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        os.abort,
+        lambda: ctypes.string_at(0),
+        lambda: os._exit(0),
+        lambda: time.sleep(60),
+        lambda: np.ones(2**26),
+    ],
+    ids=["abort", "segmentation fault", "exit", "hang", "memory"],
+)
+def test_what_crashes_or_hangs_apart_is_an_error_here(harm, capfd):
+    start = time.perf_counter()
+    with pytest.raises(OSError, match=r"crashed or took too much|MemoryError"):
+        apart(harm, 1, 2**28)
+    assert time.perf_counter() - start < 5.0
+    assert capfd.readouterr() == ("", "")
