@@ -8,9 +8,33 @@ from __future__ import annotations
 
 from typing import Any
 
+MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
+"""Limits of a message: in lines, in characters of a line, and in all."""
+
+
+def shortened(message: str) -> str:
+    """Return a message that a person can read: long ones lose lines, and the middle of lines."""
+    if len(message) <= LONGEST_LINE and message.count("\n") < MOST_LINES:
+        return message
+    end = LONGEST_LINE // 3
+    start = LONGEST_LINE - end - len(" ... ")
+    lines = message.splitlines()
+    kept: list[str] = []
+    for line in lines[:MOST_LINES]:
+        kept.append(line if len(line) <= LONGEST_LINE else f"{line[:start]} ... {line[-end:]}")
+        if sum(map(len, kept)) > LONGEST - LONGEST_LINE:
+            break
+    left = len(lines) - len(kept)
+    if left:
+        kept[-1] = f"  ... and {left + 1} lines more"
+    return "\n".join(kept)
+
 
 class FoldynError(Exception):
     """Base of everything that Foldyn raises on purpose."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
 
 
 class InputError(FoldynError, ValueError):
@@ -49,3 +73,6 @@ class MotionInterrupted(KeyboardInterrupt):
 
 class FoldynWarning(UserWarning):
     """Something works, but perhaps not as intended."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))

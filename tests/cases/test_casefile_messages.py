@@ -219,7 +219,10 @@ BAD = {
     "no duration": ([("duration = 20.0\n", "")], "analysis.duration: missing"),
     "dt": ([("# dt = 1e-3", "dt = 0")], "analysis.dt = 0: must be greater than 0"),
     "force flag": ([("# dt = 1e-3", "force = 1")], "analysis.force = 1: must be true or false"),
-    "every": ([("every = 0.01", "every = 0")], "output.every = 0: must be at least 1 (steps)"),
+    "every": (
+        [("every = 0.01", "every = 0")],
+        "output.every = 0: must be a whole number, at least 1 (steps)",
+    ),
     "every seconds": ([("every = 0.01", "every = -0.1")], "output.every = -0.1: must be greater"),
     "every truth": ([("every = 0.01", "every = true")], "output.every = true: must be a number"),
     "output axis": (

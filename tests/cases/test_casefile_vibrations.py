@@ -241,7 +241,7 @@ BAD_RESPONSE = {
     ),
     "too many frequencies": (
         [(KEYS, "{ first = 0, last = 5, count = 1000000 }")],
-        "analysis.frequencies.count = 1000000: at most 100000",
+        "analysis.frequencies.count = 1000000: must be at most 100000",
     ),
     "method": (
         [('"frf"', '"frf"\nmethod = "impuls"')],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fuzz_of_cases
+import fuzz_of_fits
 import fuzz_of_patterns
 import fuzz_of_results
 import fuzz_of_selections
@@ -11,6 +13,8 @@ from fuzz_target import Target
 TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
+        fuzz_of_cases.TARGET,
+        fuzz_of_fits.TARGET,
         fuzz_of_patterns.TARGET,
         *fuzz_of_results.TARGETS,
         fuzz_of_selections.TARGET,

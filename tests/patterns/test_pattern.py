@@ -351,14 +351,14 @@ def test_name_must_be_text():
         Pattern(SQUARES, TWO, name=5)
 
 
-@pytest.mark.parametrize("far", [-(2**63), 1e50])
+@pytest.mark.parametrize("far", [-(2**63), 1e30])
 @pytest.mark.filterwarnings("error")
 def test_vertices_may_be_far(far):
     Pattern([[0, 0, 0], [far, 0, 0], [0, far, 0]], [[0, 1, 2]])
 
 
-@pytest.mark.parametrize("far", [1e51, 1e200, 1.7e308])
+@pytest.mark.parametrize("far", [1e31, 1e200, 1.7e308])
 @pytest.mark.filterwarnings("error")
 def test_vertices_too_far_for_numbers_are_refused(far):
-    with pytest.raises(InputError, match=r"vertices\[1\] = .*at most 1e\+50 m"):
+    with pytest.raises(InputError, match=r"vertices\[1\] = .*at most 1e\+30 m"):
         Pattern([[0, 0, 0], [far, 0, 0], [0, far, 0]], [[0, 1, 2]])

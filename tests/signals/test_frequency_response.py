@@ -286,7 +286,7 @@ def test_what_is_left_at_the_end_is_unused():
         ({"dt": np.arange(100) * 0.1}, "sampling_interval"),
         ({"estimator": "h3"}, "estimator: 'h3'"),
         ({"segment": 101}, "segment: 101"),
-        ({"segment": 2}, "segment: 2"),
+        ({"segment": 2}, "segment = 2"),
         ({"overlap": 1.0}, "overlap: 1.0"),
         ({"overlap": -0.1}, "overlap: -0.1"),
         ({"window": np.ones(5)}, "window"),
@@ -303,7 +303,7 @@ def test_bad_input(arguments, words):
     ("function", "arguments", "words"),
     [
         (exponential_window, (100, 0.1, -1.0), "rate: -1.0 must be finite, above 0"),
-        (exponential_window, (0, 0.1, 1.0), "n: 0"),
+        (exponential_window, (0, 0.1, 1.0), "n = 0"),
         (without_window, (10.0, 1.2, 1.0), "damping_ratio"),
         (without_window, (10.0, 0.1, "fast"), "rate: 'fast' is not a number"),
     ],

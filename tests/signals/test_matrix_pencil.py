@@ -129,7 +129,7 @@ def test_a_long_record_goes_piece_by_piece():
         ({"x": np.full(50, np.nan)}, "x: 50 samples are NaN"),
         ({"dt": 0.0}, "dt: 0.0"),
         ({"order": 40}, "order: 40, but 100 samples with windows of 34"),
-        ({"order": 0}, "order: 0"),
+        ({"order": 0}, "order = 0"),
         ({"threshold": 2.0}, "threshold: 2.0"),
         ({"width": 100}, "width: 100"),
         ({"x": np.random.default_rng(1).normal(size=100)}, "no singular value stands above"),

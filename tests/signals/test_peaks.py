@@ -193,7 +193,7 @@ def test_bad_options():
     f, size = [0.0, 1.0, 2.0, 3.0], [0.0, 2.0, 1.0, 0.0]
     with pytest.raises(InputError, match=r"prominence: 1\.5"):
         find_peaks(f, size, prominence=1.5)
-    with pytest.raises(InputError, match="count: 0"):
+    with pytest.raises(InputError, match="count = 0"):
         find_peaks(f, size, count=0)
     with pytest.raises(InputError, match=r"ripple: -0\.1"):
         half_power(f, size, ripple=-0.1)

@@ -22,12 +22,12 @@ def case():
     [
         ({"method": "newtn"}, "choose one of newton, displacement, mgdcm, arc_length"),
         ({"load_factors": [1.0], "steps": 3}, "give one of them"),
-        ({"load_factors": [0.0, np.nan]}, "finite numbers"),
+        ({"load_factors": [0.0, np.nan]}, "finite number"),
         ({"load_factors": []}, "at least one"),
-        ({"load_factors": "all"}, "a list of numbers"),
+        ({"load_factors": "all"}, "must be numbers"),
         ({"load_factors": [0.5, 0.5]}, "number 1 repeats"),
-        ({"steps": 0}, "steps = 0: give a positive whole number"),
-        ({"steps": True}, "positive whole number"),
+        ({"steps": 0}, "steps = 0: must be a whole number, at least 1"),
+        ({"steps": True}, "whole number, at least 1"),
         ({"first_step": 0.1}, "method 'newton' goes by load_factors"),
         ({"method": "mgdcm", "load_factors": [0, 1, 2]}, "two numbers"),
         ({"method": "mgdcm", "load_factors": [1, 1]}, "begin and end must differ"),
@@ -60,12 +60,12 @@ def test_no_case():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"tolerance": 0.0}, "positive number"),
+        ({"tolerance": 0.0}, "greater than 0"),
         ({"tolerance": 0.5}, "between 1e-14 and 0.01"),
-        ({"iterations": 0}, "positive whole number"),
-        ({"target": 2.5}, "positive whole number"),
+        ({"iterations": 0}, "whole number, at least 1"),
+        ({"target": 2.5}, "whole number, at least 1"),
         ({"jump": 1.0}, "above 1"),
-        ({"largest_turn": -3}, "positive number"),
+        ({"largest_turn": -3}, "greater than 0"),
         ({"locate": 1}, "True or False"),
     ],
 )

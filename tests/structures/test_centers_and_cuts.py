@@ -182,3 +182,12 @@ def test_pattern_of_many_kinds_of_panels():
     kinds = np.sort(s.bars, axis=1).tolist()
     assert kinds[10:12] == pattern.creases.tolist()
     assert kinds[12:] == pattern.boundary.tolist()
+
+
+def test_a_panel_too_narrow_for_its_center_is_refused():
+    """Rounding hides where diagonals cross that are parallel to 1e-9; near that, it does not."""
+    for length in (1.0, 1e4):
+        center = fd.discretize(fd.patterns.simple_fold(a=length), SHEET).nodes[6]
+        np.testing.assert_allclose(center, [length / 4, 0.5, length * 0.75**0.5 / 2], rtol=1e-6)
+    with pytest.raises(InputError, match=r'^panel 0: is so narrow .* scheme = "n4b5"'):
+        fd.discretize(fd.patterns.simple_fold(a=2.0**31), SHEET)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
-from foldyn.cases.values import indices, number_or_list, show, suggest
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear
+from foldyn.values import indices, number_or_list, show, suggest
 
 SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
 """Words for creases, and the assignments that each means."""

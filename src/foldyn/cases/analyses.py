@@ -13,6 +13,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from foldyn.cases.models import MASSLESS_METHODS, SHELL
 from foldyn.cases.schema import (
     CaseSchema,
+    Count,
     LoadSection,
     ModelSection,
     Nodes,
@@ -20,11 +21,12 @@ from foldyn.cases.schema import (
     Section,
     SupportSection,
     Vector,
+    Whole,
     check_mass,
 )
 from foldyn.cases.supports import check_axis
-from foldyn.cases.values import choice, indices, number, show
 from foldyn.errors import InputError
+from foldyn.values import choice, indices, number, show, whole
 
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
@@ -47,9 +49,7 @@ MOST_SHAPES = 12
 
 def _every(value: Any) -> int | float:
     if isinstance(value, int) and not isinstance(value, bool):
-        if value < 1:
-            raise InputError(f" = {value}: must be at least 1 (steps)")
-        return value
+        return whole("", value, least=1, what="steps")
     return number("", value, above=0.0)
 
 
@@ -129,7 +129,7 @@ class DynamicsSection(Section):
 class UntilSection(Section):
     """Where a path ends: a node's displacement along an axis reaches a value."""
 
-    node: int
+    node: Whole
     axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
     displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
 
@@ -146,7 +146,7 @@ class StaticsSection(Section):
     kind: str
     method: Annotated[str, PlainValidator(lambda value: choice("", value, PATH_METHODS))] = "newton"
     load_factors: Annotated[list[float] | None, PlainValidator(_load_factors)] = None
-    steps: Annotated[int, Field(ge=1)] | None = None
+    steps: Count | None = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
     until: UntilSection | None = None
@@ -162,7 +162,7 @@ class MotionStart(Section):
     velocity: Vector = None
     spin: Vector = None
     file: Annotated[Any, PlainValidator(_result_file)] = None
-    at: int = -1
+    at: Whole = -1
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -183,7 +183,7 @@ class PathStart(Section):
     """[initial] of a path: the stored state near which its first point is sought."""
 
     file: Annotated[str, PlainValidator(_result_file)]
-    at: int = -1
+    at: Whole = -1
 
 
 class MotionOutput(Section):

@@ -18,8 +18,8 @@ from foldyn.cases.histories import History
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, BaseMotion, Fix, Impose, Support
-from foldyn.cases.values import show
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.values import show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
 

@@ -15,10 +15,10 @@ from foldyn.cases.case import Case
 from foldyn.cases.initial import Initial, rigid_motion
 from foldyn.cases.models import MODELS
 from foldyn.cases.state import State
-from foldyn.cases.values import choice, show
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.structures import Sheet
+from foldyn.values import choice, show
 
 
 @dataclass(frozen=True)

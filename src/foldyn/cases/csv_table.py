@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import shortened, show, suggest
 from foldyn.errors import InputError
 from foldyn.input_files import read_text
+from foldyn.values import shortened, show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),

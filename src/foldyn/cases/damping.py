@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from foldyn.cases.values import choice, number
+from foldyn.values import choice, number
 
 STATES = ("rest", "start")
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from foldyn.cases.histories import HISTORIES, History, Table
-from foldyn.cases.values import choice, number, show, suggest
 from foldyn.errors import InputError
+from foldyn.values import choice, number, show, suggest, whole
 
 
 def history_from(table: Any, folder: Path | None = None) -> History:
@@ -126,9 +126,7 @@ def _checked(place: str, value: Any, hint: Any) -> Any:
     if hint is float:
         return number(place, value)
     if hint is int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise InputError(f"{place} = {show(value)}: must be a whole number")
-        return value
+        return whole(place, value)
     if hint in (str, bool):
         if not isinstance(value, hint):
             what = "text" if hint is str else "true or false"

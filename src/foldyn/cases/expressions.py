@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import warnings
 
-from foldyn.cases.values import shortened
 from foldyn.errors import InputError
+from foldyn.values import shortened
 
 LONGEST = 1000
 """Characters of an expression."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases.histories import Constant, History
 from foldyn.cases.history import set_field
-from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
+from foldyn.values import numbers, show
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import ClassVar
 from foldyn.cases import waveforms
 from foldyn.cases.history import Formula, History, check_flag, set_field
 from foldyn.cases.table import Table
-from foldyn.cases.values import number
 from foldyn.errors import InputError
+from foldyn.values import number
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import waveforms
-from foldyn.cases.values import show
 from foldyn.errors import InputError
+from foldyn.values import show
 
 
 class History(ABC):

@@ -9,8 +9,8 @@ import numpy as np
 from foldyn.cases.case import Case
 from foldyn.cases.state import State
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import show
 from foldyn.errors import InputError
+from foldyn.values import show
 
 TOLERANCE = 1e-9
 """Velocity of a supported node, relative to the largest, that counts as rounding."""

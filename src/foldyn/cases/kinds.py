@@ -9,9 +9,9 @@ from pydantic import BeforeValidator
 
 from foldyn.cases.analyses import MotionSchema, PathSchema
 from foldyn.cases.schema import CaseSchema
-from foldyn.cases.values import choice
 from foldyn.cases.vibrations import FrfSchema, ModesSchema
 from foldyn.errors import InputError
+from foldyn.values import choice
 
 KINDS: Mapping[str, type[CaseSchema]] = {
     "dynamics": MotionSchema,

@@ -9,7 +9,7 @@ from typing import Any
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.values import vector
+from foldyn.values import vector
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from foldyn.cases.decode import unknown_key
-from foldyn.cases.values import nearest, show
+from foldyn.values import SHOWN, nearest, show
 
+MOST_LINES = 12
+"""Errors that are told one by one."""
 _TEXTS = {
     "missing": "missing; give its value",
     "float_type": "must be a number",
@@ -35,14 +37,17 @@ def describe(
     items = error.errors(include_url=False, include_context=True)
     unknown = [item for item in items if item["type"] == "extra_forbidden"]
     # a misspelled key is also missing under its right name: say it once, and first
-    meant = {(*item["loc"][:-1], _meant(item["loc"], schema)) for item in unknown}
+    meant = {(*item["loc"][:-1], _meant(item["loc"], schema)) for item in unknown[:MOST_LINES]}
     rest = [
         item
         for item in items
         if item["type"] != "extra_forbidden"
         and not (item["type"] == "missing" and item["loc"] in meant)
     ]
-    lines = [_line(item, schema, kinds) for item in [*unknown, *rest]]
+    found = [*unknown, *rest][:MOST_LINES]
+    lines = [_line(item, schema, kinds) for item in found]
+    if len(unknown) + len(rest) > MOST_LINES:
+        lines.append(f"{len(unknown) + len(rest) - MOST_LINES} more")
     return "\n  also ".join(dict.fromkeys(lines))
 
 
@@ -50,7 +55,8 @@ def dotted(location: Sequence[str | int]) -> str:
     """Path of a key: ("loads", 0, "nodes") becomes "loads[0].nodes"."""
     text = ""
     for part in location:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+        word = f"[{part}]" if isinstance(part, int) else part[:SHOWN]
+        text += f".{word}" if text and isinstance(part, str) else word
     return text
 
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from foldyn.cases.values import choice
 from foldyn.shells import ShellOptions, shell
 from foldyn.shells.shell import MASSES
 from foldyn.structures import MASS_RULES, ModelOptions, discretize
+from foldyn.values import choice
 
 BARS_AND_HINGES = "bars_and_hinges"
 SHELL = "shell"

@@ -20,6 +20,7 @@ from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import call_from
 from foldyn.cases.initial import Initial
 from foldyn.cases.kinds import KINDS, schema_of
+from foldyn.cases.limits import check_values
 from foldyn.cases.loads import Force, Gravity
 from foldyn.cases.messages import describe
 from foldyn.cases.models import MODELS, SHELL, remodeled
@@ -147,7 +148,9 @@ def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
     text = read_text(path, "a case file (TOML)", MOST, "put long tables into files of their own")
     try:
-        return from_toml(text)
+        document = from_toml(text)
+        check_values(document)
+        return document
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 

@@ -27,11 +27,11 @@ from foldyn.cases.histories import History
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import check_axis, check_per_node
-from foldyn.cases.values import choice, number, numbers, show, vector
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.structures.options import CALIBRATIONS, SCHEMES
+from foldyn.values import MOST, choice, number, numbers, show, vector
 
 
 class Section(BaseModel):
@@ -128,6 +128,8 @@ def _history(value: Any, info: ValidationInfo) -> History:
 
 
 Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1, le=MOST)]
+Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
 Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
 Creases = Annotated[Any, PlainValidator(lambda value: check_creases("", value))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
@@ -152,7 +154,7 @@ class ModelSection(Section):
 
     kind: Annotated[str, PlainValidator(lambda value: choice("", value, MODELS))] = BARS_AND_HINGES
     scheme: Annotated[Any, PlainValidator(lambda value: choice("", value, SCHEMES))] = None
-    divisions: Annotated[int, Field(ge=1)] | None = None
+    divisions: Count | None = None
     mass: Annotated[list[str] | None, PlainValidator(_masses)] = None
     bar_law: BarLawSpec = None
     fold_law: HingeLawSpec = None

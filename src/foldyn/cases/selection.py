@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases.expressions import parse, written
-from foldyn.cases.values import indices, shortened, show
 from foldyn.errors import InputError
+from foldyn.values import indices, shortened, show
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from foldyn.cases.values import numbers
 from foldyn.errors import InputError
+from foldyn.values import numbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from typing import Any
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.values import number, number_or_list, show
 from foldyn.errors import InputError
+from foldyn.values import number, number_or_list, show
 
 AXES = "xyz"
 

@@ -13,8 +13,8 @@ from scipy.interpolate import CubicSpline
 from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
 from foldyn.cases.history import Formula, check_flag, set_field
-from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
+from foldyn.values import SMALLEST, numbers, show
 
 SHARP = 0.01  # of the range of a table: how far a sharp corner leads away from a straight line
 
@@ -50,7 +50,7 @@ class Table(Formula):
                 f"values = {show(self.values)}: must be a list of as many numbers as times "
                 f"({times.size})"
             )
-        back = np.flatnonzero(np.diff(times) <= 0.0)
+        back = np.flatnonzero(np.diff(times) < SMALLEST)
         if back.size:
             i = int(back[0]) + 1
             raise InputError(

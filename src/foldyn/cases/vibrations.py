@@ -25,6 +25,7 @@ from foldyn.cases.decode import check_keys
 from foldyn.cases.models import SHELL
 from foldyn.cases.schema import (
     CaseSchema,
+    Count,
     LoadSection,
     Nodes,
     Positive,
@@ -33,8 +34,8 @@ from foldyn.cases.schema import (
     Vector,
 )
 from foldyn.cases.supports import check_axis
-from foldyn.cases.values import choice, indices, number, show
 from foldyn.errors import InputError
+from foldyn.values import MOST, choice, indices, number, show, whole
 
 STATES = ("rest", "equilibrium")
 """States about which a case file may have its structure vibrate, beside a stored one."""
@@ -124,11 +125,7 @@ def _range(table: dict[str, Any]) -> NDArray[np.float64]:
             raise InputError(f".{key}: missing; give first and last (Hz) and their count")
     first = number(".first", table["first"], least=0.0)
     last = number(".last", table["last"], above=first)
-    count = table["count"]
-    if isinstance(count, bool) or not isinstance(count, int) or count < 2:
-        raise InputError(f".count = {show(count)}: must be a whole number, at least 2")
-    if count > MOST_FREQUENCIES:
-        raise InputError(f".count = {count}: at most {MOST_FREQUENCIES}")
+    count = whole(".count", table["count"], least=2, most=MOST_FREQUENCIES)
     return np.linspace(first, last, count)
 
 
@@ -143,7 +140,7 @@ class ModesSection(Section):
     """[analysis] of kind "modes": arguments of `modes`."""
 
     kind: str
-    count: Annotated[int, Field(ge=1)] = 6
+    count: Count = 6
     state: Annotated[str, _one_of(STATES)] = "rest"
     secant: Secant = None
 
@@ -157,22 +154,22 @@ class FrfSection(Section):
     state: Annotated[str, _one_of(STATES)] = "rest"
     secant: Secant = None
     amplitude: Positive = 1.0
-    count: Annotated[int, Field(ge=1)] | None = None
+    count: Count | None = None
     static_correction: bool = True
     integrator: Annotated[str | None, _one_of(METHODS)] = None
     dt: Positive | None = None
     tolerance: Positive | None = None
-    iterations: Annotated[int, Field(ge=2)] = 300
+    iterations: Annotated[int, Field(ge=2, le=MOST)] = 300
     pulse: Positive | None = None
     duration: Positive | None = None
     every: Positive | None = None
     window_rate: Annotated[float, Field(ge=0)] = 0.0
-    cycles: Annotated[int, Field(ge=2)] = 4
+    cycles: Annotated[int, Field(ge=2, le=MOST)] = 4
     settled: Positive = 1e-3
-    most_cycles: Annotated[int, Field(ge=1)] = 400
+    most_cycles: Count = 400
     sweep: Annotated[str, _one_of(SWEEPS)] = "up"
-    averages: Annotated[int, Field(ge=2)] = 8
-    seed: Annotated[int, Field(ge=0)] = 0
+    averages: Annotated[int, Field(ge=2, le=MOST)] = 8
+    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
     burst: Annotated[float, Field(gt=0, lt=1)] = 0.5
     estimator: Annotated[str, _one_of(ESTIMATORS)] = "h1"
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, held
+from foldyn.cli.force import add_force
 from foldyn.cli.speech import speech
 from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, InputError
@@ -69,6 +70,7 @@ def add_fit(commands: Any) -> None:
         "--no-figures", action="store_true", help="write the numbers only, no figures and report"
     )
     fit.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    add_force(fit)
 
 
 def run_fit(given: argparse.Namespace) -> Path:

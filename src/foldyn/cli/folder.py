@@ -271,7 +271,7 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
 def reason(error: BaseException) -> str:
     """What an error says; of one of the system what it was about, without its number."""
     if isinstance(error, MemoryError):
-        return "not enough memory: take fewer cells or samples"
+        return "not enough memory: take fewer cells, divisions, steps or samples"
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror

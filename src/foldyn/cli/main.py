@@ -11,15 +11,17 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
+from foldyn.cli.force import add_force
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.track import add_track, track
-from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
+from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
@@ -27,11 +29,16 @@ SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 REPLACE = "replace results of another case file or command that the folder holds"
 
 
+class _Parser(argparse.ArgumentParser):
+    """One whose messages have a length."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(shortened(message))
+
+
 def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
-    top = argparse.ArgumentParser(
-        prog="foldyn", description="Statics and dynamics of origami structures."
-    )
+    top = _Parser(prog="foldyn", description="Statics and dynamics of origami structures.")
     top.add_argument("--version", action="version", version=f"foldyn {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -126,6 +133,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
         "--divisions", type=int, metavar="N", help="pieces of every edge of a shell (16)"
     )
     command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    add_force(command)
 
 
 def _add_state(command: argparse.ArgumentParser) -> None:
@@ -160,7 +168,8 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings()
-            _call(given)
+            with at_most(1.0 if getattr(given, "force", True) else HALF):
+                _call(given)
     except InputError as error:
         return _say(str(error), BAD_INPUT)
     except ComputationError as error:

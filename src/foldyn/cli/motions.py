@@ -73,7 +73,7 @@ class Motions:
     """All motions of a case file; see `cli.runs.Task`."""
 
     def __init__(self, case_file: CaseFile, figures: bool) -> None:
-        from foldyn.dynamics.timing import check_memory
+        from foldyn.dynamics.timing import check_samples
 
         self.case_file = case_file
         motions = {rule: MotionRun(case_file, rule, figures) for rule in case_file.masses}
@@ -81,10 +81,11 @@ class Motions:
         self._motions = list(motions.values())
         case = case_file.case()
         try:  # all of them together
-            check_memory(
+            check_samples(
                 sum(run.motion.expected_samples for run in motions.values()),
                 len(case.structure.nodes),
                 len(case.supported_dofs),
+                len(motions),
             )
         except InputError as error:
             raise InputError(f"{case_file.path}: {with_key(str(error))}") from None

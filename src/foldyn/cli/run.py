@@ -93,6 +93,7 @@ def _computed(
             raise failed from None
         _keep(done[name], one, results)
         say(one.line(done[name]))
+        _tell_missing(one.place, done[name], say)
     return done
 
 
@@ -100,6 +101,16 @@ def _keep(result: xarray.Dataset, one: Run, results: Results) -> None:
     from foldyn.results import save
 
     results.keep(one.file, partial(save, result))
+
+
+def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
+    """Say which values a result lacks; it has failed where it may lack none."""
+    from foldyn.results.missing import REASONS, told
+
+    for name, text in told(result).items():
+        if name not in REASONS:
+            raise ComputationError(f"{place}{name}: {text}", result)
+        say(f"  {name}: {text}")
 
 
 def _drawn(path: Path, task: Task, done: Mapping[str, xarray.Dataset], folder: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -14,6 +15,8 @@ from foldyn.cli.signals import ENDINGS
 from foldyn.cli.speech import speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.studies import find_case
+from foldyn.values import number
+from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
 if TYPE_CHECKING:
@@ -135,7 +138,7 @@ def numbers(name: str, text: str, count: int | None = None) -> list[float]:
         raise InputError(f"{name} {text}: {len(values)} numbers; {count} are needed")
     if not all(map(math.isfinite, values)):
         raise InputError(f"{name} {text}: every number must be finite")
-    return values
+    return [number(name, value) for value in values]
 
 
 def wholes(name: str, text: str, count: int | None = None) -> list[int]:
@@ -144,7 +147,7 @@ def wholes(name: str, text: str, count: int | None = None) -> list[int]:
     for value in values:
         if not value.is_integer():
             raise InputError(f"{name} {text}: {value:g} is not a whole number")
-    return [int(value) for value in values]
+    return [whole_number(name, int(value)) for value in values]
 
 
 def model_of(name: str) -> Model:
@@ -189,9 +192,9 @@ def _are_photos(inputs: Sequence[str]) -> bool:
     if not any(photos) and len(inputs) > 1:
         raise InputError(f"{inputs[1]}: one film at a time")
     for name in inputs:
-        if Path(name).is_dir():
+        if os.path.isdir(name):
             raise InputError(f"{name}: is a folder; give a film, or all photographs in it")
-        if not Path(name).is_file():
+        if not os.path.isfile(name):
             raise InputError(f"{name}: there is no such file")
     if photos == [True]:
         raise InputError(

@@ -6,7 +6,6 @@ import math
 import warnings
 from dataclasses import replace
 from functools import partial
-from numbers import Real
 from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_func
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
-    check_memory,
+    check_samples,
     counted_in_seconds,
     expected_samples,
     fixed_steps,
@@ -33,11 +32,14 @@ from foldyn.dynamics.timing import (
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.statics.fill import check_fill
+from foldyn.values import number
 
 if TYPE_CHECKING:
     import xarray
 
 DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost their digits
 MANY_STEPS = 20_000_000  # beyond which the user is told before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
@@ -148,8 +150,7 @@ def prepare(
         raise InputError(
             "supports: hold every node along x, y and z, so that nothing can move: free one"
         )
-    if isinstance(start, bool) or not isinstance(start, Real) or not math.isfinite(start):
-        raise InputError(f"start = {start!r}: give a finite time (s)")
+    start = number("start", start, unit="s")
     u, v = check_start(case, initial)
     reason = ""
     if method == AUTO:
@@ -165,12 +166,19 @@ def prepare(
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, method, u, critical)
     warn_of_unstable_damping(case, u)
+    if plan.dt < SHARPEST * abs(plan.start):
+        raise InputError(
+            f"start = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
+            "nearer to 0"
+        )
     if not force and plan.dt > critical:
         raise InputError(
             f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
             "one or leave dt out (force = true integrates all the same)"
         )
-    check_memory(expected_samples(plan), len(u), len(case.supported_dofs))
+    check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
+    if integrator.implicit:
+        check_fill(case.structure)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
         memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY
@@ -200,10 +208,8 @@ def _with_radius(method: Method, spectral_radius: float | None) -> Method:
             f"spectral_radius = {spectral_radius!r}: {method.name} has none; leave it out, or "
             "choose generalized_alpha"
         )
-    number = isinstance(spectral_radius, Real) and not isinstance(spectral_radius, bool)
-    if not number or not 0.0 <= spectral_radius <= 1.0:
-        raise InputError(f"spectral_radius = {spectral_radius!r}: give a number from 0 to 1")
-    return method._replace(scheme=generalized_alpha.scheme(float(spectral_radius)))
+    radius = number("spectral_radius", spectral_radius, least=0.0, most=1.0)
+    return method._replace(scheme=generalized_alpha.scheme(radius))
 
 
 def _plan(

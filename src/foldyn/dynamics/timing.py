@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from numbers import Integral, Real
 
 import numpy as np
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Plan
 from foldyn.errors import InputError
+from foldyn.memory import check_memory
+from foldyn.values import number, show, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
@@ -20,12 +21,7 @@ NO_STOPS = np.zeros(0)
 
 def positive(name: str, value: object) -> float:
     """Return a positive finite number, or refuse it."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} = {value!r}: give a number (s)")
-    number = float(value)
-    if not (math.isfinite(number) and number > 0.0):
-        raise InputError(f"{name} = {value}: must be finite and greater than 0")
-    return number
+    return number(name, value, above=0.0)
 
 
 def fixed_steps(
@@ -96,10 +92,9 @@ def expected_samples(plan: Plan) -> int:
 def counted_in_seconds(duration: float, every: int | float) -> bool:
     """Whether a sampling interval is in seconds; refuses one that fits no motion."""
     if isinstance(every, bool) or not isinstance(every, Real):
-        raise InputError(f"every = {every!r}: an int counts steps, a float is seconds")
+        raise InputError(f"every = {show(every)}: an int counts steps, a float is seconds")
     if isinstance(every, Integral):
-        if every < 1:
-            raise InputError(f"every = {every}: must be at least 1 step")
+        whole("every", every, least=1, what="steps")
         return False
     if positive("every", every) > duration * (1.0 + 1e-9):
         raise InputError(f"every = {every:g} s: longer than the duration of {duration:g} s")
@@ -122,15 +117,10 @@ def _check_count(duration: float, dt: float) -> None:
         )
 
 
-def check_memory(samples: int, nodes: int, supported: int) -> None:
-    """Refuse an output that would not fit in memory, before anything is computed."""
-    needed = 8.0 * samples * (6 * nodes + supported + 6)
-    try:
-        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return
-    if needed > 0.8 * available:
-        raise InputError(
-            f"every: {samples:.3g} samples of {nodes} nodes need {needed / 2**30:.3g} GiB of "
-            f"{available / 2**30:.3g} GiB: raise it"
-        )
+def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) -> None:
+    """Refuse an output that memory cannot hold, before anything is computed."""
+    together = f" of {motions} mass rules" if motions > 1 else ""
+    check_memory(
+        "every", f"{samples:.3g} samples of {nodes} nodes{together}",
+        8.0 * samples * (6 * nodes + supported + 6), "raise it, or shorten the duration",
+    )  # fmt: skip

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import choice, number
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
 from foldyn.linear.answer import Answer
-from foldyn.linear.records import record_of, smooth_history, transform
+from foldyn.linear.records import check_records, record_of, smooth_history, transform
 from foldyn.linear.time_domain import Integration, Rig, overall
+from foldyn.values import choice, number, whole
 
 PER_CYCLE = 20  # samples in a cycle of the highest frequency
 BAND = (0.8, 1.2)  # of the lowest and the highest frequency: what is excited
@@ -55,9 +55,7 @@ class BurstRandom(Integration):
         """Check the arguments."""
         super().__post_init__()
         for name, least in (("averages", 2), ("seed", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise InputError(f"{name} = {value!r}: must be a whole number, at least {least}")
+            whole(name, getattr(self, name), least=least)
         if not 0.0 < number("burst", self.burst) < 1.0:
             raise InputError(f"burst = {self.burst}: must be a part of the record, between 0 and 1")
         choice("estimator", self.estimator, ESTIMATORS)
@@ -79,6 +77,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     quiet = 1.0 - options.burst
     every = 1.0 / (PER_CYCLE * float(frequency[-1])) if options.every is None else options.every
     record = record_of(frequency, alpha, quiet, every, options.duration)
+    check_records("averages", record, options.averages, len(rig.state))
     count = int(options.burst * record.samples)
     random = np.random.default_rng(options.seed)
     drives = np.zeros((options.averages, record.length))

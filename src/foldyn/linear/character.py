@@ -17,7 +17,6 @@ shares add up to 1; a small negative one can occur where sections are not symmet
 
 from __future__ import annotations
 
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
+from foldyn.values import whole
 
 if TYPE_CHECKING:
     import xarray
@@ -180,6 +180,4 @@ def _nodes(given: Any, structure: Any) -> NDArray:
 def _stations(given: int | None, nodes: int) -> int:
     if given is None:
         return max(2, min(MOST_STATIONS, nodes // NODES_PER_STATION))
-    if isinstance(given, bool) or not isinstance(given, Integral) or int(given) < 1:
-        raise InputError(f"stations = {given!r}: give a positive whole number")
-    return int(given)
+    return whole("stations", given, least=1)

@@ -81,7 +81,7 @@ def solve(matrix: sparse.csc_array, load: NDArray) -> NDArray[np.complex128]:
     if not np.isfinite(solution).all():
         return lost
     size = np.abs(solution)
-    phase = solution / np.where(size > 0.0, size, 1.0)
+    phase = solution / np.where(size > np.finfo(float).tiny, size, 1.0)
     change = factors.solve(_EPS * phase * (abs(matrix) @ size))
     if not np.abs(change).max() <= LOST * size.max():
         return lost

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case, Constant, Force
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import show
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.values import show
 
 
 @dataclass(frozen=True, eq=False)

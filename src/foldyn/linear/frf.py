@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import BaseMotion, Case, Force, State
-from foldyn.cases.values import choice, number, numbers, suggest
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.answer import Answer
@@ -29,7 +28,9 @@ from foldyn.linear.pencil import Pencil
 from foldyn.linear.stepped_sine import SteppedSine, stepped_sine
 from foldyn.linear.time_domain import Rig
 from foldyn.linear.transmissibility import absolute
+from foldyn.memory import check_memory
 from foldyn.results import frf_dataset
+from foldyn.values import choice, number, numbers, suggest
 
 if TYPE_CHECKING:
     import xarray
@@ -62,6 +63,7 @@ METHODS: Mapping[str, Method] = {
     )
 }
 
+COPIES = 4  # of the response, while it is found and stored
 _MORE: Mapping[str, tuple[tuple[str, ...], str, str]] = {
     "coherence": (("frequency", "node", "axis"), "1", "coherence"),
     "swing": (("frequency",), "degrees", "largest amplitude of a superlinear hinge"),
@@ -161,6 +163,10 @@ def frf(
     how = METHODS[choice("method", method, METHODS)]
     chosen = _options(how, options)
     frequency = _frequencies(frequencies, how)
+    check_memory(
+        "frequencies", f"the response at {len(frequency)} frequencies",
+        16.0 * COPIES * len(frequency) * case.structure.nodes.size, "take fewer",
+    )  # fmt: skip
     driven = drive_of(case, drive, number("amplitude", amplitude, above=0.0))
     report, close = reporter(progress)
     began = time.perf_counter()

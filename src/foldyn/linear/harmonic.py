@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.cases.values import number
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
@@ -34,6 +33,7 @@ from foldyn.linear.transmissibility import drive_factor, drive_shape
 from foldyn.materials import Superlinear
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.structures import Structure
+from foldyn.values import number, whole
 
 REFERENCE = 1.0  # degrees: the swing for which the slopes stand in the system that is given
 DEPTH = 5  # iterations that the acceleration looks back on
@@ -62,9 +62,7 @@ class HarmonicBalance:
     def __post_init__(self) -> None:
         """Check the arguments."""
         number("tolerance", self.tolerance, above=0.0)
-        count = self.iterations
-        if isinstance(count, bool) or not isinstance(count, int) or count < 2:
-            raise InputError(f"iterations = {count!r}: must be a whole number, at least 2")
+        whole("iterations", self.iterations, least=2)
 
 
 def harmonic(

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import number
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
 from foldyn.linear.answer import Answer
-from foldyn.linear.records import Record, record_of, smooth_history, transform
+from foldyn.linear.records import Record, check_records, record_of, smooth_history, transform
 from foldyn.linear.time_domain import Integration, Rig
+from foldyn.values import number
 
 PER_PULSE = 10  # samples in the pulse
 WIDTH = 0.5  # of a cycle of the highest frequency: the pulse
@@ -67,6 +67,7 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     pulse = width if options.pulse is None else options.pulse
     every = min(pulse, width) / PER_PULSE if options.every is None else options.every
     record = record_of(frequency, rig.case.damping.alpha, 1.0, every, options.duration)
+    check_records("duration", record, 1, len(rig.state))
     factor = _pulse(float(frequency[-1]), pulse, record)
     history = smooth_history(factor, record.every)
     _, response, _ = rig.run(history, record.duration, record.every, report)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,8 @@ from foldyn.linear.secant import equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.mechanics import BarsHinges
 from foldyn.statics.body import BarsHingesBody, Body, body_of
+from foldyn.statics.fill import check_fill
+from foldyn.values import number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
 # (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
@@ -99,6 +100,7 @@ def linearize(
     """
     amplitude = _amplitude(secant)
     check_mass(case.structure.mass, case.fixed)
+    check_fill(case.structure)
     where = station(case, state, load_factor)
     body = where.body
     free = np.concatenate([case.free_dofs, body.hidden])
@@ -125,11 +127,7 @@ def linearize(
 def _amplitude(secant: float | None) -> float | None:
     if secant is None:
         return None
-    if isinstance(secant, bool) or not isinstance(secant, Real):
-        raise InputError(f"secant = {secant!r}: give an amplitude in degrees, or leave it out")
-    if not (math.isfinite(secant) and 0.0 < secant <= 180.0):
-        raise InputError(f"secant = {secant!r}: give an amplitude between 0 and 180 degrees")
-    return math.radians(secant)
+    return math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
 
 
 def _slope_change(

@@ -18,6 +18,7 @@ from foldyn.linear.linearized import Linearized
 from foldyn.linear.pencil import Pencil
 from foldyn.linear.rigid_modes import rigid_space, unresisted
 from foldyn.linear.transmissibility import drive_factor, drive_shape
+from foldyn.values import whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
 BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
@@ -41,10 +42,8 @@ class Modal:
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        count = self.count
-        whole = not isinstance(count, bool) and isinstance(count, int | np.integer)
-        if count is not None and (not whole or count < 1):
-            raise InputError(f"count = {count!r}: give a positive whole number of modes")
+        if self.count is not None:
+            whole("count", self.count, least=1, what="modes")
         if not isinstance(self.static_correction, bool):
             raise InputError(f"static_correction = {self.static_correction!r}: give True or False")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 import warnings
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +16,14 @@ from foldyn.linear.linearized import Linearized, linearize
 from foldyn.linear.participation import free_mass, participation_factors
 from foldyn.linear.pencil import Pencil
 from foldyn.linear.rigid_modes import rigid_share, rigid_space, unresisted
+from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
+from foldyn.values import whole
 
 if TYPE_CHECKING:
     import xarray
 
+COPIES = 4  # of the shapes, while they are found and stored
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one
 
 
@@ -85,18 +87,21 @@ def modes(
         The state is no equilibrium, or an unstable one; loads do not act at rest; hinges have no
         slope; a mode was missed.
     """
-    if isinstance(count, bool) or not isinstance(count, Integral) or int(count) < 1:
-        raise InputError(f"count = {count!r}: give a positive whole number")
+    count = whole("count", count, least=1)
+    check_memory(
+        "count", f"{float(count):.3g} modes", 8.0 * COPIES * count * case.structure.nodes.size,
+        "take fewer",
+    )  # fmt: skip
     began = time.perf_counter()
     linear = linearize(case, state, secant, load_factor)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
     if count > pencil.finite:
         raise InputError(f"count = {count}: the case has only {pencil.finite} free dofs")
     space = rigid_space(linear)
-    found = lowest(pencil, int(count), unresisted(linear, space), verify)
+    found = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(found)
     statistics = {
-        "count": int(count),
+        "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
         "free_dofs": pencil.finite,

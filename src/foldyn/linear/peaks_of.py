@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.supports import AXES, check_axis
-from foldyn.cases.values import choice
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.linear.quantity import PER_FORCE, convert, quantity_of
 from foldyn.signals import (
@@ -22,6 +21,7 @@ from foldyn.signals import (
     half_power,
     without_window,
 )
+from foldyn.values import choice
 
 if TYPE_CHECKING:
     import xarray

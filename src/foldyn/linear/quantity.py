@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from foldyn.cases.values import choice
 from foldyn.errors import InputError
 from foldyn.results.frf import RESPONSES
 from foldyn.signals import convert_response
+from foldyn.values import choice
 
 if TYPE_CHECKING:
     import xarray

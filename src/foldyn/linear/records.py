@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Table
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.memory import check_memory
 from foldyn.signals import exponential_window, frequency_response
 
 MOST_LINES = 100  # of the frequencies' spacing: how fine a spacing may be that holds them all
 DECAYED = 1e-5  # what damping leaves of a motion within the default duration
+COPIES = 4  # of the samples, while their spectra are taken
 FEWEST = 4  # samples in a cycle of the highest frequency
 LEFT = 1e-3  # of the largest response: what may be left at the end of a record
 END = 0.05  # of the record: where that is looked for
@@ -76,6 +78,12 @@ def record_of(
     check_resolved(frequency, every)
     samples = min(math.ceil(duration / every * (1.0 - 1e-9)), length)
     return Record(every, samples, length, np.rint(frequency * whole).astype(np.int64))
+
+
+def check_records(field: str, record: Record, count: int, nodes: int) -> None:
+    """Refuse records that memory cannot hold."""
+    what = f"{float(count):.3g} records of {float(record.length):.3g} samples of {nodes} nodes"
+    check_memory(field, what, 8.0 * COPIES * count * record.length * 3 * nodes, "take fewer")
 
 
 def check_resolved(frequency: NDArray, every: float) -> None:
@@ -145,7 +153,8 @@ def transform(
         responses *= window[:, None, None]
     size = np.abs(responses).max(axis=(2, 3))
     end = slice(int((1.0 - END) * record.samples), record.samples)
-    left = float((size[:, end].max(axis=1) / size.max(axis=1)).max())
+    whole = size.max(axis=1)
+    left = float((size[:, end].max(axis=1) / np.where(whole > 0.0, whole, 1.0)).max())
     if left > LEFT:
         decay = 2.0 * np.log(1.0 / LEFT) / record.duration
         warnings.warn(

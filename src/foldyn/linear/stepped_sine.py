@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Harmonic, State
-from foldyn.cases.values import choice, number
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.answer import Answer
 from foldyn.linear.time_domain import Integration, Rig
 from foldyn.signals import stepped_sine as response_per_drive
+from foldyn.values import choice, number, whole
 
 PER_CYCLE = 32  # samples in a cycle
 SLOWEST = 0.99  # ratio of successive changes above which no decay is seen
@@ -49,9 +49,7 @@ class SteppedSine(Integration):
         """Check the arguments."""
         super().__post_init__()
         for name, least in (("cycles", 2), ("most_cycles", 3 * self.cycles)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise InputError(f"{name} = {value!r}: must be a whole number, at least {least}")
+            whole(name, getattr(self, name), least=least)
         number("settled", self.settled, above=0.0)
         choice("sweep", self.sweep, ("up", "down"))
 

@@ -23,12 +23,12 @@ from foldyn.cases import (
     resolve_nodes,
 )
 from foldyn.cases.supports import AXES, Support
-from foldyn.cases.values import choice, number
 from foldyn.dynamics import METHODS, Progress, simulate
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.equilibrium import Station
 from foldyn.linear.excitation import Drive
 from foldyn.shells import Shell
+from foldyn.values import choice, number
 
 
 @dataclass(frozen=True)

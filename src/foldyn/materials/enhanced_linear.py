@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
+from foldyn.values import number
 
 TWO_PI = 2.0 * math.pi
 HALF_PI = 0.5 * math.pi
@@ -100,9 +100,7 @@ class EnhancedLinear(HingeLaw):
 
     def __post_init__(self) -> None:
         for field in ("theta1", "theta2"):
-            value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise InputError(f"EnhancedLinear: {field} = {value!r}: give a number (degrees)")
+            number(f"EnhancedLinear: {field}", getattr(self, field), unit="degrees")
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
                 f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "

@@ -66,6 +66,8 @@ def kresling(
     """
     sides = arguments.count("kresling", "sides", sides, 3)
     storeys = arguments.count("kresling", "storeys", storeys, 1)
+    fields = f"sides = {sides}, storeys = {storeys}"
+    arguments.check_size("kresling", fields, (storeys + 1) * sides)
     radius = arguments.length("kresling", "radius", radius)
     height = arguments.length("kresling", "height", height)
     remedy = f": beyond, the panels of a tower with {sides} sides pass through its axis"

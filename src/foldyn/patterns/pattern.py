@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry
 from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
+from foldyn.values import LONGEST, SHORTEST
 
-FARTHEST = 1e50
-"""Largest coordinate (m): squares of areas are numbers still."""
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
 _CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
 _LETTERS = ("M", "V", "F", "U")
@@ -166,13 +165,18 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
             f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
         )
     far = np.abs(points.astype(np.float64)).max(axis=1)
-    if far.max() > FARTHEST:
+    if far.max() > LONGEST:
         v = int(far.argmax())
         raise InputError(
-            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {FARTHEST:g} m."
+            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {LONGEST:g} m."
         )
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points
+    size = float(np.ptp(result, axis=0).max())
+    if 0.0 < size < SHORTEST:
+        raise InputError(
+            f"vertices: they span {size:.3g} m: give coordinates that span at least {SHORTEST:g} m."
+        )
     return result
 
 

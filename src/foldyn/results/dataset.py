@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import HISTORIES, Case, Fix
 from foldyn.cases.document import Document, to_document
+from foldyn.results.missing import with_reason
 
 FORMAT = 1
 """Number of the layout of results, raised when older programs could not read a new one."""
@@ -135,7 +136,8 @@ def result_dataset(
         "support_node": ("support", support // 3),
         "support_axis": ("support", AXIS[support % 3]),
     }
-    return xr.Dataset({**data, **_case_variables(document)}, coordinates, attributes)
+    reasoned = {name: with_reason(name, values) for name, values in data.items()}
+    return xr.Dataset({**reasoned, **_case_variables(document)}, coordinates, attributes)
 
 
 def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.values import show, whole
 
 Window: TypeAlias = str | tuple | ArrayLike | None
 
@@ -107,8 +108,8 @@ def checked_number(
     """Return `value` as a finite float within the bounds."""
     try:
         number = float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: {value!r} is not a number") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name}: {show(value)} is not a finite number") from error
     if not (np.isfinite(number) and number >= least and above < number < below):
         bounds = {"at least": least, "above": above, "below": below}
         words = [f"{word} {bound:g}" for word, bound in bounds.items() if np.isfinite(bound)]
@@ -120,9 +121,7 @@ def checked_number(
 
 def checked_count(name: str, value: Any, least: int = 1) -> int:
     """Return `value` as a whole number, at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{name}: {value!r}; a whole number from {least} up")
-    return int(value)
+    return whole(name, value, least=least)
 
 
 def checked_choice(name: str, value: Any, known: Any) -> str:

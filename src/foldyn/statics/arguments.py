@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +12,15 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Gravity, State
 from foldyn.errors import InputError
+from foldyn.memory import check_memory
 from foldyn.statics.methods import Method
 from foldyn.statics.origami import OrigamiProblem, drives, is_actuated
+from foldyn.values import number, numbers, show, whole
 
 STEPS_DRIVEN = 10
 STEPS_FREE = 100
 SHORTEST = 1e-3  # of a bar's length, that is left of it where a path starts
+COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of it
 FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
 
 
@@ -35,8 +37,6 @@ class Plan(NamedTuple):
 def plan(method: Method, load_factors: Any, steps: int | None, first_step: float | None) -> Plan:
     """Check the arguments that say where a path goes."""
     factors = None if load_factors is None else _factors(load_factors)
-    if steps is not None:
-        check_steps(steps)
     if first_step is not None and method.rule is None:
         raise InputError(
             f"first_step: method {method.name!r} goes by load_factors or steps; leave it out"
@@ -53,8 +53,8 @@ def plan(method: Method, load_factors: Any, steps: int | None, first_step: float
         raise InputError(f"load_factors = {factors}: begin and end must differ")
     way = 1.0 if end is None else end - begin
     step = FIRST_STEP * way if first_step is None else first_step
-    if isinstance(step, bool) or not isinstance(step, Real) or not math.isfinite(step) or not step:
-        raise InputError(f"first_step = {first_step!r}: give a number that is not zero")
+    if not number("first_step", step):
+        raise InputError(f"first_step = {show(first_step)}: give a number that is not zero")
     if end is not None and step * way < 0.0:
         raise InputError(f"first_step = {step:g} leads away from the last load factor {end:g}")
     if end is not None and abs(step) > abs(way):
@@ -62,10 +62,12 @@ def plan(method: Method, load_factors: Any, steps: int | None, first_step: float
     return Plan(begin, [], end, int(steps or STEPS_FREE), float(step))
 
 
-def check_steps(steps: Any) -> None:
-    """Refuse a count of steps that is none."""
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or int(steps) < 1:
-        raise InputError(f"steps = {steps!r}: give a positive whole number")
+def check_steps(steps: Any, dofs: int) -> None:
+    """Refuse a count of steps that is none, or whose points memory cannot hold."""
+    count = whole("steps", steps, least=1)
+    check_memory(
+        "steps", f"a path of {float(count):.3g} points", 8.0 * COPIES * count * dofs, "take fewer"
+    )
 
 
 def _driven(method: Method, factors: list[float] | None, steps: int | None) -> Plan:
@@ -83,12 +85,9 @@ def _driven(method: Method, factors: list[float] | None, steps: int | None) -> P
 
 
 def _factors(given: Any) -> list[float]:
-    try:
-        array = np.asarray(given, float)
-    except (TypeError, ValueError):
-        raise InputError(f"load_factors = {given!r}: give a list of numbers") from None
-    if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-        raise InputError(f"load_factors = {given!r}: give a list of finite numbers, at least one")
+    array = numbers("load_factors", given)
+    if array.ndim != 1 or not array.size:
+        raise InputError(f"load_factors = {show(given)}: give a list of numbers, at least one")
     return array.tolist()
 
 
@@ -97,22 +96,23 @@ def constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
     if isinstance(constant, str):
         if constant != "gravity":
             raise InputError(
-                f'constant = {constant!r}: give "gravity", or numbers of loads, as in [0]'
+                f'constant = {show(constant)}: give "gravity", or numbers of loads, as in [0]'
             )
         chosen = tuple(i for i, load in enumerate(case.loads) if isinstance(load, Gravity))
         if not chosen:
             raise InputError('constant = "gravity": the case has no Gravity among its loads')
         return chosen
     if not isinstance(constant, Sequence | np.ndarray):
-        raise InputError(f'constant = {constant!r}: give "gravity", or numbers of loads')
-    for number in constant:
-        if isinstance(number, bool) or not isinstance(number, Integral):
-            raise InputError(f"constant = {constant!r}: give whole numbers of loads, as in [0]")
-        if not 0 <= int(number) < len(case.loads):
+        raise InputError(f'constant = {show(constant)}: give "gravity", or numbers of loads')
+    for which in constant:
+        if isinstance(which, bool) or not isinstance(which, Integral):
+            raise InputError(f"constant = {show(constant)}: give whole numbers of loads, as in [0]")
+        if not 0 <= int(which) < len(case.loads):
             raise InputError(
-                f"constant: the case has no load {number}; it has {len(case.loads)}, counted from 0"
+                f"constant: the case has no load {show(which)}; it has {len(case.loads)}, counted "
+                "from 0"
             )
-    return tuple(sorted({int(number) for number in constant}))
+    return tuple(sorted({int(which) for which in constant}))
 
 
 def start_state(case: Case, start: Any) -> NDArray | None:

@@ -26,6 +26,7 @@ from foldyn.statics.stability import critical_modes
 from foldyn.statics.station import PathStoppedError, Point, Station, Walk, arrive
 from foldyn.statics.tolerance import balance
 from foldyn.statics.tracing import Recorder, on_nodes
+from foldyn.values import whole
 
 if TYPE_CHECKING:
     import xarray
@@ -83,9 +84,8 @@ def switch_branch(
     at = _bifurcation(path, at)
     if direction not in (1, -1):
         raise InputError(f"direction = {direction!r}: give 1 or -1")
-    if isinstance(mode, bool) or not isinstance(mode, int) or mode < 0:
-        raise InputError(f"mode = {mode!r}: give a whole number from 0 on")
-    check_steps(steps)
+    whole("mode", mode, least=0)
+    check_steps(steps, path["displacement"][0].size)
     rule = method_of(method).rule
     if rule is None:
         raise InputError(f"method = {method!r}: a branch takes 'arc_length' or 'mgdcm'")

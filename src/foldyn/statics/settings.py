@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from numbers import Integral, Real
 
 from foldyn.errors import InputError
+from foldyn.values import number, whole
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,7 @@ class Settings:
     def __post_init__(self) -> None:
         """Check the values."""
         for name in ("tolerance", "largest_turn", "jump"):
-            value = getattr(self, name)
-            number = isinstance(value, Real) and not isinstance(value, bool)
-            if not number or not 0.0 < float(value) < math.inf:
-                raise InputError(f"settings: {name} = {value!r}: give a positive number")
+            number(f"settings: {name}", getattr(self, name), above=0.0)
         if not 1e-14 <= self.tolerance <= 1e-2:
             raise InputError(
                 f"settings: tolerance = {self.tolerance:g}: give one between 1e-14 and 0.01"
@@ -63,9 +59,7 @@ class Settings:
         if self.jump <= 1.0:
             raise InputError(f"settings: jump = {self.jump:g}: give a number above 1")
         for name in ("iterations", "target", "cuts"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
-                raise InputError(f"settings: {name} = {value!r}: give a positive whole number")
+            whole(f"settings: {name}", getattr(self, name), least=1)
         for name in ("stability", "locate"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"settings: {name} = {getattr(self, name)!r}: give True or False")

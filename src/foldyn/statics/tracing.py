@@ -18,11 +18,13 @@ from foldyn.statics.arguments import (
     check_actuation,
     check_case,
     check_start,
+    check_steps,
     constant_loads,
     plan,
     start_state,
 )
 from foldyn.statics.course import Until, driven, free
+from foldyn.statics.fill import check_fill
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.methods import Method, method_of
 from foldyn.statics.newton import Solver
@@ -123,6 +125,8 @@ def trace(
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     how = method_of(method)
+    if steps is not None:
+        check_steps(steps, case.structure.nodes.size)
     goes = plan(how, load_factors, steps, first_step)
     held = constant_loads(case, constant)
     state = start_state(case, start)
@@ -131,6 +135,7 @@ def trace(
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
         raise InputError(f"inertia_relief = {inertia_relief!r}: give True or False")
+    check_fill(case.structure)
     problem = OrigamiProblem(case, held, state, adaptive_load, inertia_relief)
     check_start(problem)
     check_actuation(problem, goes)

@@ -26,6 +26,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures.mesh import Mesh
 from foldyn.structures.sheet import Sheet
 
+STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
 WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
@@ -145,6 +146,25 @@ def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> N
     out = np.empty(4)
     out[sorted(range(4), key=lambda k: ends[k])] = area[listed]
     return out
+
+
+def check_scale(sheet: Sheet, edges: NDArray) -> None:
+    """Refuse a sheet and edges (m) whose stiffness or mass is too far from 1 to compute with."""
+    low, high = float(edges.min()), float(edges.max())
+    stretching, mass = sheet.youngs_modulus * sheet.thickness, sheet.thickness * high**2
+    for what, value in (
+        ("stretching stiffness E t (N/m)", stretching),
+        ("bending stiffness E t^3 / 12(1 - nu^2) L^2 (N/m)", sheet.bending_modulus / low**2),
+        ("bending stiffness E t^3 / 12(1 - nu^2) L^2 (N/m)", sheet.bending_modulus / high**2),
+        ("mass rho t L^2 (kg)", mass * (sheet.density or 1.0)),
+    ):
+        if not 1.0 / STIFFEST <= value <= STIFFEST:
+            density = "" if sheet.density is None else f", density = {sheet.density:g} kg/m3"
+            raise InputError(
+                f"sheet: its {what} is {value:.3g}, out of range: check youngs_modulus = "
+                f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
+                f"pattern, whose edges have {low:.3g} to {high:.3g} m"
+            )
 
 
 def check_poisson(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.structures.mesh import Mesh, check_triangles, fold_rows
+
+PARALLEL = 1e-12  # of two vectors: the squared sine of an angle that rounding spoils
 
 
 def n5b8(pattern: Pattern, centers: dict[int, NDArray] | None = None) -> Mesh:
@@ -29,6 +32,12 @@ def n5b8(pattern: Pattern, centers: dict[int, NDArray] | None = None) -> Mesh:
             continue
         x = pattern.vertices[corners]
         found = quad_centers(x) if size == 4 else np.array([polygon_center(p) for p in x])
+        lost = panels[np.isnan(found).any(axis=1)]
+        if lost.size:
+            raise InputError(
+                f"panel {lost[0]}: is so narrow that rounding hides where its diagonals cross; cut "
+                'it into shorter panels, or use scheme = "n4b5"'
+            )
         points[number[panels] - len(pattern.vertices)] = found
         hub = np.repeat(number[panels][:, None], size, axis=1)
         spokes.append(np.stack([hub, corners], -1).reshape(-1, 2))
@@ -66,13 +75,15 @@ def quad_centers(x: NDArray) -> NDArray:
     """Crossing of the diagonals of quadrilaterals x (m, 4, 3).
 
     Where a panel is not flat, the point of the shorter diagonal that is nearest to the other;
-    for equal ones, of the diagonal through corners 1 and 3 (counted from 0).
+    for equal ones, of the diagonal through corners 1 and 3 (counted from 0). nan where the
+    diagonals are parallel to rounding.
     """
     p, q = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
     start = x[:, 1] - x[:, 0]
     pp, qq, pq = (np.einsum("ij,ij->i", a, b) for a, b in ((p, p), (q, q), (p, q)))
     ps, qs = np.einsum("ij,ij->i", p, start), np.einsum("ij,ij->i", q, start)
     determinant = pp * qq - pq * pq
+    determinant[determinant <= PARALLEL * pp * qq] = np.nan
     on_p = (ps * qq - pq * qs) / determinant
     on_q = (pq * ps - pp * qs) / determinant
     first = (pp < qq * (1.0 - 1e-12))[:, None]

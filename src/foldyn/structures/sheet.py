@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
-from numbers import Real
 
 from foldyn.errors import InputError
+from foldyn.values import length, number
 
 
 @dataclass(frozen=True)
@@ -41,29 +40,21 @@ class Sheet:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
+            name, value = f"sheet: {field.name}", getattr(self, field.name)
             if value is None and field.name == "density":
                 continue
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise InputError(f"sheet: {field.name} = {value!r}: give a number")
-            value = float(value)
-            if not math.isfinite(value):
-                raise InputError(f"sheet: {field.name} = {value}: must be finite")
-            if field.name == "poissons_ratio":
-                if not -1.0 < value < 0.5:
+            if field.name == "thickness":
+                checked = length(name, value)
+            elif field.name == "poissons_ratio":
+                checked = number(name, value)
+                if not -1.0 < checked < 0.5:
                     raise InputError(
-                        f"sheet: poissons_ratio = {value}: must lie between -1 and 0.5, both "
-                        "excluded (0.5 makes the bar areas infinite)"
+                        f"{name} = {checked}: must lie between -1 and 0.5, both excluded (0.5 "
+                        "makes the bar areas infinite)"
                     )
-            elif value <= 0.0:
-                raise InputError(f"sheet: {field.name} = {value}: must be greater than 0")
-            object.__setattr__(self, field.name, value)  # in double precision
-        g = self.bending_modulus
-        if not (math.isfinite(g) and g > 1e-300):
-            raise InputError(
-                f"sheet: the bending stiffness E t^3 / 12(1 - nu^2) = {g} is out of range: check "
-                f"youngs_modulus = {self.youngs_modulus:g} Pa and thickness = {self.thickness:g} m"
-            )
+            else:
+                checked = number(name, value, above=0.0)
+            object.__setattr__(self, field.name, checked)  # in double precision
 
     @property
     def bending_modulus(self) -> float:

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from foldyn.cases.values import number
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError
 from foldyn.experiment.calibration.evaluations import Evaluations
 from foldyn.experiment.calibration.fit_problem import Problem, problem
 from foldyn.experiment.calibration.fitted import Descent, Estimate, Fit, score
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
 from foldyn.experiment.calibration.uncertainty import Uncertainty, uncertainty
+from foldyn.values import number, whole
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
@@ -39,6 +39,9 @@ WHY = {
     4: "neither cost nor parameters move any more",
 }
 """Why a search ended, by the status of `least_squares`."""
+
+MOST_PROCESSES = 1024
+"""Processes at a time: more are a slip of the finger."""
 
 
 @dataclass(frozen=True)
@@ -116,12 +119,8 @@ def fit(
     A motion is computed with fixed steps, `analysis.dt`, or for an implicit method without it the
     interval of its output: steps chosen by their error would make the misfit jump.
     """
-    confidence = number("confidence", confidence, above=0.0)
-    if confidence >= 1.0:
-        raise InputError(f"confidence = {confidence:g}: must be below 1, as in 0.95")
-    for name, given in (("starts", starts), ("processes", processes)):
-        if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-            raise InputError(f"{name} = {given!r}: must be a whole number, at least 1")
+    confidence = number("confidence", confidence, above=0.0, below=1.0)
+    whole("processes", processes, least=1, most=MOST_PROCESSES)
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()

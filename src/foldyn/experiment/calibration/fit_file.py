@@ -14,14 +14,14 @@ from pydantic import Field, PlainValidator, ValidationError
 from foldyn.cases.decode import unknown_key
 from foldyn.cases.messages import describe
 from foldyn.cases.reading import read_document
-from foldyn.cases.schema import Section
-from foldyn.cases.values import choice
+from foldyn.cases.schema import Count, Section
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measured_files import READERS, read_measurement
 from foldyn.experiment.calibration.measured_motions import History, Spectrum
 from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
+from foldyn.values import MOST, choice
 
 CLASSES = {one.kind: one for one in (ForceDisplacement, Shapes, History, Spectrum)}
 MADE = (
@@ -61,9 +61,9 @@ class DataSection(Section):
 class SolverSection(Section):
     """[solver]: other arguments of `fit`."""
 
-    starts: Annotated[int, Field(ge=1)] = 1
-    seed: int = 0
-    processes: Annotated[int, Field(ge=1)] = 1
+    starts: Count = 1
+    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
+    processes: Count = 1
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
 
 
@@ -131,7 +131,7 @@ def read_fit(
 
     def case_of(name: str) -> Path:
         there = path.parent / name
-        if there.is_file() or find is None:
+        if os.path.isfile(there) or find is None:  # false where a name is too long
             return there
         try:
             return find(name)

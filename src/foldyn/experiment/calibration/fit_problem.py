@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from foldyn.cases.casefile import CaseFile
 from foldyn.cases.reading import case_of_document, read_document, validated
-from foldyn.cases.values import show
 from foldyn.dynamics import simulate, start_of
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
@@ -24,6 +23,7 @@ from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.program import program
 from foldyn.statics import Settings, trace
+from foldyn.values import show
 
 STEADY = "generalized_alpha"
 """Integrator of a fit where the case leaves the choice to us."""

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from foldyn.cases.values import show
 from foldyn.errors import InputError
+from foldyn.values import show
 
 LONGEST = 200
 """Characters of a path: no case file has one as deep."""

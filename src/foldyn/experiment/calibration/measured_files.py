@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measured_motions import History, Spectrum
 from foldyn.experiment.calibration.measured_paths import IMPOSED, ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement, axis_number
 from foldyn.experiment.tracking.store import load_tracks
+from foldyn.values import numbers, show
 
 
 def force_displacement(
@@ -303,7 +303,8 @@ def _along(
 
 def _listed(file: Path, nodes: Any) -> list[int]:
     """Numbers of nodes: a file knows nothing of a pattern, so that no expression can be read."""
-    chosen = check_nodes(nodes) if np.size(nodes) else ""
+    empty = isinstance(nodes, Sized) and not len(nodes)
+    chosen = "" if empty else check_nodes(nodes)
     if isinstance(chosen, str):
         raise InputError(f"nodes = {show(nodes)}: give the numbers of the nodes in {file.name}")
     return list(chosen)

@@ -13,10 +13,10 @@ from scipy.interpolate import CubicSpline
 
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
 from foldyn.signals import sampling_interval, spectrum
+from foldyn.values import number, numbers, show
 
 DETRENDS = (None, "constant", "linear")
 REFINED = 8

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import choice, show
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
+from foldyn.values import choice, show
 
 IMPOSED = "imposed"
 """Selects all nodes that supports of the case move along the axis."""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.cases.supports import AXES
-from foldyn.cases.values import number, numbers, show
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
+from foldyn.values import number, numbers, show
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.values import number, show, suggest
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import number_keys, parts, value_at
 from foldyn.experiment.calibration.ties import Tie
+from foldyn.values import number, show, suggest, whole
+
+MOST_STARTS = 100_000
+"""Searches: more are a slip of the finger."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,8 @@ class Space:
         The random ones are a Latin hypercube within the bounds: each parameter's range is cut
         into as many pieces as there are starts, and each piece is used once.
         """
+        whole("starts", count, least=1, most=MOST_STARTS)
+        whole("seed", seed, least=0)
         low, high = self.column("lower"), self.column("upper")
         if count > 1:
             free = [p.key for p in self.parameters if not math.isfinite(p.upper - p.lower)]

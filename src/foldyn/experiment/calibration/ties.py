@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from foldyn.cases.expressions import parse, written
-from foldyn.cases.values import shortened, show, suggest
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.key_paths import parts
+from foldyn.values import shortened, show, suggest
 
 _OPERATIONS = {
     ast.Add: operator.add,

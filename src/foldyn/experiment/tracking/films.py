@@ -104,7 +104,7 @@ def open_film(
     """
     cv2 = opencv()
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"{path}: there is no such file")
     film = cv2.VideoCapture(str(path))
     try:
@@ -139,7 +139,7 @@ def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[
     """
     cv2 = opencv()
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"{path}: there is no such file")
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:

@@ -1,0 +1,89 @@
+"""Memory: what is too large for the machine is refused from an estimate, before it is made.
+
+Estimates are right within a factor of about two. What one byte a thing costs stands where the
+thing is made, beside how it was measured.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+from foldyn.errors import InputError
+
+MEBI, GIB = 2.0**20, 2.0**30
+HALF = 0.5
+"""Share of the memory that the command takes without being told to."""
+_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+_share: ContextVar[float] = ContextVar("share of the memory", default=1.0)
+
+
+@contextmanager
+def at_most(share: float) -> Iterator[None]:
+    """Refuse within the block what takes more than this share of the memory."""
+    before = _share.set(share)
+    try:
+        yield
+    finally:
+        _share.reset(before)
+
+
+def memory() -> float:
+    """Bytes of the machine, or fewer where its container or the shell's limits allow fewer."""
+    known = [_machine(), *map(_limit, _LIMITS)]
+    if sys.platform != "win32":
+        import resource
+
+        soft = resource.getrlimit(resource.RLIMIT_AS)[0]
+        known.append(math.inf if soft == resource.RLIM_INFINITY else float(soft))
+    return min(known)
+
+
+def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
+    """Refuse what would not fit in memory.
+
+    Parameters
+    ----------
+    field : str
+        What makes it large, as the user knows it.
+    what : str
+        What is too large, with its size: "a pattern of 1e+06 vertices".
+    needed : float
+        Bytes, estimated.
+    remedy : str
+        What to do.
+
+    Raises
+    ------
+    InputError
+        It needs more than the memory, or than the share of it that `at_most` allows.
+    """
+    there = memory()
+    if needed <= _share.get() * there:
+        return
+    here = f"the {there / GIB:.3g} GiB of this machine"
+    if needed <= there:
+        here, remedy = f"half of {here}", f"{remedy}, or go on with --force"
+    raise InputError(
+        f"{field}: {what} needs about {needed / GIB:.3g} GiB, more than {here}: {remedy}"
+    )
+
+
+def _machine() -> float:
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf
+
+
+def _limit(file: str) -> float:
+    """Limit of a container, in bytes."""
+    try:
+        return float(Path(file).read_text())
+    except (OSError, ValueError):  # none, or "max"
+        return math.inf

@@ -1,0 +1,267 @@
+"""Checks of single values, at the door: what passes them cannot overflow further in.
+
+Every message begins with the field's name, so that a caller can put a place in front of it
+("loads[0].history." + "duration = -1: must be greater than 0").
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections import Counter
+from collections.abc import Iterable
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+
+LARGEST, SMALLEST = 1e50, 1e-50
+"""Sizes of numbers but 0, in SI units: their fourth powers and quotients are finite and not 0."""
+LONGEST, SHORTEST = 1e30, 1e-30
+"""Sizes of lengths (m), whose eighth powers occur: a thousand universes, and less than Planck's."""
+MOST = 2**63 - 1
+"""Largest whole number: what arrays of them hold."""
+SHOWN = 60
+"""Characters of a value in a message."""
+
+
+def show(value: Any) -> str:
+    """Write a value the way a message shows it: short, strings in double quotes."""
+    text = _written(value, 3)
+    return text if len(text) <= SHOWN else text[: SHOWN - 4] + " ..."
+
+
+def _written(value: Any, depth: int) -> str:
+    """Text of a value and of what is in it, `depth` levels down."""
+    if isinstance(value, str):
+        return f'"{value[:SHOWN]}"'
+    if isinstance(value, np.generic | np.ndarray):
+        return _written(value.tolist() if value.ndim == 0 else list(value[:7]), depth)
+    if isinstance(value, list | tuple | dict) and depth == 0:
+        return "..."
+    if isinstance(value, dict):
+        shown = [f"{key} = {_written(value[key], depth - 1)}" for key in list(value)[:6]]
+        return f"{{ {', '.join(shown)}{', ...' if len(value) > 6 else ''} }}"
+    if isinstance(value, list | tuple):
+        shown = [_written(item, depth - 1) for item in value[:6]]
+        return f"[{', '.join(shown)}{', ...' if len(value) > 6 else ''}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):  # Python refuses to write the digits of very large ones
+        digits = int(value.bit_length() * math.log10(2.0)) + 1
+        return repr(value) if digits < SHOWN else f"a number of about {digits} digits"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def shortened(text: str) -> str:
+    """Text for a message, in one line, of a long one only the beginning."""
+    text = " ".join(text.splitlines())
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word nearest to `word`, if any is near."""
+    close = difflib.get_close_matches(word[:SHOWN], list(known), n=1, cutoff=0.6)
+    return close[0] if close else None
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Text "did you mean 'thickness'? " for the known word nearest to `word`, or nothing."""
+    close = nearest(word, known)
+    return f"did you mean '{close}'? " if close else ""
+
+
+def choice(name: str, value: Any, known: Iterable[str]) -> str:
+    """Return `value` when it is one of the `known` words."""
+    known = list(known)
+    if isinstance(value, str) and value in known:
+        return value
+    hint = suggest(value, known) if isinstance(value, str) else ""
+    raise InputError(f"{name} = {show(value)}: {hint}choose one of {', '.join(known)}")
+
+
+def number(
+    name: str,
+    value: Any,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    most: float | None = None,
+    unit: str = "",
+    smallest: float = SMALLEST,
+    largest: float = LARGEST,
+) -> float:
+    """Return `value` as a float of a size that can be computed with.
+
+    Truth values and text are not numbers.
+
+    Parameters
+    ----------
+    above, least, below, most : float, optional
+        Open and closed bounds.
+    unit : str
+        For messages: "degrees".
+    smallest, largest : float
+        Sizes of numbers but 0.
+    """
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        kind = f" ({unit})" if unit else ""
+        raise InputError(f"{name} = {show(value)}: must be a number{kind}")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise InputError(f"{name} = {show(value)}: must be a finite number")
+    unit = f" {unit}" if unit else ""
+    small = "0 or in size at least" if above is None else "in size at least"
+    for fits, words, bound in (
+        (above is None or result > above, "greater than", above),
+        (least is None or result >= least, "at least", least),
+        (below is None or result < below, "less than", below),
+        (most is None or result <= most, "at most", most),
+        (abs(result) <= largest, "in size at most", largest),
+        (result == 0.0 or abs(result) >= smallest, small, smallest),
+    ):
+        if not fits:
+            raise InputError(f"{name} = {show(value)}: must be {words} {bound:g}{unit}")
+    return result
+
+
+def length(name: str, value: Any) -> float:
+    """Return a positive length (m)."""
+    return number(name, value, above=0.0, unit="m", smallest=SHORTEST, largest=LONGEST)
+
+
+def whole(
+    name: str, value: Any, *, least: int | None = None, most: int = MOST, what: str = ""
+) -> int:
+    """Return `value` as a whole number; truth values and floats are none.
+
+    Parameters
+    ----------
+    least, most : int, optional
+        Closed bounds.
+    what : str
+        For messages: what it counts, or its unit.
+    """
+    what = f" ({what})" if what else ""
+    counts = not isinstance(value, bool | np.bool_) and isinstance(value, Integral)
+    result = int(value) if counts else 0
+    if not counts or (least is not None and result < least):
+        bound = "" if least is None else f", at least {least}"
+        raise InputError(f"{name} = {show(value)}: must be a whole number{bound}{what}")
+    if not -MOST - 1 <= result <= most:
+        end = f"at most {most}" if result > 0 else f"at least {-MOST - 1}"
+        raise InputError(f"{name} = {show(result)}: must be {end}{what}")
+    return result
+
+
+def numbers(name: str, value: Any) -> NDArray[np.float64]:
+    """Return `value` as a new read-only float array of any shape.
+
+    Its numbers are finite and of a size that can be computed with: at most `LARGEST`, and one of
+    them at least `SMALLEST`, unless all are 0.
+    """
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name} = {show(value)}: rows have different lengths") from None
+    if array.dtype == object:  # whole numbers beyond 64 bits are numbers too, if too large
+        array = _as_floats(array)
+    if array.size and (array.dtype.kind not in "iuf" or _has_truth_values(value)):
+        raise InputError(f"{name} = {show(value)}: must be numbers")
+    result = np.array(array, dtype=np.float64)
+    for usable, words in (
+        (np.isfinite(result), "a finite number"),
+        (np.abs(result) <= LARGEST, f"in size at most {LARGEST:g}"),
+    ):
+        bad = np.argwhere(~usable)
+        if len(bad):
+            place = "".join(f"[{i}]" for i in bad[0])
+            raise InputError(f"{name}{place} = {result[tuple(bad[0])]}: must be {words}")
+    size = float(np.abs(result).max(initial=0.0))
+    if 0.0 < size < SMALLEST:
+        raise InputError(
+            f"{name}: the largest in size is {size:g}; must be 0 or at least {SMALLEST:g}"
+        )
+    result.flags.writeable = False
+    return result
+
+
+def _as_floats(array: NDArray) -> NDArray:
+    """Floats of whole numbers of any size; the array itself where it holds other things."""
+    if not all(isinstance(item, int | float) for item in array.ravel()):
+        return array
+    large = {True: math.inf, False: -math.inf}
+    found = [item if abs(item) <= MOST else large[item > 0] for item in array.ravel()]
+    return np.array(found, dtype=np.float64).reshape(array.shape)
+
+
+def number_or_list(name: str, value: Any, what: str) -> float | tuple[float, ...]:
+    """Return `value` as a finite float, or a list of them as a tuple.
+
+    Parameters
+    ----------
+    what : str
+        What the list has one number for, for messages: "node".
+    """
+    if not isinstance(value, list | tuple | np.ndarray):
+        return number(name, value)
+    array = numbers(name, value)
+    if array.ndim == 0:
+        return float(array)
+    if array.ndim > 1 or not array.size:
+        raise InputError(f"{name} = {show(value)}: must be a number, or a list of one per {what}")
+    return tuple(array.tolist())
+
+
+def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ...]:
+    """Return `value`, a whole number or a list of them, as a tuple of distinct whole numbers.
+
+    Parameters
+    ----------
+    what : str
+        What the numbers count, for messages: "node".
+    alternative : str
+        What may be given instead of numbers, for messages.
+    """
+    array = np.atleast_1d(np.asarray(value, dtype=object))
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(
+            f"{name} = {show(value)}: must be {what} numbers, as in [0, 1], {alternative}"
+        )
+    for item in array:
+        if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
+            raise InputError(f"{name} = {show(value)}: {show(item)} is not a {what} number")
+        if abs(int(item)) > MOST:
+            raise InputError(f"{name}: {show(item)}: is too large for a {what} number")
+    chosen = tuple(int(item) for item in array)
+    if len(set(chosen)) < len(chosen):
+        twice = next(item for item, times in Counter(chosen).items() if times > 1)
+        raise InputError(f"{name} = {show(value)}: {what} {twice} is listed twice")
+    return chosen
+
+
+def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, float, float]:
+    """Return `value` as three finite floats, if asked not all of them zero."""
+    array = numbers(name, value)
+    if array.shape != (3,):
+        raise InputError(f"{name} = {show(value)}: must be three numbers (x, y, z)")
+    if nonzero and not array.any():
+        raise InputError(f"{name} = {show(value)}: must not be zero")
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _has_truth_values(value: Any) -> bool:
+    # numpy silently turns [1.0, True] into floats
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind == "b"
+    if isinstance(value, list | tuple):
+        return any(_has_truth_values(item) for item in value)
+    return isinstance(value, bool | np.bool_)
