@@ -18,6 +18,7 @@ from foldyn.dynamics.kinds import longest, stretching_forces, turning_moments
 EPS = float(np.finfo(float).eps)
 MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
+BEGUN = 1e-6  # of the longest bar: displacements below that have not grown without bound
 
 # columns of the energy table that the compiled loops fill
 AUDITED = ("strain_bars", "strain_folds", "strain_bends", "kinetic", "dissipated", "work")
@@ -57,6 +58,15 @@ class Rounding:
         bars = self._force * moved * min(strain, 1.0)
         turns = self._moment * ANGLE * min(strain, math.pi)
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
+
+    def told_by(self, energy: NDArray, moved: float) -> bool:
+        """Whether an error as large as the energies at play tells that a motion is unstable.
+
+        The first steps under a load that begins slowly may miss what little there is by far:
+        implicit ones measure their error by no less than `BEGUN`.
+        """
+        far = moved > BEGUN * self.length
+        return far and energy_scale(energy) > self.energy(energy, moved)
 
     def least_motion(self, accuracy: float) -> float:
         """Displacement (m) below which dihedrals do not follow with an accuracy; 0 without any."""

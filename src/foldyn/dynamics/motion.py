@@ -128,7 +128,7 @@ class Motion:
             return 0.0
         relative = np.abs(error) / scale
         worst = float(relative.max())
-        if worst > EXPLODED and scale > self._rounding.energy(energy, self._farthest()):
+        if worst > EXPLODED and self._rounding.told_by(energy, self._farthest()):
             bad = int(np.argmax(relative > EXPLODED))
             self._course.count[1] = bad
             raise InstabilityError(
