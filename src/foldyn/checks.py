@@ -36,6 +36,7 @@ def gradient_error(
     force: Callable[[NDArray], NDArray],
     u: ArrayLike,
     seed: int = 0,
+    size: float | None = None,
 ) -> float:
     """Relative difference of a force and the central difference of its energy at u.
 
@@ -49,18 +50,20 @@ def gradient_error(
         State, of any shape.
     seed : int
         Of the random directions.
+    size : float, optional
+        What the steps are a thousandth of: by default the largest entry of u, or 1e-3 where all
+        are zero.
     """
     point = np.asarray(u, float)
     found, exact = [], []
     rng = np.random.default_rng(seed)
-    size = max(float(np.abs(point).max()), 1e-3)
+    h = 1e-3 * (size or _size(point))
     for _ in range(4):
         d = rng.standard_normal(point.shape)
 
         def slope(h: float, d: NDArray = d) -> float:
             return (energy(point + h * d) - energy(point - h * d)) / (2.0 * h)
 
-        h = 1e-3 * size
         found.append((4.0 * slope(0.5 * h) - slope(h)) / 3.0)
         exact.append(float((np.asarray(force(point)) * d).sum()))
     return float(np.linalg.norm(np.subtract(found, exact)) / np.linalg.norm(exact))
@@ -71,6 +74,7 @@ def tangent_error(
     tangent: Callable[[NDArray], object],
     u: ArrayLike,
     seed: int = 0,
+    size: float | None = None,
 ) -> float:
     """Relative difference of a tangent and the central difference of its force at u.
 
@@ -79,12 +83,15 @@ def tangent_error(
     """
     point = np.asarray(u, float)
     d = np.random.default_rng(seed).standard_normal(point.shape)
-    size = max(float(np.abs(point).max()), 1e-3)
 
     def slope(h: float) -> NDArray:
         return (np.asarray(force(point + h * d)) - np.asarray(force(point - h * d))) / (2.0 * h)
 
-    h = 1e-3 * size
+    h = 1e-3 * (size or _size(point))
     found = (4.0 * slope(0.5 * h) - slope(h)) / 3.0
     exact = (tangent(point) @ d.ravel()).reshape(point.shape)  # type: ignore[operator]
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+
+
+def _size(point: NDArray) -> float:
+    return float(np.abs(point).max()) or 1e-3

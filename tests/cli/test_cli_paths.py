@@ -114,6 +114,37 @@ def test_a_path_ends_where_a_node_has_come_far_enough(workplace, edited) -> None
     assert "(1 limit point, 0 bifurcations)" in done.out
 
 
+def test_a_path_that_loses_stability_says_so_once(workplace) -> None:
+    text = """
+[pattern]
+vertices = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
+faces = [[0, 1, 4, 5], [1, 2, 3, 4]]
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+[model]
+fold_law = "linear"
+bend_law = "linear"
+[[supports]]
+nodes = [0, 5]
+[[supports]]
+nodes = [2, 3]
+axes = "yz"
+[[loads]]
+nodes = [2, 3]
+force = [-1, 0, 0]
+[analysis]
+kind = "statics"
+"""
+    done = workplace.run(text)
+    assert done.status == 0
+    (line,) = done.err.splitlines()
+    assert line.startswith("foldyn: warning: the path loses stability: ")
+    unstable = fd.load("case-results/result.nc").attrs["unstable_points"]
+    assert f"newton: 11 points, {unstable} of them unstable, to the load factor 1," in done.out
+
+
 def test_a_path_that_cannot_go_on_is_kept_with_the_remedy(workplace) -> None:
     failed = workplace.run(TOWER)
     assert failed.status == 1

@@ -59,6 +59,7 @@ def write(tmp_path, text):
     return path, write_path(case_file, path, tmp_path).read_text("utf-8")
 
 
+@pytest.mark.filterwarnings("ignore:the path loses stability")
 def test_loads_that_are_constant_are_named(tmp_path):
     loads = "[[loads]]\nnodes = [0, 1]\nforce = [-1e-3, 0, 0]\n[[loads]]\ngravity = [0, 0, -9.81]\n"
     text = loads + '[analysis]\nkind = "statics"\nconstant = "gravity"\nsteps = 2\n'

@@ -11,6 +11,8 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.statics import Settings, switch_branch, trace
 
+pytestmark = pytest.mark.filterwarnings("ignore:the path loses stability")
+
 STEEP = VonMises(h=2.0)  # above sqrt(3) b: it gives way sideways first
 Z0 = np.sqrt(STEEP.h**2 - 2 * STEEP.b**2)  # height of the apex at the bifurcation
 CRITICAL = 2 * STEEP.EA * STEEP.b**2 * Z0 / STEEP.L**3

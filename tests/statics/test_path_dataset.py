@@ -96,6 +96,7 @@ def test_partial_path_is_stored_too(tmp_path):
     assert again.attrs["remedy"] in str(caught.value)
 
 
+@pytest.mark.filterwarnings("ignore:the path loses stability")
 def test_branch_is_stored_too(tmp_path):
     steep = VonMises(h=2.0)
     case = steep.case(free="xz")

@@ -62,9 +62,10 @@ class PathRun:
         a, kinds = result.attrs, result["point"].values
         limits, crossings = int((kinds == "limit").sum()), int((kinds == "bifurcation").sum())
         special = f" ({_count(limits, 'limit point')}, {_count(crossings, 'bifurcation')})"
+        unstable = f", {a['unstable_points']} of them unstable," if a["unstable_points"] > 0 else ""
         return (
             f"  {a['method']}: {_count(result.sizes['step'], 'point')}"
-            f"{special if limits or crossings else ''} to the load factor "
+            f"{special if limits or crossings else ''}{unstable} to the load factor "
             f"{float(result['load_factor'][-1]):.4g}, {a['newton_iterations']} iterations, "
             f"{a['wall_seconds']:.1f} s"
         )

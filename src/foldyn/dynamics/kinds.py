@@ -83,10 +83,19 @@ def stretching_forces(model: Any) -> float:
     return float(np.sqrt(3.0) * np.linalg.norm(nodal))
 
 
+def turning_moments(model: Any) -> float:
+    """Sum of the hinges' moments (N m) for a turn of one."""
+    if isinstance(model, ShellModel):
+        return float(np.abs(model.bending).sum() + model.piece_stiffness.sum())
+    return float(model.hinge_stiffness.sum())
+
+
 def longest(model: Any) -> float:
-    """Length (m) of the longest bar or side."""
+    """Length (m) of the longest bar or side; the extent of the nodes where there is none."""
     per_length2 = model.per_length2 if isinstance(model, ShellModel) else model.bar_per_length2
-    return float(1.0 / np.sqrt(per_length2.min(initial=1.0)))
+    if not per_length2.size:
+        return float(np.ptp(model.rest, axis=0).max())
+    return float(1.0 / np.sqrt(per_length2.min()))
 
 
 def fold_rest(model: Any) -> tuple[NDArray, NDArray]:

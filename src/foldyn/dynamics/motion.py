@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics import outcome
-from foldyn.dynamics.audit import AUDITED, audited, energy_error, energy_scale
+from foldyn.dynamics.audit import AUDITED, Rounding, audited, energy_error, energy_scale
 from foldyn.dynamics.course import Course, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
-from foldyn.dynamics.kinds import fold_rest, longest, stretching_forces
+from foldyn.dynamics.kinds import fold_rest
 from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.stability import is_stable, stability_limit
@@ -48,6 +48,7 @@ class Motion:
         self._course, self._out = begin(), self._room(0)
         self.at_rest = not (self._course.u.any() or self._course.v.any())
         self.seconds = 0.0
+        self._rounding = Rounding(packed.model)
         self._engine: Engine | None = None
 
     @property
@@ -123,13 +124,11 @@ class Motion:
         """Relative energy error so far; raises where the energy has exploded."""
         energy = self._out.energy[: self.stored]
         error, scale = energy_error(energy), energy_scale(energy)
-        model = self._packed.model
-        negligible = 1e-24 * stretching_forces(model) * longest(model)
-        if scale <= negligible:
+        if scale == 0.0:
             return 0.0
         relative = np.abs(error) / scale
         worst = float(relative.max())
-        if worst > EXPLODED:
+        if worst > EXPLODED and self._rounding.told_by(energy, self._farthest()):
             bad = int(np.argmax(relative > EXPLODED))
             self._course.count[1] = bad
             raise InstabilityError(
@@ -138,6 +137,11 @@ class Motion:
                 self._dataset(),
             )
         return worst
+
+    def _farthest(self) -> float:
+        """Largest displacement (m) of a sample so far."""
+        moved = self._out.displacement[: self.stored]
+        return max(float(moved.max()), -float(moved.min()))
 
     def _smaller_step(self) -> str:
         if not self.plan.steps:
@@ -257,26 +261,39 @@ class Motion:
         return float(np.abs(energy_error(energy)).max() / scale) if scale > 0.0 else 0.0
 
     def _finish(self) -> xarray.Dataset:
-        """Dataset of the whole motion; warns where its energy balance is poor."""
-        error = self._audit()
-        if error > INACCURATE:
-            remedy = self._smaller_step()
-            warnings.warn(
-                f"the energy balance of the motion is off by {error:.1%} of the energies at play: "
-                f"{remedy}",
-                FoldynWarning,
-                stacklevel=3,
+        """Dataset of the whole motion; warns where its energy balance is poor, or tells nothing."""
+        told = self._doubts(self._audit())
+        if told:
+            warnings.warn(told, FoldynWarning, stacklevel=3)
+        return self._dataset()
+
+    def _doubts(self, error: float) -> str:
+        """What to say of a motion with a relative energy error; empty where nothing."""
+        energy, farthest = self._out.energy[: self.stored], self._farthest()
+        least = self._rounding.least_motion(INACCURATE)
+        if 0.0 < farthest < least:
+            return (
+                f"nothing moves farther than {farthest:.2g} m, and below {least:.2g} m rounding "
+                "hides how hinges turn, so that they do not resist: use larger loads, lighter or "
+                "softer panels, or a longer motion"
             )
         size, least = float(self._course.clock[3]), self.plan.floor
         if 0.0 < size < least:
-            warnings.warn(
-                f"the motion is small: {size:.3g} m at most, where errors of steps are measured "
-                f"by {least:.3g} m, a share of the longest bar; use a tolerance of "
-                f"{self.plan.tolerance * size / least:.1g}, or a method with a fixed step",
-                FoldynWarning,
-                stacklevel=3,
+            return (
+                f"the motion is small: {size:.2g} m at most, where the errors of steps are measured "
+                f"by {least:.2g} m, a share of the longest bar; use a tolerance of "
+                f"{self.plan.tolerance * size / least:.1g}, or a method with a fixed step"
             )
-        return self._dataset()
+        if error <= INACCURATE:
+            return ""
+        off = f"the energy balance of the motion is off by {error:.1%} of the energies at play"
+        scale, rounding = energy_scale(energy), self._rounding.energy(energy, farthest)
+        if scale <= rounding:
+            return (
+                f"{off}, {scale:.2g} J: they are below the rounding errors of forces and "
+                f"displacements of this size ({rounding:.2g} J), and what moves may be these errors"
+            )
+        return f"{off}: {self._smaller_step()}"
 
 
 def _enlarged(out: Samples) -> Samples:

@@ -33,6 +33,7 @@ from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics import Workspace, wait
 from foldyn.mechanics.flat import flat
+from foldyn.statics.body import body_of
 
 
 class Entries(NamedTuple):
@@ -114,7 +115,8 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     if case.damping.beta > 0.0:
         state = start if case.damping.state == "start" else None
         state = np.zeros_like(structure.nodes) if state is None else state
-        k0 = by.matrix(structure.tangent(state)) * case.damping.beta
+        body = body_of(structure)
+        k0 = by.matrix(body.tangent(body.dofs(state))) * case.damping.beta
     else:
         k0 = sparse.csr_array((0, 0))
     model, turned = actuators(structure, model, by, case.actuation_terms, histories)

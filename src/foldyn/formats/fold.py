@@ -19,6 +19,7 @@ import numpy as np
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
+from foldyn.patterns.seams import seams
 
 _ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 # Units per meter of `frame_unit`; "unit" means none, taken as meters.
@@ -67,7 +68,9 @@ def read(text: str) -> Pattern:
     title = frame.get("frame_title") or frame.get("file_title") or ""
     try:
         # Twice, as only sound faces tell which listed edges are creases.
-        bare = Pattern(vertices, faces)
+        with warnings.catch_warnings():  # what the second one says again
+            warnings.simplefilter("ignore", FoldynWarning)
+            bare = Pattern(vertices, faces)
         letters = _letters(frame, bare)
         return Pattern(vertices, faces, letters, name=str(title))
     except InputError as error:
@@ -92,6 +95,8 @@ def write(pattern: Pattern) -> str:
     flat = not np.any(pattern.vertices[:, 2])
     folded = bool(np.any(np.abs(pattern.dihedrals - np.pi) > 1e-6)) or not flat
     row = {(int(a), int(b)): k for k, (a, b) in enumerate(pattern.creases)}
+    pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
+    cuts = {edge for pair in pairs for edge in pair}
     rows = [row.get((int(a), int(b))) for a, b in pattern.edges]
     angles = 180.0 - np.degrees(pattern.dihedrals)
     fields: dict[str, Any] = {
@@ -105,7 +110,10 @@ def write(pattern: Pattern) -> str:
         "vertices_coords": pattern.vertices[:, : 2 if flat else 3].tolist(),
         "faces_vertices": [list(face) for face in pattern.faces],
         "edges_vertices": pattern.edges.tolist(),
-        "edges_assignment": ["B" if k is None else pattern.assignments[k] for k in rows],
+        "edges_assignment": [
+            pattern.assignments[k] if k is not None else "C" if tuple(edge) in cuts else "B"
+            for k, edge in zip(rows, pattern.edges.tolist(), strict=True)
+        ],
         "edges_foldAngle": [0.0 if k is None else float(angles[k]) for k in rows],
     }
     return "{\n" + ",\n".join(f"  {json.dumps(k)}: {_json(v)}" for k, v in fields.items()) + "\n}\n"
@@ -186,7 +194,7 @@ def _scale(unit: Any) -> float:
 
 
 def _letters(frame: dict[str, Any], bare: Pattern) -> dict[tuple[int, int], str]:
-    """Letters of the creases among the listed edges."""
+    """Letters of the creases, and "B" for edges that meet others without being joined."""
     if "edges_assignment" not in frame and "edges_vertices" not in frame:
         return {}
     if "edges_vertices" not in frame:
@@ -217,6 +225,8 @@ def _letters(frame: dict[str, Any], bare: Pattern) -> dict[tuple[int, int], str]
                 )
         elif pair not in boundary:
             ignored["belong to no face"] += 1
+        elif letter == "C" or (letter == "B" and bare.vertices[:, 2].any()):
+            letters[pair] = "B"  # a cut, or edges that meet where the sheet is folded
         elif letter in ("M", "V"):
             ignored["are mountains or valleys although only one face has them"] += 1
     for what, count in ignored.items():

@@ -80,7 +80,9 @@ def _equilibrium(case: Case) -> NDArray:
     """Displacement (n, 3) under the loads of a case in full, near its rest state."""
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     free = free_rigid_motions(case.structure.nodes, case.fixed.ravel()).shape[1] > 0
-    path = trace(case, "newton", factors, inertia_relief=free)
+    with warnings.catch_warnings():  # what is linearized there tells of its unstable motions
+        warnings.filterwarnings("ignore", "the path loses stability", FoldynWarning)
+        path = trace(case, "newton", factors, inertia_relief=free)
     return path["displacement"].values[-1]
 
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry
+from foldyn.patterns.seams import Edge, seams
 from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
 from foldyn.values import LONGEST, SHORTEST
 
@@ -74,7 +75,8 @@ class Pattern:
     Warns
     -----
     FoldynWarning
-        A given "M" or "V" contradicts the geometry by more than 1e-3 rad.
+        A given "M" or "V" contradicts the geometry by more than 1e-3 rad; two edges that
+        are not given as "B" lie in the same place and are not joined.
 
     Notes
     -----
@@ -111,9 +113,12 @@ class Pattern:
         dihedrals, closed = crease_dihedrals(
             points, geometry.normals, topology.creases, topology.crease_faces
         )
-        given = _given_letters(assignments, topology.creases, topology.boundary)
+        given, open_edges = _given_letters(assignments, topology.creases, topology.boundary)
         dihedrals[closed & (given == "M")] = 2 * np.pi
         _warn_of_contradictions(given, topology.creases, dihedrals)
+        _warn_of_seams(
+            seams(points, topology.faces, geometry.normals, topology.boundary), open_edges
+        )
         values: dict[str, Any] = {
             "vertices": points,
             "faces": topology.faces,
@@ -187,11 +192,12 @@ def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
 
 def _given_letters(
     assignments: Any, creases: NDArray[np.int64], boundary: NDArray[np.int64]
-) -> NDArray[np.str_]:
-    """Letter given for each crease, "" where there is none."""
+) -> tuple[NDArray[np.str_], set[Edge]]:
+    """Letter given for each crease, "" where there is none, and the edges given as "B"."""
     given = np.full(len(creases), "", dtype="<U1")
+    boundary_edges: set[Edge] = set()
     if assignments is None:
-        return given
+        return given, boundary_edges
     if isinstance(assignments, Mapping):
         row, rim = edge_lookup(creases), edge_lookup(boundary)
         before: dict[tuple[int, int], Any] = {}
@@ -214,7 +220,9 @@ def _given_letters(
                     f'assignments: edge {pair} is {letter!r} but only one face has it; give "B" '
                     "or leave it out."
                 )
-        return given
+            else:
+                boundary_edges.add(pair)
+        return given, boundary_edges
     if not isinstance(assignments, Sequence | np.ndarray):
         raise InputError(
             f"assignments = {assignments!r}: give a mapping from vertex pairs, a letter for each "
@@ -227,7 +235,7 @@ def _given_letters(
         )
     for k, letter in enumerate(assignments):
         given[k] = _checked_letter(letter, (int(creases[k, 0]), int(creases[k, 1])))
-    return given
+    return given, boundary_edges
 
 
 def _vertex_pair(key: Any) -> tuple[int, int]:
@@ -274,6 +282,20 @@ def _warn_of_contradictions(
             f'assignments: crease ({a}, {b}){more} is given as "{given[k]}", but its dihedral '
             f"is {np.degrees(dihedrals[k]):.1f} degrees seen from the front (valleys are below "
             "180, mountains above): the letter is kept; turn the faces over or correct it.",
+            FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_seams(found: list[tuple[Edge, Edge]], open_edges: set[Edge]) -> None:
+    doubtful = [pair for pair in found if not open_edges.intersection(pair)]
+    if doubtful:
+        one, other = doubtful[0]
+        more = f" (and {len(doubtful) - 1} more such pairs)" if len(doubtful) > 1 else ""
+        warnings.warn(
+            f"vertices: the boundary edges {one} and {other}{more} lie in the same place but are "
+            "not joined, so that the panels part there: for a crease give both panels the same "
+            f'vertices; a cut is told by assignments = {{{one}: "B"}}, or "C" in a FOLD file.',
             FoldynWarning,
             stacklevel=3,
         )

@@ -296,7 +296,8 @@ def _write_labels(
     for group in groups:
         for node, names in group.axes:
             tips = group.triangles[:, 0]
-            corners = group.triangles[[np.allclose(tip, points[node]) for tip in tips]]
+            apart = np.abs(tips - points[node]).max(axis=1)
+            corners = group.triangles[apart < 1e-6 * sheet.size]
             # Beside the foot of the lowest triangle, away from the node's own number.
             foot = corners[:, 1:].mean(axis=1)
             lowest = foot[np.argmin(sight.flat(foot)[:, 1])]

@@ -18,7 +18,7 @@ FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
 
 
 def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> NDArray:
-    """Rotations (r,) about which there is no moment at displacement u (n, 3), by Newton's method.
+    """Dofs (r,), m, of the rotations without moment at displacement u (n, 3), by Newton's method.
 
     Raises
     ------
@@ -34,6 +34,6 @@ def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> 
         stiffness = shell_tangent(model, pattern, u, x, work, FLOOR)[u.size :][:, u.size :]
         step = splu(sparse.csc_array(stiffness)).solve(-couple)
         x = x + step
-        if np.abs(step).max(initial=0.0) <= BALANCED:
+        if model.per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
             return x
     raise ComputationError("the rotations of the shell find no balance at this displacement")

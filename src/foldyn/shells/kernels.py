@@ -1,6 +1,8 @@
 """Energy and forces of a shell of triangles, compiled.
 
-Displacements u (n, 3) and rotations x (r,); see `shells.element` and `shells.sides`.
+Displacements u (n, 3) and rotations; see `shells.element` and `shells.sides`. The dofs x (r,) of
+the rotations are lengths as well, m, so that norms over all dofs do not depend on the unit of
+length: a rotation is x times `per_reach`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ class ShellModel(NamedTuple):
 
     nodes: int  # n
     rotations: int  # r
+    per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
     rest: NDArray  # (n + g, 3) from the mean of the nodes, m
     triangles: NDArray  # (nt, 3)
     side: NDArray  # (nt, 3, 3) rest vectors of the sides, m
@@ -88,12 +91,8 @@ def fold(model, u, x, work):
             work.gradient[e, c] = found[1 + c]
     for k in range(model.piece_hinge.size):
         e = model.piece_hinge[k]
-        work.piece_turn[k] = (
-            model.hinge_rest[e]
-            + work.turn[e]
-            - x[model.piece_rotations[k, 0]]
-            - x[model.piece_rotations[k, 1]]
-        )
+        both = x[model.piece_rotations[k, 0]] + x[model.piece_rotations[k, 1]]
+        work.piece_turn[k] = model.hinge_rest[e] + work.turn[e] - model.per_reach * both
 
 
 @kernel
@@ -116,7 +115,7 @@ def side_rotations(model, x, turn, t, out):
         if model.hinge[t, k] >= 0:
             out[k] += model.weight[t, k] * turn[model.hinge[t, k]]
         if model.rotation[t, k] >= 0:
-            out[k] += model.sign[t, k] * x[model.rotation[t, k]]
+            out[k] += model.sign[t, k] * model.per_reach * x[model.rotation[t, k]]
 
 
 @kernel
@@ -143,7 +142,7 @@ def shell_energy(model, u, x, work, out):
 
 @kernel
 def shell_force(model, u, x, force, couple, work):
-    """Internal force (n, 3), N, and internal moments (r,), N m, about the rotations."""
+    """Internal force (n, 3), N, and what belongs to the rotations (r,), N."""
     fold(model, u, x, work)
     n = u.shape[0]
     force[:] = 0.0
@@ -167,7 +166,7 @@ def shell_force(model, u, x, force, couple, work):
             if model.hinge[t, k] >= 0:
                 work.moment[model.hinge[t, k]] += model.weight[t, k] * moment
             if model.rotation[t, k] >= 0:
-                couple[model.rotation[t, k]] += model.sign[t, k] * moment
+                couple[model.rotation[t, k]] += model.sign[t, k] * model.per_reach * moment
     p = model.piece_parameters
     for k in range(model.piece_hinge.size):
         moment = model.piece_stiffness[k] * hinge_moment(
@@ -175,8 +174,8 @@ def shell_force(model, u, x, force, couple, work):
             p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1],
         )  # fmt: skip
         work.moment[model.piece_hinge[k]] += moment
-        couple[model.piece_rotations[k, 0]] -= moment
-        couple[model.piece_rotations[k, 1]] -= moment
+        couple[model.piece_rotations[k, 0]] -= model.per_reach * moment
+        couple[model.piece_rotations[k, 1]] -= model.per_reach * moment
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]

@@ -156,6 +156,11 @@ class Shell:
         return rest
 
     @cached_property
+    def _reach(self) -> float:
+        """Length (m) by which a rotation becomes a displacement: that of a side."""
+        return float(np.sqrt((self.bar_length**2).mean()))
+
+    @cached_property
     def model(self) -> ShellModel:
         """The arrays that the compiled kernels work on."""
         corners, found, law = self.nodes[self.triangles], self.sides, self.fold_law
@@ -170,6 +175,7 @@ class Shell:
         return ShellModel(
             nodes=len(self.nodes),
             rotations=self.rotations,
+            per_reach=1.0 / self._reach,
             rest=rest,
             triangles=self.triangles.copy(),
             side=np.ascontiguousarray(side),
@@ -226,7 +232,7 @@ class Shell:
         """
         u, x = self._state(u, rotation)
         out = np.empty(3)
-        shell_energy(self.model, u, x, shell_work(self.model), out)
+        shell_energy(self.model, u, x * self._reach, shell_work(self.model), out)
         return dict(zip(GROUPS, out.tolist(), strict=True))
 
     def energy(self, u: ArrayLike, rotation: ArrayLike | None = None) -> float:
@@ -237,8 +243,8 @@ class Shell:
         """Derivatives of the energy: forces (n, 3), N, and moments about the rotations, N m."""
         u, x = self._state(u, rotation)
         force, couple = np.empty_like(u), np.empty_like(x)
-        shell_force(self.model, u, x, force, couple, shell_work(self.model))
-        return force, couple
+        shell_force(self.model, u, x * self._reach, force, couple, shell_work(self.model))
+        return force, couple * self._reach
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m, with rotations in balance."""
@@ -250,12 +256,16 @@ class Shell:
     ) -> sparse.csr_array:
         """Second derivative (3n + r, 3n + r) of the energy: 3 node + axis, then the rotations."""
         u, x = self._state(u, rotation)
-        return shell_tangent(self.model, self.sparsity, u, x, shell_work(self.model), floor)
+        x, work = x * self._reach, shell_work(self.model)
+        matrix = shell_tangent(self.model, self.sparsity, u, x, work, floor)
+        units = np.repeat([1.0, self._reach], [u.size, x.size])
+        matrix.data *= np.repeat(units, np.diff(matrix.indptr)) * units[matrix.indices]
+        return matrix
 
     def balanced(self, u: ArrayLike) -> NDArray:
         """Rotations (r,) about which there is no moment at displacement u (n, 3)."""
         u, _ = self._state(u, np.zeros(self.rotations))
-        return balanced_rotations(self.model, self.sparsity, u)
+        return balanced_rotations(self.model, self.sparsity, u) / self._reach
 
     def _state(self, u: ArrayLike, rotation: ArrayLike | None) -> tuple[NDArray, NDArray]:
         array = np.ascontiguousarray(u, float)

@@ -92,7 +92,7 @@ def _add_triangles(model, pattern, u, x, work, data):
                     for c in range(3):
                         bend[k, at + c] = weight * work.gradient[h, 3 * v + c]
             if model.rotation[t, k] >= 0:
-                bend[k, 18 + k] = model.sign[t, k]
+                bend[k, 18 + k] = model.sign[t, k] * model.per_reach
         _membrane(model, t, e, gap, block)
         _bending(model, t, bend, resist, block)
         _scatter(pattern.indptr, pattern.triangle_dof[t], pattern.triangle[t], 6, block, data)
@@ -142,7 +142,7 @@ def _add_creases(model, pattern, u, work, floor, data):
         slope = model.piece_stiffness[k] * max(slope, floor)
         for c in range(12):
             along[c] = work.gradient[h, c]
-        along[12], along[13] = -1.0, -1.0
+        along[12] = along[13] = -model.per_reach
         for r in range(14):
             for q in range(14):
                 block[r, q] = slope * along[r] * along[q]

@@ -220,7 +220,7 @@ class ShellBody:
         nodal = np.zeros(self._nodes // 3)
         for end in (0, -1):
             np.add.at(nodal, np.roll(model.triangles, end, axis=1), stiff)
-        bending = np.abs(model.bending).sum(axis=(1, 2)).max(initial=0.0)
+        bending = model.per_reach * np.abs(model.bending).sum(axis=(1, 2)).max(initial=0.0)
         return np.concatenate([np.repeat(nodal, 3), np.full(len(self.hidden), bending)])
 
     def dofs(self, displacement: NDArray) -> NDArray:

@@ -17,6 +17,8 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.statics.rigid import free_rigid_motions
 
+TIE = 1e-6  # by how much the last dof counts less than the first one where pins are chosen
+
 
 class Relief:
     """Balance of the loads of a case whose supports leave it free to move as a rigid body."""
@@ -34,7 +36,8 @@ class Relief:
                 "inertia_relief: the supports leave no rigid motion free: leave it out"
             )
         free = np.flatnonzero(~self._held)
-        _, _, order = qr(motions[free].T, mode="economic", pivoting=True)
+        first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first
+        _, _, order = qr(motions[free].T * first, mode="economic", pivoting=True)
         self.pins = np.sort(free[order[: self._count]])
 
     def _motions(self, u: NDArray) -> NDArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 from foldyn.results import path_dataset
+from foldyn.statics import stability_changes
 from foldyn.statics.arguments import (
     Plan,
     check_actuation,
@@ -102,7 +104,8 @@ def trace(
         `reaction` (N) at supported dofs; energies (J) `strain_bars`, `strain_folds`,
         `strain_bends` and `work`; `negative_eigenvalues`, `point` ("regular", "limit",
         "bifurcation"), `iterations`, `residual`. Attributes hold `status` ("complete" or
-        "stopped", then with `stopped_because` and `remedy`) and the facts about the run.
+        "stopped", then with `stopped_because` and `remedy`), `unstable_points` (how many) and
+        `stability_changes` (in words), and the facts about the run.
 
     Raises
     ------
@@ -110,6 +113,12 @@ def trace(
         An argument out of range; supports that leave a mechanism; nothing that loads the case.
     ComputationError
         The path cannot go on; the exception's `partial` has it up to its last point.
+
+    Warns
+    -----
+    FoldynWarning
+        The count of negative eigenvalues changes along the path, but for limit points that
+        "mgdcm" and "arc_length" have located.
 
     Examples
     --------
@@ -235,6 +244,11 @@ class Recorder:
     def dataset(self, seconds: float, end: dict[str, Any]) -> xarray.Dataset:
         """The points so far, with the case and the facts about the run."""
         problem, points, tally = self.problem, self.points, self.solver.tally
+        from_rest = self.facts["started_from"] == "rest"
+        free = method_of(self.facts["method"]).rule is not None
+        told = stability_changes.warning(points, from_rest, free)
+        if told:
+            warnings.warn(told, FoldynWarning, stacklevel=4)
         residuals = [problem.residual(p.u, p.factor) for p in points]
         energies = np.array([problem.energies(p.u, p.factor) for p in points])
         columns = dict(zip(problem.groups, energies.T, strict=True))
@@ -247,6 +261,7 @@ class Recorder:
             "factorizations": tally.factorizations,
             "step_cuts": tally.cuts,
             "wall_seconds": seconds,
+            **stability_changes.facts(points, from_rest),
         }
         own = "an adaptive load, a function of the user's own, acted on it"
         return path_dataset(

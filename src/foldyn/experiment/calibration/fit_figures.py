@@ -66,7 +66,7 @@ def plot_shapes(one: Shapes, case: Case, model: NDArray[np.float64]) -> Figure:
     origin = rest[:, letters] if one.quantity == "displacement" else 0.0
     steps = np.linspace(0, len(one.load_factor) - 1, min(MOST, len(one.load_factor))).astype(int)
     span = [np.ptp((model + origin)[..., k]) for k in (across, up)]
-    shape = min(max(span[1] / max(span[0], 1e-9), 0.3), 1.6)
+    shape = min(max(span[1] / span[0], 0.3), 1.6) if span[0] > 0.0 else 1.6
     columns = min(len(steps), 4)
     rows = -(-len(steps) // columns)
     figure = style.new_figure(WIDTH, rows * (WIDTH / columns * shape + 0.6) + 0.5)

@@ -1,0 +1,83 @@
+"""What the energy audit says where rounding is all that moves, and where it hides the hinges."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.dynamics.audit import Rounding
+from foldyn.errors import ComputationError, FoldynWarning
+
+SUPPORTS = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
+
+
+def fold(thickness=0.01, density=1.0, size=1.0):
+    pattern = fd.patterns.simple_fold(size, 1.2 * size, 60)
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, density))
+
+
+def motion(structure, load, method="rk4", duration=0.3, initial=None, history=None):
+    """A motion, and what was said of it."""
+    force = fd.Force([0, 1], (-load, 0.0, 0.0), history or fd.HalfSine(0.2))
+    case = fd.Case(structure, SUPPORTS, [force], fd.Rayleigh(0.5))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", FoldynWarning)
+        found = fd.simulate(case, duration, method, every=0.1 * duration, initial=initial)
+    return found, [str(one.message) for one in told]
+
+
+@pytest.mark.parametrize("load", [1e-3, 1e-9, 1e-12])
+def test_nothing_is_said_of_motions_that_hinges_follow(load):
+    found, said = motion(fold(), load)
+    assert not said and found.attrs["energy_error"] < 1e-4
+
+
+@pytest.mark.parametrize("load", [1e-15, 1e-30])
+def test_displacements_that_rounding_hides_from_the_hinges(load):
+    found, said = motion(fold(), load)
+    assert len(said) == 1 and said[0].startswith("nothing moves farther than")
+    assert 0.0 < np.abs(found.displacement.values).max() < 1e-12
+
+
+def test_a_body_too_heavy_to_move_is_not_silently_fine():
+    """An energy error of 100 % once counted as negligible here."""
+    found, said = motion(fold(density=1e300), 0.01, "generalized_alpha")
+    assert found.attrs["energy_error"] > 0.5 and len(said) == 1
+
+
+def test_it_does_not_depend_on_the_unit_of_length():
+    for size in (1e-6, 1e3):
+        rounding = Rounding(fd.dynamics.system.pack(case_of_size(size), 1.0).model)
+        assert rounding.least_motion(0.01) / size == pytest.approx(LEAST, rel=1e-12)
+        energy = np.zeros((1, 6))
+        found = rounding.energy(energy, 0.01 * size)
+        assert found / size**3 == pytest.approx(AT_ONE.energy(energy, 0.01), rel=1e-12)
+
+
+def case_of_size(size):
+    return fd.Case(fold(0.01 * size, 1.0, size), SUPPORTS)
+
+
+AT_ONE = Rounding(fd.dynamics.system.pack(case_of_size(1.0), 1.0).model)
+LEAST = AT_ONE.least_motion(0.01)
+
+
+@pytest.mark.parametrize("method", ["rk4", "dormand_prince"])
+def test_an_equilibrium_that_rests_is_rounding_and_not_unstable(method):
+    structure = fold()
+    held = fd.Case(structure, SUPPORTS, [fd.Force([0, 1], (-1e-3, 0.0, 0.0))])
+    start = fd.initial_state(fd.trace(held, steps=2))
+    found, said = motion(structure, 1e-3, method, 0.3, start, fd.Constant())
+    apart = np.abs(found.displacement - found.displacement[0]).max()
+    assert float(apart) < 1e-6
+    assert all("below the rounding errors" in one for one in said)
+
+
+def test_a_motion_that_explodes_from_next_to_nothing_is_still_stopped():
+    case = fd.Case(fold(), SUPPORTS, [fd.Force([0, 1], (-1e-9, 0.0, 0.0))])
+    dt = 1.5 * fd.critical_step(case)
+    with pytest.raises(ComputationError):
+        fd.simulate(case, 2000 * dt, "rk4", dt=dt, force=True)

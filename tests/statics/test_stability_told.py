@@ -1,0 +1,110 @@
+"""A path that loses stability says so, once, and its facts always."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from trusses import APEX, VonMises
+
+import foldyn as fd
+from foldyn.errors import ComputationError, FoldynWarning
+from foldyn.statics import Settings, stability_changes, trace
+from foldyn.statics.station import Point
+
+STEEP = VonMises(h=2.0)  # gives way sideways at 2530 N, before its limit point
+SHALLOW = VonMises()
+
+
+def strut(kind="force"):
+    """Two flat panels in a row, pressed together: they buckle."""
+    corners = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
+    pattern = fd.Pattern(corners, [[0, 1, 4, 5], [1, 2, 3, 4]])
+    s = fd.discretize(
+        pattern, fd.Sheet(1e6, 0.25, 0.01), crease_stiffness=0.1, fold_law="linear",
+        bend_law="linear",
+    )  # fmt: skip
+    supports, loads = [fd.Fix([0, 5], "xyz"), fd.Fix([2, 3], "yz")], []
+    if kind == "force":
+        loads.append(fd.Force([2, 3], (-1.0, 0.0, 0.0)))
+    else:
+        supports.append(fd.Impose([2, 3], "x", -1e-3))
+    return fd.Case(s, supports, loads)
+
+
+def told(case, *arguments, **given):
+    """The path and what was said of it."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", FoldynWarning)
+        path = trace(case, *arguments, **given)
+    return path, [str(one.message) for one in found]
+
+
+@pytest.mark.parametrize("kind", ["force", "displacement"])
+def test_newton_past_a_buckling_load(kind):
+    """Every point is regular, and the eigenvalues tell all the same."""
+    path, said = told(strut(kind), "newton", steps=10)
+    counts = path.negative_eigenvalues.values
+    assert set(path.point.values) == {"regular"} and counts[0] == 0 < counts[-1]
+    first = int(np.argmax(counts > 0))
+    factors = path.load_factor.values
+    assert len(said) == 1
+    where = f"is 0 at the load factor {factors[first - 1]:.4g}, {counts[first]} at"
+    assert f"{where} {factors[first]:.4g}" in said[0]
+    assert "method 'arc_length' locates the point" in said[0]
+    assert path.attrs["unstable_points"] == (counts > 0).sum()
+    assert path.attrs["stability_changes"].startswith(said[0].split("eigenvalues is ")[1][:20])
+
+
+def test_a_located_bifurcation_is_told_once():
+    path, said = told(
+        STEEP.case(free="xz"), "arc_length", first_step=100.0, steps=60,
+        until=lambda u, factor: u[APEX, 2] < -2.2 * STEEP.h,
+    )  # fmt: skip
+    assert len(said) == 1
+    assert "is 0 up to the load factor 2530 (bifurcation), then 1." in said[0]
+    changes = path.attrs["stability_changes"].split("; ")
+    assert len(changes) == 4 and "(limit point), then 2" in changes[1]
+
+
+def test_a_limit_point_that_was_asked_for_is_marked_and_not_warned_of():
+    limit = SHALLOW.limit
+    path, said = told(SHALLOW.case(), "arc_length", first_step=0.2 * limit, steps=40)
+    assert not said and "limit" in path.point.values
+    assert path.attrs["unstable_points"] == (path.negative_eigenvalues.values > 0).sum() > 0
+    assert "(limit point)" in path.attrs["stability_changes"]
+    _, said = told(
+        SHALLOW.case(), "arc_length", first_step=0.2 * limit, steps=40,
+        settings=Settings(locate=False),
+    )  # fmt: skip
+    assert len(said) == 1  # nothing marks it
+
+
+def test_stable_paths_and_uncounted_ones():
+    path, said = told(STEEP.case(free="xz"), load_factors=[0.0, 1000.0, 2000.0])
+    assert not said
+    assert path.attrs["unstable_points"] == 0 and path.attrs["stability_changes"] == "none"
+    path, said = told(strut(), steps=10, settings=Settings(stability=False))
+    assert not said
+    assert path.attrs["unstable_points"] == -1
+    assert path.attrs["stability_changes"] == "not counted"
+
+
+def test_a_path_that_stops_tells_it_too():
+    with pytest.raises(ComputationError) as caught, pytest.warns(FoldynWarning, match="loses"):
+        trace(STEEP.case(free="xz"), load_factors=[0.0, 2000.0, 2600.0, 1e5])
+    assert caught.value.partial.attrs["unstable_points"] == 1
+
+
+def test_a_path_that_begins_unstable_or_regains_stability():
+    def points(*counts):
+        return [Point(np.zeros(3), 0.1 * k, 1, 0.0, n) for k, n in enumerate(counts)]
+
+    assert "is 2 from the start" in stability_changes.warning(points(2, 2), True, False)
+    assert not stability_changes.warning(points(2, 2), False, False)  # the state was given so
+    assert not stability_changes.warning(points(1, 0), False, False)
+    many = stability_changes.warning(points(0, 1, 0, 3), False, False)
+    assert "is 0 at the load factor 0, 1 at 0.1, and at 1 more places (up to 3)" in many
+    long = stability_changes.facts(points(*[0, 1] * 40), False)["stability_changes"]
+    assert long.count(";") == stability_changes.MOST_TOLD and long.endswith("and 59 more")
