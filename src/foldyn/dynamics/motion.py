@@ -280,7 +280,7 @@ class Motion:
         size, least = float(self._course.clock[3]), self.plan.floor
         if 0.0 < size < least:
             return (
-                f"the motion is small: {size:.2g} m at most, where the errors of steps are measured "
+                f"the motion is small: {size:.2g} m at most, where errors of steps are measured "
                 f"by {least:.2g} m, a share of the longest bar; use a tolerance of "
                 f"{self.plan.tolerance * size / least:.1g}, or a method with a fixed step"
             )
