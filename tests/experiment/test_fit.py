@@ -295,7 +295,7 @@ def test_results_as_files(pressed, tmp_path) -> None:
     [
         ({"starts": 0}, "starts = 0: must be a whole number, at least 1"),
         ({"processes": 1.5}, "processes = 1.5: must be a whole number"),
-        ({"confidence": 95}, "confidence = 95: must be below 1"),
+        ({"confidence": 95}, "confidence = 95: must be less than 1"),
     ],
 )
 def test_arguments_that_make_no_sense(pressed, changes, message) -> None:

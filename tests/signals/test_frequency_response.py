@@ -305,7 +305,7 @@ def test_bad_input(arguments, words):
         (exponential_window, (100, 0.1, -1.0), "rate: -1.0 must be finite, above 0"),
         (exponential_window, (0, 0.1, 1.0), "n = 0"),
         (without_window, (10.0, 1.2, 1.0), "damping_ratio"),
-        (without_window, (10.0, 0.1, "fast"), "rate: 'fast' is not a number"),
+        (without_window, (10.0, 0.1, "fast"), 'rate: "fast" is not a finite number'),
     ],
 )
 def test_bad_windows(function, arguments, words):
