@@ -120,7 +120,7 @@ def _words(random: Random, data: bytes, seeds: Sequence[bytes], words: Sequence[
         pieces[i], pieces[j] = pieces[j], pieces[i]
     elif kind == "again":
         repeated = pieces[i : i + random.randint(1, 6)]
-        many = min(random.choice((2, 3, 30, 1000)), LONGEST // sum(map(len, repeated)) + 1)
+        many = min(random.choice((2, 3, 30, 1000)), LONGEST // (sum(map(len, repeated)) + 1))
         pieces[i : i + 1] = repeated * many
     elif kind == "deep":
         opened, closed = random.choice(((b"[", b"]"), (b"{", b"}"), (b"(", b")"), (b"-", b"")))

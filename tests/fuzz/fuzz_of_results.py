@@ -117,6 +117,8 @@ def _replace(random: Random, file: h5py.File, name: str) -> None:
     scales = known.pop("DIMENSION_LIST", None) if random.random() < 0.3 else None
     shape = file[name].shape if isinstance(file[name], h5py.Dataset) else ()
     shape = random.choice((shape, shape, shape, (), (0,), (1,), (3,), (*shape, 2), shape[:-1]))
+    if np.prod(shape, dtype=float) > 10_000:
+        shape = (3,)
     del file[name]
     file.create_dataset(name, data=_values(random, shape))
     for key, value in known.items():
@@ -143,7 +145,9 @@ def _values(random: Random, shape: tuple[int, ...]) -> Any:
 def _number(random: Random, file: h5py.File, name: str) -> None:
     """A boundary number in its place."""
     item = file[name]
-    if not isinstance(item, h5py.Dataset) or not item.size or item.dtype.kind not in "iuf":
+    if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "iuf":
+        return
+    if not item.size or item.size > 10_000:
         return
     values = item[()].ravel() if item.ndim else np.array([item[()]])
     choice = REALS if values.dtype.kind == "f" else [n for n in INTEGERS if abs(n) < 2**62]

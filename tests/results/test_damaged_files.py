@@ -181,6 +181,22 @@ def test_what_is_made_of_a_result_checks_it(make, change, text, motion):
         make(change(motion))
 
 
+def test_a_damaged_case_asks_for_no_mesh_larger_than_the_result():
+    pattern = fd.patterns.miura((1, 1))
+    shell = fd.shell(pattern, fd.Sheet(1e6, 0.25, 0.01, 1e3), divisions=2)
+    case = fd.Case(shell, [fd.Fix("xmin")])
+    moved, reaction = np.zeros((1, len(shell.nodes), 3)), np.zeros((1, len(case.supported_dofs)))
+    ds = trajectory_dataset(case, [0.0], moved, moved, reaction, {}, {})
+    assert fd.case_of(ds).structure.options.divisions == 2
+    text = str(ds["case"].values[()])
+    start = time.perf_counter()
+    for many in (4, 10**9, 2**62):
+        other = ds.assign(case=((), text.replace("divisions = 2", f"divisions = {many}")))
+        with pytest.raises(InputError, match="its structure has at least"):
+            fd.case_of(other)
+    assert time.perf_counter() - start < 2.0
+
+
 # ------------------------------------------------------------------- a process of its own
 def test_a_call_apart_returns_what_it_makes_or_raises_it():
     here = os.getpid()

@@ -276,7 +276,15 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         warnings.simplefilter("ignore", FoldynWarning)
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
         sheet = Sheet(**sections["sheet"])
-        structure = MODELS[model.pop("kind", BARS_AND_HINGES)].make(pattern, sheet, **model)
+        kind = model.pop("kind", BARS_AND_HINGES)
+        pieces = model.get("divisions", 1) if kind == SHELL else 1
+        least = len(pattern.vertices) + len(pattern.edges) * (pieces - 1)
+        if least > len(nodes):  # before a mesh of any size is made
+            raise InputError(
+                f"the result holds rest positions of {len(nodes)} nodes, its structure has at "
+                f"least {least}: use the whole result, not a selection of its nodes"
+            )
+        structure = MODELS[kind].make(pattern, sheet, **model)
         if nodes.shape != structure.nodes.shape:
             raise InputError(
                 f"the result holds rest positions of shape {nodes.shape}, its structure has "
