@@ -240,8 +240,10 @@ class Implicit:
         if force is not None:
             if not newton.matrix.factorized and not newton.renew(h):
                 return math.inf, scale
-            moved = _largest(newton.matrix.solve(force, bench.step)) / reference
-            error = max(moved**1.5, moved * self._horizon / h if self._horizon > h else 0.0)
+            moved = newton.matrix.solve(force, bench.step) / reference
+            error = _largest(moved) ** 1.5
+            if h < self._horizon:
+                error = max(error, _largest(moved[~bench.massless]) * self._horizon / h)
         change = scheme.change(h)
         if change.any() and newton.matrix.factorized:
             times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
