@@ -96,7 +96,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
         array = np.asarray(value)
     except ValueError:
         raise InputError(f"{name} = {show(value)}: rows have different lengths") from None
-    if array.size and (array.dtype.kind not in "iuf" or _has_truth_values(value)):
+    if array.dtype.kind not in "iuf" or _has_truth_values(value):
         raise InputError(f"{name} = {show(value)}: must be numbers")
     result = np.array(array, dtype=np.float64)
     bad = np.argwhere(~np.isfinite(result))
