@@ -173,7 +173,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
         raise InputError(f"{name} = {show(value)}: rows have different lengths") from None
     if array.dtype == object:  # whole numbers beyond 64 bits are numbers too, if too large
         array = _as_floats(array)
-    if array.size and (array.dtype.kind not in "iuf" or _has_truth_values(value)):
+    if array.dtype.kind not in "iuf" or _has_truth_values(value):
         raise InputError(f"{name} = {show(value)}: must be numbers")
     result = np.array(array, dtype=np.float64)
     for usable, words in (

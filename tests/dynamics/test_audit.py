@@ -44,7 +44,7 @@ def test_displacements_that_rounding_hides_from_the_hinges(load):
 
 def test_a_body_too_heavy_to_move_is_not_silently_fine():
     """An energy error of 100 % once counted as negligible here."""
-    found, said = motion(fold(density=1e300), 0.01, "generalized_alpha")
+    found, said = motion(fold(density=1e45), 0.01, "generalized_alpha")
     assert found.attrs["energy_error"] > 0.5 and len(said) == 1
 
 

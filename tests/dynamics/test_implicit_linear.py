@@ -136,6 +136,7 @@ def test_high_frequencies_die_out_with_the_radius():
         assert np.abs(np.polyval(parabola, n) * radius**n / x - 1.0).max() < 0.02
 
 
+@pytest.mark.filterwarnings("ignore:steps of 0.5 s do not resolve")
 @pytest.mark.parametrize("method", ["newmark", "energy_momentum"])
 def test_a_linear_system_keeps_its_energy_and_closes_its_balance(method):
     """Whatever the step: free, and with damping and a load the balance closes to rounding."""
@@ -177,8 +178,8 @@ def test_a_node_without_mass_is_in_equilibrium(method, beta):
 def test_bad_arguments():
     case = oscillator(linear_law(), K)
     for options, message in (
-        ({"method": "generalized_alpha", "spectral_radius": 1.2}, "from 0 to 1"),
-        ({"method": "generalized_alpha", "spectral_radius": "half"}, "from 0 to 1"),
+        ({"method": "generalized_alpha", "spectral_radius": 1.2}, "at most 1"),
+        ({"method": "generalized_alpha", "spectral_radius": "half"}, "must be a number"),
         ({"method": "newmark", "spectral_radius": 0.8}, "newmark has none"),
         ({"method": "rk4", "spectral_radius": 0.8}, "rk4 has none"),
         ({"method": "newmark", "tolerance": -1.0}, "tolerance = -1"),

@@ -89,10 +89,9 @@ def damage(random: Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     with h5py.File(whole, "r+") as file:
         for _ in range(random.choice((1, 1, 2, 4))):
             name = random.choice(list(file))
-            if file.get(name) is None:  # a link that leads nowhere
-                continue
             with suppress(KeyError, OSError, RuntimeError, TypeError, ValueError):
-                random.choice(_OF_PARTS)(random, file, name)  # HDF5 itself refuses some
+                if file.get(name) is not None:  # no link that leads nowhere
+                    random.choice(_OF_PARTS)(random, file, name)  # HDF5 itself refuses some
             if not len(file):
                 break
     return whole.getvalue()

@@ -137,11 +137,32 @@ def test_much_that_is_well_packed_is_read(tmp_path):
             lambda ds: ds.assign(x=((), 1.0, {"part_of_complex": "response"})),
             "lacks its real or imaginary part",
         ),
+        (
+            lambda ds: ds.assign(
+                x_real=((), 1.0, {"part_of_complex": "x"}), x_imag=("node", ds["node"].values)
+            ),
+            "lacks its real or imaginary part",
+        ),
+        (
+            lambda ds: ds.assign(x_real=((), 1, {"part_of_complex": "x"}), x_imag=((), 2.0)),
+            "lacks its real or imaginary part",
+        ),
     ],
 )
 def test_results_with_the_wrong_contents_are_refused(change, text, motion, tmp_path):
     netcdf.write(change(motion), tmp_path / "run.nc")
     assert text in refusal(tmp_path / "run.nc")
+
+
+def test_variables_must_fit_their_dimensions(file):
+    with h5py.File(file, "r+") as made:
+        known = dict(made["node"].attrs)
+        del made["node"]
+        made["node"] = np.arange(2)
+        for key in ("CLASS", "NAME", "_Netcdf4Dimid"):
+            if key in known:
+                made["node"].attrs[key] = known[key]
+    assert "it is damaged" in refusal(file)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_enough_supports(sheet):
 
 def test_folds_without_stiffness(sheet):
     """A Miura whose creases resist nothing folds as a rigid mechanism, with one freedom."""
-    loose = specimen(crease_stiffness=1e-300)
+    loose = specimen(crease_stiffness=1e-50)
     found = names(loose, ideal_supports())
     assert len(found) == 1
     assert found[0].startswith("internal mechanism that moves nodes 0, 1, 2, 3, 4, 5, 6")

@@ -184,6 +184,7 @@ def test_pattern_of_many_kinds_of_panels():
     assert kinds[12:] == pattern.boundary.tolist()
 
 
+@pytest.mark.filterwarnings("ignore:vertices. the boundary edges")
 def test_a_panel_too_narrow_for_its_center_is_refused():
     """Rounding hides where diagonals cross that are parallel to 1e-9; near that, it does not."""
     for length in (1.0, 1e4):

@@ -98,7 +98,11 @@ def _load(path: Path) -> xr.Dataset:
     _check_header(path)
     with warnings.catch_warnings():  # of xarray, on what it finds odd
         warnings.simplefilter("ignore")
-        return xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+        ds = xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+    for name, variable in ds.variables.items():
+        if variable.shape != tuple(ds.sizes[dim] for dim in variable.dims):
+            raise ValueError(f"{name}: {variable.shape} does not fit its dimensions")
+    return ds
 
 
 def _check_header(path: Path) -> None:

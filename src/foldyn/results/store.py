@@ -99,6 +99,8 @@ def _joined(ds: xr.Dataset) -> xr.Dataset:
         if name is None:
             continue
         real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
+        if real.dims != imag.dims or {real.dtype.kind, imag.dtype.kind} != {"f"}:
+            raise TypeError(name)
         # not real + 1j * imag: an infinite part would make the other one nan
         whole = np.empty(real.shape, np.complex128)
         whole.real, whole.imag = real.values, imag.values
