@@ -43,9 +43,10 @@ def test_displacements_that_rounding_hides_from_the_hinges(load):
 
 
 def test_a_body_too_heavy_to_move_is_not_silently_fine():
-    """An energy error of 100 % once counted as negligible here."""
+    """What it does is below rounding, which once counted as a balance that closes."""
     found, said = motion(fold(density=1e45), 0.01, "generalized_alpha")
-    assert found.attrs["energy_error"] > 0.5 and len(said) == 1
+    assert len(said) == 1 and said[0].startswith("nothing moves farther than")
+    assert 0.0 < np.abs(found.displacement.values).max() < 1e-40
 
 
 def test_it_does_not_depend_on_the_unit_of_length():

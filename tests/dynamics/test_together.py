@@ -96,6 +96,7 @@ def test_all_threads_stop_where_one_finds_the_motion_wrong(monkeypatch, method):
     assert str(found.value) == str(alone.value)
 
 
+@pytest.mark.filterwarnings("ignore:steps of")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_load_that_is_not_finite_stops_all_threads(monkeypatch, method):
     table = fd.Table([0.0, 0.001, 0.0011], [1.0, 1.0, 1e50])

@@ -49,7 +49,7 @@ FAULTS = {
     "warns": ("import warnings; warnings.warn('overflow', RuntimeWarning)", "RuntimeWarning"),
     "dies": ("import os; os.abort()", "SIGABRT"),
     "leaves": ("import os; os._exit(3)", "exit status 3"),
-    "talks": ("raise InputError('word ' * 2000)", "a message of 10000 letters"),
+    "talks": ("e = InputError(''); e.args = ('word ' * 2000,); raise e", "of 10000 letters"),
 }
 
 
