@@ -15,6 +15,8 @@ from typing import Any, TypeVar
 from foldyn.errors import FoldynError
 
 T = TypeVar("T")
+IDLE = 4
+"""How much longer than it computes a call may take: the machine has other work."""
 
 
 def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
@@ -27,7 +29,8 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
     make : callable
         Without arguments; what it returns can be pickled.
     seconds : int
-        After which its process is ended.
+        Of computing, after which its process is ended; by the clock it may take `IDLE` times as
+        many.
     memory : int
         Bytes that it may take beside what this process has.
 
@@ -66,8 +69,8 @@ def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) ->
     try:
         for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
-        signal.alarm(seconds)
-        _limit(memory)
+        signal.alarm(IDLE * seconds)
+        _limit(seconds, memory)
         faulthandler.disable()
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
@@ -84,9 +87,10 @@ def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) ->
         os._exit(0)
 
 
-def _limit(memory: int) -> None:
+def _limit(seconds: int, memory: int) -> None:
     import resource  # there is none on Windows
 
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     _, most = resource.getrlimit(resource.RLIMIT_AS)
     wanted = pages * resource.getpagesize() + memory

@@ -7,8 +7,10 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import h5netcdf  # noqa: F401  here, and not in the processes that read
 import h5py
 import xarray as xr
+from xarray.backends import list_engines
 
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
@@ -22,8 +24,8 @@ MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 LEAST_MEMORY = 2**29
 """Bytes that a file without a seal may take beside what it holds."""
-LEAST_SECONDS, PER_SECOND = 4, 50_000
-"""Time that a file without a seal may take, and the bytes that take a second more."""
+LEAST_SECONDS, PER_SECOND = 2, 50_000
+"""Computing time that a file without a seal may take, and the bytes that take a second more."""
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -81,6 +83,7 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
         if sealed:
             return _load(path)
         size = path.stat().st_size  # HDF5 may crash on what is damaged
+        list_engines()  # once, and not in each of the processes
         seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
         return apart(lambda: _load(path), seconds, memory)
     except InputError:
