@@ -113,6 +113,27 @@ def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edi
         assert fd.load(folder / "result.nc").sizes["time"] == 101
 
 
+def test_exit_status_of_an_interrupt_within_code_made_from_text(tmp_path) -> None:
+    """As where the signal meets the making of a dataclass; CPython would end by SIGINT itself."""
+    (tmp_path / "stopped.py").write_text(
+        "import sys\n"
+        "from foldyn.cli import main\n"
+        "def call(_):\n"
+        "    exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)\\nwhile True: pass')\n"
+        "main._call = call\n"
+        "sys.exit(main.main(['info']))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "stopped"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": SOURCE},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (130, "foldyn: interrupted\n")
+
+
 def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
     """Neither HDF5 nor the interpreter falls over, and nothing cut stays."""
     workplace.run(miura, "--out", "before")  # compiles

@@ -46,6 +46,8 @@ class Endings:
         finally:
             for one, handler in before.items():
                 signal.signal(one, handler)
+            if self.first is not None:
+                _forget_interrupt()
 
     @contextmanager
     def saving(self) -> Iterator[None]:
@@ -68,6 +70,16 @@ class Endings:
             return
         self._due = False
         raise KeyboardInterrupt
+
+
+def _forget_interrupt() -> None:
+    """Let the exit status be ours.
+
+    CPython notes that KeyboardInterrupt ended a piece of code given as text, as dataclasses and
+    named tuples are made of, and `python -m` then ends by SIGINT even where the exception was
+    caught. The next piece of text that is run to its end clears the note.
+    """
+    eval("None")
 
 
 ENDINGS = Endings()
