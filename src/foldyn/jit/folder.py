@@ -8,6 +8,7 @@ that one is the user's alone.
 from __future__ import annotations
 
 import atexit
+import hashlib
 import os
 import shutil
 import stat
@@ -18,7 +19,6 @@ from functools import cache
 from pathlib import Path
 
 from numba.core import config
-from numba.core.caching import UserProvidedCacheLocator
 from numba.misc.appdirs import AppDirs
 
 from foldyn.errors import FoldynWarning
@@ -30,7 +30,7 @@ REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
 def folder_for(source: Path) -> Path | None:
     """Folder for the kernels of a folder of sources; None where nothing can be written."""
     named = str(getattr(config, "CACHE_DIR", ""))
-    inside = UserProvidedCacheLocator.get_suitable_cache_subpath(str(source / "__init__.py"))
+    inside = f"{source.name}_{hashlib.sha1(os.fsencode(source)).hexdigest()[:16]}"
     if named:
         folder = Path(named).absolute() / inside
         if _writable(folder):
