@@ -9,7 +9,6 @@ from scipy import sparse
 import foldyn as fd
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import pack
-from foldyn.statics.body import body_of
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 PATTERNS = {
@@ -43,7 +42,7 @@ def test_it_solves_with_stiffness_mass_and_damping(name, mass):
 
     none = sparse.csr_array((shell.rotations, shell.rotations))
     inertia = sparse.block_diag([sparse.kron(shell.mass, np.eye(3)), none])
-    body, rest = body_of(shell), np.concatenate([np.zeros(3 * n), rotation])
+    body, rest = shell.body, np.concatenate([np.zeros(3 * n), rotation])
     whole = weights.stiffness * body.tangent(np.concatenate([u[:n].ravel(), rotation]))
     whole = whole + weights.mass * inertia + weights.damping * beta * body.tangent(rest)
     free = np.setdiff1d(np.arange(size), range(6))

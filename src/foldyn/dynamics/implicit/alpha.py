@@ -26,7 +26,6 @@ from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, jud
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
-from foldyn.dynamics.kinds import fold_angles
 from foldyn.dynamics.system import acceleration, moving_energy
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.borrow import borrowed
@@ -101,7 +100,7 @@ class Alpha:
         b, packed = self.bench, self.bench.packed
         done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
         if packed.system.turns:
-            angle = fold_angles(b.work)
+            angle = b.work.fold_angle
             done += _actuation(packed.model, packed.system, b.old, b.new, b.folds, angle)
         return done, lost
 

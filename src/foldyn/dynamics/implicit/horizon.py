@@ -9,7 +9,6 @@ import numpy as np
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.kinds import hinges_linear
 from foldyn.statics.linear_solver import SingularTangentError
 
 
@@ -21,7 +20,7 @@ def horizon(bench: Bench, matrix: StepMatrix, duration: float) -> float:
     """
     packed, u = bench.packed, bench.displacement()
     force = bench.push(bench.old, np.ones(len(bench.old.factor)))
-    model, pattern = hinges_linear(packed.model, u), matrix.pattern
+    model, pattern = packed.body.nominal(u).model, matrix.pattern
     matrix.blocks.put(model, pattern, u, u, False, matrix.stiffness)
     slow = (2.0 * math.pi / duration) ** 2
     try:
