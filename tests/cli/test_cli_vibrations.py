@@ -59,7 +59,7 @@ def small(edited):
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch):
     """Films of two pictures: what they show is tested with the figures."""
-    monkeypatch.setattr("foldyn.report.modes.FRAMES", 2)
+    monkeypatch.setattr("foldyn.analyses.modes.FRAMES", 2)
 
 
 def cells_of(page: str) -> list[list[str]]:

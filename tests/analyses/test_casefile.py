@@ -7,7 +7,8 @@ import textwrap
 import numpy as np
 import pytest
 
-from foldyn.cases import Chirp, Constant, Force, Gravity, Pulse, Rayleigh, Table, read_case
+from foldyn.analyses import read_case
+from foldyn.cases import Chirp, Constant, Force, Gravity, Pulse, Rayleigh, Table
 from foldyn.errors import InputError
 from foldyn.formats import write_pattern
 from foldyn.materials import EnhancedLinear
