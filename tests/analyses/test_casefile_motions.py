@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 import pytest
 
@@ -62,7 +60,7 @@ def test_moving_supports_and_actuated_creases(read, short, tmp_path) -> None:
     np.testing.assert_array_equal(np.argwhere(case.imposed), [[6, 2], [7, 1], [8, 2]])
     np.testing.assert_array_equal(found.output.nodes, [3, 4, 5, 6, 7, 8])  # what can move
     assert found.initial() is None
-    assert found.start is None
+    assert found.initial() is None
 
 
 def test_a_rigid_start_turns_about_the_center_of_mass(read, short) -> None:
@@ -129,6 +127,8 @@ def test_a_start_from_a_result(read, short, tmp_path) -> None:
     state = found.initial()
     np.testing.assert_array_equal(state.displacement, motion.displacement.values[-2])
     np.testing.assert_array_equal(state.velocity, motion.velocity.values[-2])
+    last = read(f"{short}[initial]\nfile = 'runs/first.nc'\n").initial()
+    np.testing.assert_array_equal(last.displacement, motion.displacement.values[-1])
     with pytest.raises(
         InputError, match=r"case2\.toml: initial\.at = 9999: the result has samples 0"
     ):
@@ -140,8 +140,3 @@ def test_a_start_from_a_result(read, short, tmp_path) -> None:
     assert f'"runs/first.nc": holds a motion of {count - 1} nodes, but this structure has ' in (
         str(caught.value)
     )
-
-
-def test_the_sample_of_a_result_is_the_last_by_default(read, short) -> None:
-    found = read(textwrap.dedent(short) + "[initial]\nfile = 'first.nc'\n")
-    assert (found.start.file, found.start.at) == ("first.nc", -1)

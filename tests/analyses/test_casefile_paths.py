@@ -233,7 +233,7 @@ BAD = {
     ),
     "base": (
         [("[[loads]]", '[[supports]]\nbase = "x"\n[[loads]]')],
-        'supports[1].base = "x": a base moves over time, which a path has not; give nodes, axis',
+        'supports[1].base = "x": a base moves over time, and a path has no time; give nodes, axis',
     ),
     "masses": (
         [("[[supports]]", '[model]\nmass = ["panel", "centroid"]\n[[supports]]')],

@@ -155,7 +155,7 @@ WRONG = {
     ),
     "a secant": (
         [SHELL, MODES[0], (STATICS, 'kind = "modes"\nsecant = 1')],
-        "analysis.secant = 1.0: is for superlinear bends, which a shell has not; leave it out",
+        "analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out",
     ),
     "a support on the mesh": (
         [SHELL, ("nodes = [4, 5]", "nodes = [4, 6]")],

@@ -7,8 +7,8 @@ import warnings
 
 import pytest
 
+from foldyn.analyses import limits
 from foldyn.analyses.reading import read_case
-from foldyn.cases import limits
 from foldyn.errors import InputError
 
 CASE = """

@@ -11,6 +11,7 @@ import xarray as xr
 
 import foldyn as fd
 from foldyn.analyses import read_case
+from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, History

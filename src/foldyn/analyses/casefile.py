@@ -74,20 +74,18 @@ class Analysis(ABC):
         What a case file calls it.
     schema : type
         What such a case file looks like.
-    name : str
-        In messages: "a motion".
     files : tuple of str
         Figures and animations that its page comes with.
-    needs_density : bool
+    needs_density : str
+        Beginning of a message, "a motion needs"; "" where it does without.
     arguments : dict
         Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
     """
 
     kind: ClassVar[str]
     schema: ClassVar[type[CaseSchema]]
-    name: ClassVar[str]
     files: ClassVar[tuple[str, ...]]
-    needs_density: ClassVar[bool] = True
+    needs_density: ClassVar[str]
 
     def __init__(self, arguments: dict[str, Any]) -> None:
         self.arguments = arguments

@@ -202,7 +202,7 @@ class FrfAnalysis(Analysis):
 
     kind = "frf"
     schema = FrfSchema
-    name = "a frequency response"
+    needs_density = "a frequency response needs"
     files = ("response.png", "nyquist.png")
 
     @classmethod

@@ -79,7 +79,7 @@ class ModesAnalysis(Analysis):
 
     kind = "modes"
     schema = ModesSchema
-    name = "modes"
+    needs_density = "modes need"
     files = ("modes.png", "mac.png", "modes.gif", "modes.mp4")
 
     @classmethod

@@ -102,7 +102,7 @@ class MotionAnalysis(Analysis):
 
     kind = "dynamics"
     schema = MotionSchema
-    name = "a motion"
+    needs_density = "a motion needs"
     files = ("load.png", "motion.png", "energies.png")
 
     @classmethod

@@ -192,12 +192,11 @@ class PathAnalysis(Analysis):
 
     kind = "statics"
     schema = PathSchema
-    name = "a path"
     files = (
         *(f"{name}.png" for name in ("reaction", "curve", "energies", "shapes")),
         "path.gif", "path.mp4",
     )  # fmt: skip
-    needs_density = False
+    needs_density = ""
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:

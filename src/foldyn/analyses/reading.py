@@ -134,7 +134,7 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         sheet = Sheet(**schema.sheet.model_dump())
         kind = ANALYSES[schema.analysis.kind]
         if sheet.density is None and kind.needs_density:
-            raise InputError(f": missing; {kind.name} needs it (kg/m3)", "sheet.density")
+            raise InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density")
         if schema.model.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping."):
