@@ -8,7 +8,7 @@ import pytest
 import foldyn as fd
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.cli.main import main
-from foldyn.cli.shortcuts import read_as
+from foldyn.analyses.reading import read_as
 from foldyn.errors import FoldynWarning, InputError
 
 GRID = {"first": 0.0, "last": 3.0, "count": 31}

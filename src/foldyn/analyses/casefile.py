@@ -250,9 +250,9 @@ class CaseFile:
         return Computation(self, self._rule(mass), changes)
 
     @contextmanager
-    def placing(self, mass: str) -> Iterator[None]:
+    def placing(self, mass: str | None = None) -> Iterator[None]:
         """Put the file, the mass rule and the table of the key before bad input."""
-        rule = f'mass = "{mass}": ' if len(self.masses) > 1 else ""
+        rule = f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
         try:
             yield
         except InputError as error:

@@ -52,7 +52,7 @@ def run(
     with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
         case_file = read(path)
         task = [case_file.computation(mass) for mass in case_file.masses]
-        with case_file.placing(case_file.masses[0]):
+        with case_file.placing():
             case_file.analysis.check([one.compute for one in task], figures)
         if figures:
             _check_video(case_file)

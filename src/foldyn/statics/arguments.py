@@ -74,7 +74,7 @@ def check_steps(steps: Any, dofs: int) -> None:
 def _driven(method: Method, factors: list[float] | None, steps: int | None) -> Plan:
     if factors is not None and steps is not None:
         raise InputError(
-            "load_factors and steps: give one of them; steps counts equal steps from 0 to 1"
+            " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
         )
     if factors is None:
         count = int(steps or STEPS_DRIVEN)
@@ -146,8 +146,9 @@ def check_case(
     moves = bool(case.imposed.any()) or is_actuated(case)
     if method.name == "displacement" and not moves:
         raise InputError(
-            "method 'displacement' needs something that moves: an Impose among the supports or "
-            "an Actuate among the loads; paths under forces take 'newton' or 'arc_length'"
+            " 'displacement' needs something that moves: an Impose among the supports or an "
+            "Actuate among the loads; paths under forces take 'newton' or 'arc_length'",
+            "method",
         )
     if not goes.factors and goes.begin == 0.0 and method.rule is None:
         return  # one point, of what is constant
