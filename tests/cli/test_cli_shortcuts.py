@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.analyses.reading import read_as
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.cli.main import main
-from foldyn.cli.shortcuts import read_as
 from foldyn.errors import FoldynWarning, InputError
 
 GRID = {"first": 0.0, "last": 3.0, "count": 31}

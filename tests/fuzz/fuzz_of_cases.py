@@ -9,7 +9,7 @@ from fuzz_target import Target
 from fuzz_toml import mutator
 
 from foldyn import memory
-from foldyn.cases.reading import read_case
+from foldyn.analyses.reading import read_case
 from foldyn.cli.run import KINDS
 from foldyn.studies import shipped_cases
 

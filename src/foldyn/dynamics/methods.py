@@ -111,7 +111,7 @@ METHODS: Mapping[str, Method] = {
 def method_of(name: str) -> Method:
     """Integrator by its name."""
     if not isinstance(name, str) or name not in METHODS:
-        raise InputError(f"method = {name!r}: choose auto or one of {', '.join(METHODS)}")
+        raise InputError(f" = {name!r}: choose auto or one of {', '.join(METHODS)}", "method")
     return METHODS[name]
 
 
@@ -122,7 +122,7 @@ def suited(name: str, structure: Any) -> Method:
     if found:
         fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, structure))
         raise InputError(
-            f"method = {name!r}: {found}, which this method needs; choose one of {fit}"
+            f" = {name!r}: {found}, which this method needs; choose one of {fit}", "method"
         )
     return method
 

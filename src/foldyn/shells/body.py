@@ -139,8 +139,9 @@ class ShellBody:
         """See `Body`: none."""
         if self.model.code == Superlinear.code:
             raise InputError(
-                'fold_law = "superlinear": the folds of a shell have no slope at rest; modes and '
-                'frequency responses of shells take "linear" or "enhanced"'
+                ' = "superlinear": the folds of a shell have no slope at rest; modes and '
+                'frequency responses of shells take "linear" or "enhanced"',
+                "fold_law",
             )
         return SoftHinges(np.zeros(0), np.zeros(0), sparse.csr_array((0, self.size)))
 
