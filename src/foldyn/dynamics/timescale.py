@@ -80,7 +80,7 @@ def _applied(case: Case, u: NDArray) -> NDArray:
     for turn, _ in case.actuation_terms:
         change += turn
     if change.any():
-        linear = body.nominal(u).hinges_alone()
+        linear = body.nominal(u)
         force -= linear.folded(linear.fold_rest + change).internal(u) - linear.internal(u)
     return force
 

@@ -12,9 +12,9 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import SoftHinges, largest_turn
+from foldyn.mechanics.blocks import SparseBlocks
+from foldyn.mechanics.body import Body, SoftHinges, largest_turn
 from foldyn.shells.balance import balanced_rotations
-from foldyn.shells.blocks import ShellBlocks
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
 from foldyn.shells.sparsity import ShellPattern, shell_pattern
 from foldyn.shells.step_tangent import shell_step_tangent
@@ -27,7 +27,7 @@ GROUPS: Mapping[str, str] = {
 }
 
 
-class ShellBody:
+class ShellBody(Body):
     """A shell of triangles; see `mechanics.body.Body`.
 
     Parameters
@@ -42,8 +42,6 @@ class ShellBody:
     """
 
     energy_groups = tuple(GROUPS)
-    has_discrete_gradient = False
-    threads = 1
 
     def __init__(
         self, model: ShellModel, crease: NDArray, law: HingeLaw, like: ShellBody | None = None
@@ -85,6 +83,11 @@ class ShellBody:
         shell_force(self.model, *self._split(q), *self._split(out), work)
         return out
 
+    def hinge_forces(self, q: NDArray, work: ShellWork | None = None) -> NDArray:
+        """See `Body`."""
+        loose = self.model._replace(membrane=np.zeros_like(self.model.membrane))
+        return self._with(loose).internal(q, work)
+
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Body`."""
         work = shell_work(self.model)
@@ -96,9 +99,16 @@ class ShellBody:
         work = shell_work(self.model)
         return shell_step_tangent(self.model, self.sparsity, *self._split(q), work, old)
 
-    def blocks(self) -> ShellBlocks:
+    def blocks(self) -> SparseBlocks:
         """See `Body`."""
-        return ShellBlocks(self.model, self.sparsity)
+        entries = (
+            np.zeros(len(self.sparsity.indices)),
+            self.sparsity.indices,
+            self.sparsity.indptr,
+        )
+        return SparseBlocks(
+            sparse.csr_array(entries, (self.size, self.size)), self.rows, positions(self.model)
+        )
 
     def workspaces(self, threads: int) -> list[ShellWork]:
         """See `Body`."""
@@ -143,11 +153,7 @@ class ShellBody:
                 'frequency responses of shells take "linear" or "enhanced"',
                 "fold_law",
             )
-        return SoftHinges(np.zeros(0), np.zeros(0), sparse.csr_array((0, self.size)))
-
-    def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
-        """See `Body`."""
-        return sparse.csr_array((self.size, self.size))
+        return super().soft_hinges(q)
 
     @property
     def fold_rest(self) -> NDArray:
@@ -174,18 +180,13 @@ class ShellBody:
         """See `Body`."""
         return self.model.piece_rest, self.model.piece_hinge
 
-    def renumbered(self) -> tuple[ShellBody, NDArray]:
-        """See `Body`: as it is."""
-        return self, np.arange(self.model.nodes)
 
-    def hinges_alone(self) -> ShellBody:
-        """See `Body`."""
-        return self._with(self.model._replace(membrane=np.zeros_like(self.model.membrane)))
-
-    def nominal(self, q: NDArray) -> ShellBody:
-        """See `Body`: its hinges are so at rest."""
-        return self
-
-    def unstrained(self, q: NDArray) -> None:
-        """See `Body`."""
-        return
+def positions(model: ShellModel) -> NDArray:
+    """Where in the shell its dofs are (3 rows, 3): rotations in the middle of their sides."""
+    found = np.zeros((3 * model.rows, 3))
+    n, tri = model.nodes, model.triangles
+    found[: 3 * n] = np.repeat(model.rest[:n], 3, axis=0)
+    middle = 0.5 * (model.rest[tri] + model.rest[np.roll(tri, -1, axis=1)])
+    has = model.rotation >= 0
+    found[3 * n + model.rotation[has]] = middle[has]
+    return found

@@ -138,7 +138,7 @@ class OrigamiProblem:
 
     def reference(self, u: NDArray, factor: float) -> float:
         """Largest of the norms of the external forces and of the hinges' forces alone, N."""
-        hinges = self.actuation.body(factor).hinges_alone().internal(u, self._work)
+        hinges = self.actuation.body(factor).hinge_forces(u, self._work)
         external = self.external(u, factor)
         return max(float(np.linalg.norm(hinges)), float(np.linalg.norm(external)))
 

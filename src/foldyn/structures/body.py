@@ -12,7 +12,7 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.materials import HingeLaw, Superlinear
 from foldyn.mechanics.blocks import BarsHingesBlocks
-from foldyn.mechanics.body import SoftHinges, Unstrained, largest_turn
+from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.renumber import node_order, ranks, renumber
@@ -26,7 +26,7 @@ GROUPS: Mapping[str, str] = {
 SMALL = 300  # nodes below which all values are in the cache anyway, whatever their order
 
 
-class BarsHingesBody:
+class BarsHingesBody(Body):
     """A model of bars and hinges; see `mechanics.body.Body`.
 
     Parameters
@@ -48,7 +48,6 @@ class BarsHingesBody:
     ) -> None:
         self.model, self._folds, self._law, self._like = model, folds, law, like
         self.size, self.rows = model.rest.size, len(model.rest)
-        self.hidden = np.zeros(0, np.int64)
 
     def _with(self, model: BarsHinges) -> BarsHingesBody:
         """Another body whose elements have the same nodes."""
@@ -67,10 +66,6 @@ class BarsHingesBody:
         """See `Body`."""
         return mechanics.threads_for(self.model)
 
-    def dofs(self, displacement: NDArray) -> NDArray:
-        """See `Body`."""
-        return np.asarray(displacement, float).ravel()
-
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
         out = np.empty(len(GROUPS))
@@ -83,6 +78,10 @@ class BarsHingesBody:
         work = mechanics.workspace(self.model) if work is None else work
         mechanics.internal_force(self.model, self._nodal(q), force, work, False)
         return force.ravel()
+
+    def hinge_forces(self, q: NDArray, work: mechanics.Workspace | None = None) -> NDArray:
+        """See `Body`."""
+        return self._hinges_alone().internal(q, work)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Body`."""
@@ -152,7 +151,7 @@ class BarsHingesBody:
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
         """See `Body`."""
-        alone = self.nominal(q).hinges_alone().model
+        alone = self.nominal(q)._hinges_alone().model
         stiffness = np.zeros(len(alone.hinges))
         stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
@@ -188,8 +187,8 @@ class BarsHingesBody:
         model, rows = renumber(self.model, order)
         return BarsHingesBody(model, ranks(rows)[self._folds], self._law), order
 
-    def hinges_alone(self) -> BarsHingesBody:
-        """See `Body`."""
+    def _hinges_alone(self) -> BarsHingesBody:
+        """The body without its bars."""
         return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
 
     def nominal(self, q: NDArray) -> BarsHingesBody:
@@ -210,7 +209,7 @@ class BarsHingesBody:
         )
         rest = np.zeros(self.size)
         return Unstrained(
-            body.tangent(rest), body.hinges_alone().tangent(rest), partial(stretch, body.model)
+            body.tangent(rest), body._hinges_alone().tangent(rest), partial(stretch, body.model)
         )
 
 

@@ -92,8 +92,7 @@ class Alpha:
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
         b = self.bench
-        model = b.packed.model
-        matrix.blocks.put(model, matrix.pattern, b.moved(), before, again, matrix.stiffness)
+        matrix.blocks.put(b.packed.body, matrix.pattern, b.moved(), before, again, matrix.stiffness)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""

@@ -114,7 +114,6 @@ class Bench:
         # mean velocity of the last step, and its change per time from the middle of one to another
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
-        self._hinges = packed.body.hinges_alone()
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
         self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
 
@@ -131,7 +130,8 @@ class Bench:
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
-        return float(np.linalg.norm(self._hinges.internal(self.displacement(), self.work)))
+        forces = self.packed.body.hinge_forces(self.displacement(), self.work)
+        return float(np.linalg.norm(forces))
 
     def displacement(self) -> NDArray:
         """Displacement (n, 3) of old.q with that of the supports."""
