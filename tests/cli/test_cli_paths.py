@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cli.run import DRAWN
 from foldyn.cli import stamp
 from foldyn.cli.main import main
+from foldyn.cli.run import DRAWN
 
 CELL = """
 title = "a Miura unit cell, pulled slowly"
