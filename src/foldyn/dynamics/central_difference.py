@@ -12,9 +12,9 @@ import numpy as np
 from foldyn.dynamics.course import observe, tell
 from foldyn.dynamics.outcome import DONE
 from foldyn.dynamics.system import acceleration
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 ORDER = 2
 

@@ -14,9 +14,9 @@ from foldyn.dynamics.course import passed_through, sample
 from foldyn.dynamics.outcome import DONE, FULL, NOT_FINITE, PENETRATION, STUCK
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 ORDER = 5
 

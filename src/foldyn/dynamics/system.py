@@ -31,8 +31,8 @@ from foldyn.dynamics.inertia import (
 from foldyn.dynamics.kinds import energies_of, fold_angles, force_of
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.flat import flat
 from foldyn.mechanics import Workspace, wait
-from foldyn.mechanics.flat import flat
 from foldyn.statics.body import body_of
 
 

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.flat import flat
+from foldyn.jit.prefetch import prefetch_range
+from foldyn.jit.rows import LANES, add_rows, load_rows
 from foldyn.materials import enhanced_linear, ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.switch import bar_stress, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.flat import flat
 from foldyn.mechanics.model import BLOCK, BarsHinges
-from foldyn.mechanics.prefetch import prefetch_range
-from foldyn.mechanics.rows import LANES, add_rows, load_rows
 from foldyn.mechanics.strips import Strips, strips
 from foldyn.mechanics.threads import Team, team, wait
 
