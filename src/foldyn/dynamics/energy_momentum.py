@@ -31,10 +31,10 @@ from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.implicit.tangent import expected_stress
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import moving_energy
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
+from foldyn.jit.flat import flat
 from foldyn.mechanics import strain_energies
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
 from foldyn.statics.body import FLOOR
 
 ORDER = 2

@@ -13,8 +13,8 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn import mechanics
+from foldyn.jit.flat import flat
 from foldyn.mechanics import BarsHinges, internal_force, strain_energies
-from foldyn.mechanics.flat import flat
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
 
 

@@ -31,8 +31,8 @@ from foldyn.dynamics.inertia import (
 from foldyn.dynamics.kinds import energies_of, fold_angles, force_of
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.flat import flat
 from foldyn.mechanics import Workspace, wait
-from foldyn.mechanics.flat import flat
 from foldyn.statics.body import body_of
 
 
@@ -330,6 +330,6 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     energies_of(model, s.displacement, work, s.energy)
     for k in range(3):
         energy[k] = s.energy[k]
-    energy[4] = tally[1]
+    energy[4] = tally.dissipated
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[5] = tally[0] + moving_energy(system.moved_mass, s.factor)
+    energy[5] = tally.work + moving_energy(system.moved_mass, s.factor)

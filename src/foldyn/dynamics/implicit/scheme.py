@@ -21,7 +21,7 @@ from foldyn.dynamics.kinds import (
 )
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 EPS = float(np.finfo(float).eps)
 
