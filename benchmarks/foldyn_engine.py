@@ -42,7 +42,7 @@ class FoldynEngine:
         plan = Plan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0)
         start = self.problem.start[self._back]
         course = begin(case, start, np.zeros_like(start), plan, packed)
-        course.count[1] = 1  # so that no step is due for a sample
+        course.tally.samples = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
         began = time.perf_counter()
         code, _ = self.engine.advance(course, plan, out, steps)

@@ -306,7 +306,7 @@ def test_an_interrupted_response_leaves_nothing(workplace, monkeypatch) -> None:
     workplace.write(RESPONSE)
     workplace.call("run", "case.toml", "--no-figures", "--out", "motion")
     (workplace.folder / "motion.nc").write_bytes(Path("motion/result.nc").read_bytes())
-    monkeypatch.setattr("foldyn.linear.frf", interrupted)
+    monkeypatch.setattr("foldyn.analyses.frf.frf", interrupted)
     stopped = workplace.call("run", "case.toml", "--no-figures")
     assert (stopped.status, stopped.new) == (130, [])
     assert stopped.err == "foldyn: interrupted at 0.1 s\n"

@@ -7,7 +7,6 @@ import pytest
 
 import foldyn as fd
 from foldyn.checks import observed_order
-from foldyn.materials.switch import hinge_rest_slope
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 CUBIC = fd.CustomHingeLaw(
@@ -29,22 +28,6 @@ LAWS = {
 def fold(law="linear", dihedral=60.0, **options) -> fd.Structure:
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=dihedral)
     return fd.discretize(pattern, SHEET, fold_law=LAWS[law], bend_law="linear", **options)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_power_of_an_actuator_is_the_derivative_of_the_energy(law):
-    """dW/d rest of every law, with its moment and energy at rest moving along, by differences."""
-    structure = fold(law)
-    known = structure.fold_law
-    address = known.addresses[0] if known.addresses else 0
-    follows = law == "stress_free"
-    a, b = known.parameters(np.array([1.0]))[0, :2]
-    h = 1e-6
-    for rest in np.radians([40.0, 100.0, 200.0, 320.0]):
-        for theta in np.radians([30.0, 120.0, 250.0, 330.0]):
-            wanted = (known.energy(theta, rest + h) - known.energy(theta, rest - h)) / (2 * h)
-            got = hinge_rest_slope(known.code, theta, rest, a, b, follows, address)
-            assert got == pytest.approx(float(wanted), rel=1e-6, abs=1e-7)
 
 
 @pytest.mark.parametrize("law", ["linear", "stress_free", "as_published", "custom"])

@@ -14,11 +14,11 @@ from test_blocks import random_model
 
 import foldyn as fd
 from foldyn import mechanics
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
 from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics import force as force_module
 from foldyn.mechanics import threads as threads_module
-from foldyn.mechanics.borrow import borrowed
 from foldyn.mechanics.strips import reach, shares, strips
 from foldyn.mechanics.threads import BROKEN, run_together, team, wait
 

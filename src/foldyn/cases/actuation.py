@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
 from foldyn.errors import InputError
-from foldyn.materials import EnhancedLinear
 from foldyn.values import indices, number_or_list, show, suggest
 
 SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
@@ -137,13 +136,12 @@ def rest_changes(
             f"{place}.angle = {show(load.angle)}: {len(angles)} angles for {len(creases)} creases; "
             "give one, or one for each"
         )
-    law = structure.fold_law
     closed = angles[(angles == 0.0) | (angles == 360.0)]
-    if closed.size and isinstance(law, EnhancedLinear) and law.rest == "stress_free":
+    if closed.size and not structure.fold_law.closed_at_rest:
         raise InputError(
-            f'{place}.angle = {closed[0]:g}: folds with rest = "stress_free" have an infinite '
-            "moment there; give an angle between 0 and 360 degrees (flat: 180), or another "
-            "fold_law"
+            f"{place}.angle = {closed[0]:g}: this fold law, free of stress at rest, has an "
+            "infinite moment there; give an angle between 0 and 360 degrees (flat: 180), or "
+            "another fold_law"
         )
     return creases, np.radians(angles) - structure.fold_rest[creases]
 

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
-from foldyn.materials import EnhancedLinear, HingeLaw
-from foldyn.materials.enhanced_linear import TWO_PI, energy, moment
-from foldyn.materials.switch import hinge_rest_slope
+from foldyn.materials import HingeLaw
+from foldyn.materials.switch import hinge_rest_slope, move_rest
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import folds_of
 
@@ -28,7 +27,6 @@ class Actuators(NamedTuple):
     row: NDArray  # (a,) of the waveforms
     code: int  # of the fold law, the same for all
     address: int  # of its energy, if it is the user's own
-    stress_free: bool  # whether its moment at rest is subtracted and moves along
 
 
 def actuators(body: Body, law: HingeLaw, terms: Any, histories: list) -> tuple[Body, Actuators]:
@@ -50,7 +48,6 @@ def actuators(body: Body, law: HingeLaw, terms: Any, histories: list) -> tuple[B
         row=np.concatenate(rows).astype(np.int64)[place],
         code=int(law.code),
         address=int(law.addresses[0]) if law.addresses else 0,
-        stress_free=isinstance(law, EnhancedLinear) and law.rest == "stress_free",
     )
     return body, found
 
@@ -62,12 +59,10 @@ def turn(model, actuators, factor):
     for k in range(actuators.hinge.size):
         e = actuators.hinge[k]
         rest = actuators.start[k] + actuators.span[k] * factor[actuators.row[k], 0]
-        if not 0.0 <= rest <= TWO_PI:
+        if not 0.0 <= rest <= 2.0 * np.pi:
             rest = np.nan
         rest_angle[e] = rest
-        if actuators.stress_free:
-            p[e, 2] = moment(rest, rest, p[e, 0], p[e, 1])
-            p[e, 3] = energy(rest, rest, p[e, 0], p[e, 1])
+        move_rest(actuators.code, rest, p[e])
 
 
 @kernel
@@ -77,8 +72,7 @@ def actuator_power(model, actuators, factor, angle):
     for k in range(actuators.hinge.size):
         e = actuators.hinge[k]
         slope = hinge_rest_slope(
-            actuators.code, angle[e], rest_angle[e], p[e, 0], p[e, 1],
-            actuators.stress_free, actuators.address,
+            actuators.code, angle[e], rest_angle[e], p[e, 0], p[e, 1], actuators.address
         )  # fmt: skip
         rate = actuators.span[k] * factor[actuators.row[k], 1]
         power += stiffness[e] * slope * rate

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import observe, tell
-from foldyn.dynamics.outcome import DONE
+from foldyn.dynamics.course import DONE, observe, tell
 from foldyn.dynamics.system import acceleration
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 ORDER = 2
 
@@ -53,7 +52,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     fa, ahead = flat(a)[low:high], flat(s.stage[0])[low:high]
     powers = s.powers
-    begun = course.count[0]
+    begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
     tell(team, 0.0, 0.0, 0)
     if begun == 0:
@@ -79,7 +78,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tell(team, 0.5 * dt * (powers[0] + power_in), 0.5 * dt * (powers[1] + power_out), wrong)
         powers[0], powers[1] = power_in, power_out
         if team.number == 0:
-            course.count[3] += 1
+            course.tally.evaluations += 1
         found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
         if found != DONE:
             return found, hinge

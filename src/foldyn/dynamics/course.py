@@ -7,10 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.outcome import DONE, NOT_FINITE, PENETRATION
 from foldyn.dynamics.system import record
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics import largest, part, total, wait
+
+# How a stretch of steps ended. FULL: no room for another sample; STUCK: the error asks for a step
+# that time cannot resolve; NOT_CONVERGED: an implicit step was not solved, however small.
+DONE, NOT_FINITE, PENETRATION, FULL, STUCK, NOT_CONVERGED = range(6)
 
 WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
 
@@ -29,16 +32,40 @@ class Plan(NamedTuple):
     stops: NDArray  # times (s) in order at which steps that vary end: knots of the histories
 
 
+# What is counted and measured along a motion
+TALLY = np.dtype(
+    (
+        np.record,
+        [
+            ("steps", np.int64),  # done
+            ("samples", np.int64),  # written
+            ("refused", np.int64),  # steps whose error was too large
+            ("evaluations", np.int64),  # of the force
+            ("work", float),  # of the loads, J
+            ("dissipated", float),  # J
+            ("power_in", float),  # at the last step, W
+            ("power_out", float),
+            ("time", float),  # reached, s
+            ("wanted", float),  # next step, and the others of methods whose steps vary, s
+            ("last", float),
+            ("shortest", float),
+            ("longest", float),
+            ("error", float),  # of the last step over the tolerance
+            ("farthest", float),  # largest displacement so far, m
+            ("fastest", float),  # largest velocity so far, m/s
+        ],
+    )
+)
+
+
 class Course(NamedTuple):
     """State of a motion between two stretches of steps, changed in place."""
 
     u: NDArray  # (n, 3) displacement without that of moving supports, m
     v: NDArray  # (n, 3) velocity likewise, m/s
     carry: NDArray  # (n, 3) acceleration, for methods that keep it
-    tally: NDArray  # (4,) work of the loads, energy dissipated (J), and two more of the method
+    tally: np.record  # `TALLY`
     angle: NDArray  # (nh,) dihedrals at the last step seen, rad
-    count: NDArray  # (4,) int64: steps done, samples written, steps refused, force evaluations
-    clock: NDArray  # (8,) time reached (s), and what methods with a variable step keep
 
 
 class Samples(NamedTuple):
@@ -83,7 +110,7 @@ def passed_through(now, before, first, last):
 @kernel
 def sample(model, system, mass, u, v, a, t, course, out, work, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
-    k = course.count[1]
+    k = course.tally.samples
     out.time[k] = t
     record(
         model, system, mass, u, v, a, course.tally, work, s,
@@ -91,7 +118,7 @@ def sample(model, system, mass, u, v, a, t, course, out, work, s):
     )  # fmt: skip
     if not np.isfinite(out.energy[k].sum()):
         return NOT_FINITE
-    course.count[1] += 1
+    course.tally.samples += 1
     return DONE
 
 
@@ -110,7 +137,7 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
     panels that passed through each other end the motion, and every plan.every steps a sample is
     written. Returns (outcome, hinge), the same to all.
     """
-    team, count = work.team, course.count
+    team, tally = work.team, course.tally
     wait(team)  # for the others' accelerations, dihedrals and notes
     t = plan.start + step * plan.dt
     wrong = total(team, WRONG)
@@ -120,12 +147,12 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
     wait(team)
     hinge = int(largest(team, HINGE))
     if team.number == 0:
-        course.tally[0] += total(team, WORK)
-        course.tally[1] += total(team, DISSIPATED)
-        course.clock[0] = t
-        count[0] = step
+        tally.work += total(team, WORK)
+        tally.dissipated += total(team, DISSIPATED)
+        tally.time = t
+        tally.steps = step
         found = DONE
-        if wrong == 0.0 and hinge < 0 and step == count[1] * plan.every:
+        if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
             found = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
         team.note[0, FOUND] = found
     wait(team)

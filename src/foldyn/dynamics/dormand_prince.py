@@ -10,13 +10,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import passed_through, sample
-from foldyn.dynamics.outcome import DONE, FULL, NOT_FINITE, PENETRATION, STUCK
+from foldyn.dynamics.course import (
+    DONE,
+    FULL,
+    NOT_FINITE,
+    PENETRATION,
+    STUCK,
+    passed_through,
+    sample,
+)
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 ORDER = 5
 
@@ -93,6 +100,14 @@ def _combine(base, slopes, weights, h, count, out):
 
 
 @kernel
+def _integral(start, slopes, h, weights, count):
+    """Start + h sum of weights times the first `count` slopes."""
+    for j in range(count):
+        start += h * weights[j] * slopes[j]
+    return start
+
+
+@kernel
 def _largest(values):
     out = 0.0
     for i in range(values.size):
@@ -126,41 +141,39 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
 
     The error of a step is that of the worst node, relative to the largest displacement and the
-    largest velocity that the motion has had so far. clock: the time, the next step, the last
-    error, these two largest values, the smallest and the largest step, the end of the last step.
-    Steps end at the stops of the plan, where loads may jump.
+    largest velocity that the motion has had so far. Steps end at the stops of the plan, where
+    loads may jump.
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    clock, count, tally = course.clock, course.count, course.tally
-    n = course.u.size
+    tally, n = course.tally, course.u.size
     u, v = flat(course.u), flat(course.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))
-    powers, weights, end_tally = np.empty((2, 7)), np.empty(7), np.empty(2)
+    powers, weights = np.empty((2, 7)), np.empty(7)
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
-    if count[0] == 0:
+    if tally.steps == 0:
         powers[0, 0], powers[1, 0] = acceleration(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        if count[1] == 0:
-            clock[3], clock[4] = _largest(u), _largest(v)
+        if tally.samples == 0:
+            tally.farthest, tally.fastest = _largest(u), _largest(v)
             found = sample(
                 model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
             )
             if found != DONE:
                 return found, -1
     else:
-        powers[0, 0], powers[1, 0] = tally[2], tally[3]
+        powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
         for i in range(n):
             fa[i] = flat(course.carry)[i]
     for i in range(n):
         speeds[0, i], accelerations[0, i] = v[i], fa[i]
-    last = count[0] + stretch
-    while count[0] < last and clock[0] < plan.end:
-        if plan.every > 0 and count[1] == out.time.size:
+    last = tally.steps + stretch
+    while tally.steps < last and tally.time < plan.end:
+        if plan.every > 0 and tally.samples == out.time.size:
             break
-        t, wanted = clock[0], clock[1]
+        t, wanted = tally.time, tally.wanted
         stop = np.searchsorted(plan.stops, t, side="right")
         stops = stop < plan.stops.size
         goal = plan.stops[stop] if stops else plan.end
@@ -181,76 +194,71 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             )
             for i in range(n):
                 speeds[stage, i], accelerations[stage, i] = fvt[i], fa[i]
-        count[3] += 6
-        scale_u = max(clock[3], _largest(fut), plan.floor) * plan.tolerance
-        scale_v = max(clock[4], _largest(fvt), plan.floor / plan.dt) * plan.tolerance
+        tally.evaluations += 6
+        scale_u = max(tally.farthest, _largest(fut), plan.floor) * plan.tolerance
+        scale_v = max(tally.fastest, _largest(fvt), plan.floor / plan.dt) * plan.tolerance
         error_u, error_v = _error(speeds, h), _error(accelerations, h)
         error = 0.0
         if error_u > 0.0 or error_v > 0.0:
             error = max(error_u / scale_u, error_v / scale_v)
         if not abs(error) < np.inf:  # too far: try less
-            clock[1] = 0.2 * h
-            count[2] += 1
-            if clock[1] < SMALLEST * max(abs(plan.end), abs(t)):
+            tally.wanted = 0.2 * h
+            tally.refused += 1
+            if tally.wanted < SMALLEST * max(abs(plan.end), abs(t)):
                 return NOT_FINITE, -1
             continue
-        factor = 5.0 if error == 0.0 else 0.9 * error**-0.17 * clock[2] ** 0.04
+        factor = 5.0 if error == 0.0 else 0.9 * error**-0.17 * tally.error**0.04
         if error > 1.0:
-            clock[1] = h * max(0.2, min(factor, 0.9))
-            count[2] += 1
+            tally.wanted = h * max(0.2, min(factor, 0.9))
+            tally.refused += 1
             continue
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return PENETRATION, hinge
         after = goal if h == goal - t else t + h
-        count[0] += 1
-        clock[5], clock[6] = min(clock[5], h), max(clock[6], h)
-        for k in range(2):
-            end_tally[k] = tally[k]
-            for j in range(6):
-                end_tally[k] += h * A[6, j] * powers[k, j]
-        due = plan.start + count[1] * plan.interval
-        begun = tally[0], tally[1]
-        while plan.every == 0 and count[1] < out.time.size and due <= after + ROUNDING * h:
+        tally.steps += 1
+        tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
+        due = plan.start + tally.samples * plan.interval
+        begun = tally.work, tally.dissipated
+        while plan.every == 0 and tally.samples < out.time.size and due <= after + ROUNDING * h:
             _weights(min(1.0, (due - t) / h), weights)
             _combine(u, speeds, weights, h, 7, fut)
             _combine(v, accelerations, weights, h, 7, fvt)
-            for k in range(2):
-                tally[k] = begun[k]
-                for j in range(7):
-                    tally[k] += h * weights[j] * powers[k, j]
+            tally.work = _integral(begun[0], powers[0], h, weights, 7)
+            tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
             acceleration(model, system, mass, ut, vt, due, a, work, s)
-            count[3] += 1
+            tally.evaluations += 1
             found = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
             if found != DONE:
                 return found, -1
-            due = plan.start + count[1] * plan.interval
-        tally[0], tally[1] = end_tally[0], end_tally[1]
+            due = plan.start + tally.samples * plan.interval
+        tally.work = _integral(begun[0], powers[0], h, A[6], 6)
+        tally.dissipated = _integral(begun[1], powers[1], h, A[6], 6)
         _combine(u, speeds, A[6], h, 6, fut)
         for i in range(n):
             u[i], v[i] = fut[i], speeds[6, i]
             speeds[0, i], accelerations[0, i] = speeds[6, i], accelerations[6, i]
         for k in range(2):
             powers[k, 0] = powers[k, 6]
-        clock[0], clock[2] = after, max(error, 1e-4)
-        clock[3], clock[4] = scale_u / plan.tolerance, scale_v / plan.tolerance
-        clock[1] = min(plan.dt, h * max(0.2, min(factor, 5.0)))
+        tally.time, tally.error = after, max(error, 1e-4)
+        tally.farthest, tally.fastest = scale_u / plan.tolerance, scale_v / plan.tolerance
+        tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
-            clock[1] = max(clock[1], min(wanted, plan.dt))
+            tally.wanted = max(tally.wanted, min(wanted, plan.dt))
             powers[0, 0], powers[1, 0] = acceleration(
                 model, system, mass, course.u, course.v, after, a, work, s
             )
-            count[3] += 1
+            tally.evaluations += 1
             for i in range(n):
                 accelerations[0, i] = fa[i]
-        if plan.every > 0 and count[0] % plan.every == 0:
+        if plan.every > 0 and tally.steps % plan.every == 0:
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
-            count[3] += 1
+            tally.evaluations += 1
             found = sample(model, system, mass, course.u, course.v, a, after, course, out, work, s)
             if found != DONE:
                 return found, -1
-    tally[2], tally[3] = powers[0, 0], powers[1, 0]
+    tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
     for i in range(n):
         flat(course.carry)[i] = accelerations[0, i]
-    full = plan.every > 0 and count[1] == out.time.size and clock[0] < plan.end
+    full = plan.every > 0 and tally.samples == out.time.size and tally.time < plan.end
     return (FULL if full else DONE), -1

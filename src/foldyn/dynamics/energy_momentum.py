@@ -30,10 +30,10 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import moving_energy
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
+from foldyn.jit.flat import flat
 from foldyn.mechanics import strain_energies
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
 ORDER = 2

@@ -11,9 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics import outcome
 from foldyn.dynamics.audit import Rounding, audited, energy_error, energy_scale
-from foldyn.dynamics.course import Course, Plan, Samples, samples
+from foldyn.dynamics.course import (
+    DONE,
+    FULL,
+    NOT_CONVERGED,
+    PENETRATION,
+    STUCK,
+    Course,
+    Plan,
+    Samples,
+    samples,
+)  # fmt: skip
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.methods import Method
@@ -58,7 +67,7 @@ class Motion:
     @property
     def stored(self) -> int:
         """Samples computed so far."""
-        return int(self._course.count[1])
+        return int(self._course.tally.samples)
 
     def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """Integrate the motion; see `simulate`."""
@@ -82,7 +91,7 @@ class Motion:
         began = None
         try:
             while True:
-                done = int(course.count[0])
+                done = int(course.tally.steps)
                 stretch = min(length, recheck - done % recheck)
                 clock = time.perf_counter()
                 code, hinge = engine.advance(course, plan, self._out, stretch)
@@ -91,11 +100,11 @@ class Motion:
                 self.seconds = time.perf_counter() - began
                 if callbacks.error is not None:
                     self._raise(callbacks.error)
-                if code == outcome.FULL:
+                if code == FULL:
                     self._out = _enlarged(self._out)
-                elif code != outcome.DONE:
+                elif code != DONE:
                     self._fail(code, hinge)
-                step, now = int(course.count[0]), float(course.clock[0])
+                step, now = int(course.tally.steps), float(course.tally.time)
                 ended = step == plan.steps if plan.steps else now >= plan.end
                 report(Progress(now - plan.start, plan.end - plan.start, step, self._audit()))
                 if ended:
@@ -109,7 +118,7 @@ class Motion:
                 length = max(least, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:
             raise MotionInterrupted(
-                f"interrupted at t = {course.clock[0]:.6g} s", self._dataset()
+                f"interrupted at t = {course.tally.time:.6g} s", self._dataset()
             ) from None
         finally:
             close()
@@ -130,7 +139,7 @@ class Motion:
         worst = float(relative.max())
         if worst > EXPLODED and self._rounding.told_by(energy, self._farthest()):
             bad = int(np.argmax(relative > EXPLODED))
-            self._course.count[1] = bad
+            self._course.tally.samples = bad
             raise InstabilityError(
                 f"the motion is unstable: at t = {self._out.time[bad]:.6g} s the energy balance is "
                 f"off by more than the energies at play; {self._smaller_step()}",
@@ -160,16 +169,16 @@ class Motion:
         if not is_stable(growth, omega, *damping, self.plan.dt):
             limit = stability_limit(growth, omega, *damping)
             raise InstabilityError(
-                f"the structure has stiffened: at t = {self._course.clock[0]:.6g} s the step of "
+                f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
                 f"dt = {0.5 * MARGIN * limit:.3g} or smaller",
                 self._dataset(),
             )
 
     def _fail(self, code: int, hinge: int) -> None:
-        plan, course, order = self.plan, self._course, self._packed.numbering.order
+        plan, tally, order = self.plan, self._course.tally, self._packed.numbering.order
         model = self._packed.model
-        moment = f"t = {course.clock[0]:.6g} s (step {course.count[0]})"
+        moment = f"t = {tally.time:.6g} s (step {tally.steps})"
         rest, rows = self._packed.body.turned()
         turned = rows[np.isnan(rest)]
         if len(turned):
@@ -181,7 +190,7 @@ class Motion:
             )
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
-        if code == outcome.PENETRATION:
+        if code == PENETRATION:
             j, k, i, l = order[model.hinges[hinge]].tolist()  # noqa: E741
             raise PenetrationError(
                 f"at {moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
@@ -189,13 +198,13 @@ class Motion:
                 "smaller step keeps panels apart",
                 self._dataset(),
             )
-        if code == outcome.STUCK:
+        if code == STUCK:
             raise InstabilityError(
-                f"at {moment} the error asks for a step of {course.clock[1]:.3g} s: a load jumps "
+                f"at {moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps "
                 "too often, or the motion is too violent; raise the tolerance, or use rk4",
                 self._dataset(),
             )
-        if code == outcome.NOT_CONVERGED:
+        if code == NOT_CONVERGED:
             raise InstabilityError(
                 f"at {moment} no end of a step was found that is in equilibrium, however small the "
                 "step: a mass or a stiffness may be missing, or the motion is too violent",
@@ -223,8 +232,8 @@ class Motion:
         )  # fmt: skip
 
     def _statistics(self, plan: Plan) -> dict[str, Any]:
-        course = self._course
-        steps = int(course.count[0])
+        tally = self._course.tally
+        steps = int(tally.steps)
         told: dict[str, Any] = {
             "method": self.method.name,
             "dt": plan.dt,
@@ -242,15 +251,15 @@ class Motion:
             told["method_reason"] = self.reason
         if not plan.steps:
             told |= {
-                "dt": float(course.clock[0] - plan.start) / max(steps, 1),
+                "dt": float(tally.time - plan.start) / max(steps, 1),
                 "steps": steps,
                 "every": plan.every or plan.interval,
                 "tolerance": plan.tolerance,
-                "refused_steps": int(course.count[2]),
-                "smallest_step": float(course.clock[5]) if steps else 0.0,
-                "largest_step": float(course.clock[6]),
+                "refused_steps": int(tally.refused),
+                "smallest_step": float(tally.shortest) if steps else 0.0,
+                "largest_step": float(tally.longest),
             }
-        told["force_evaluations"] = int(course.count[3])
+        told["force_evaluations"] = int(tally.evaluations)
         return told | (self._engine.facts() if self._engine else {})
 
     def _relative_error(self) -> float:
@@ -277,7 +286,7 @@ class Motion:
                 "hides how hinges turn, so that they do not resist: use larger loads, lighter or "
                 "softer panels, or a longer motion"
             )
-        size, least = float(self._course.clock[3]), self.plan.floor
+        size, least = float(self._course.tally.farthest), self.plan.floor
         if 0.0 < size < least:
             return (
                 f"the motion is small: {size:.2g} m at most, where errors of steps are measured "

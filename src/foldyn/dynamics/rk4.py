@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import observe, tell
-from foldyn.dynamics.outcome import DONE
+from foldyn.dynamics.course import DONE, observe, tell
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 ORDER = 4
 
@@ -42,7 +41,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     du, dv = np.empty_like(u), np.empty_like(v)
     for i in range(u.size):
         ut[i], vt[i] = u[i], v[i]
-    begun = course.count[0]
+    begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
     tell(team, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
@@ -78,5 +77,5 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
                     ut[i], vt[i] = u[i], v[i]
         tell(team, dt / 6.0 * work_in, dt / 6.0 * work_out, wrong)
         if team.number == 0:
-            course.count[3] += 4
+            course.tally.evaluations += 4
     return DONE, -1

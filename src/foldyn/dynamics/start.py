@@ -10,7 +10,7 @@ from scipy import sparse
 
 from foldyn.cases import Case, State
 from foldyn.dynamics.actuation import turn
-from foldyn.dynamics.course import Course, Plan
+from foldyn.dynamics.course import TALLY, Course, Plan
 from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
@@ -102,10 +102,10 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
             "there"
         )
     q[imposed] = 0.0
-    tally = np.zeros(4)
-    tally[0] = -moving_energy(system.moved_mass, s.factor)
+    tally = np.zeros(1, TALLY)[0]
+    tally.work = -moving_energy(system.moved_mass, s.factor)
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
-    clock = np.array([plan.start, first, 1e-4, 0.0, 0.0, np.inf, 0.0, 0.0])
+    tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward = by.inward(q)
     if len(body.hidden):  # they stand where they are in balance
         if system.turns:
@@ -117,6 +117,4 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
         carry=np.zeros_like(inward),
         tally=tally,
         angle=body.angles(by.inward(u)),
-        count=np.zeros(4, np.int64),
-        clock=clock,
     )

@@ -30,9 +30,9 @@ from foldyn.dynamics.inertia import (
 )
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.flat import flat
 from foldyn.mechanics import wait
 from foldyn.mechanics.body import Body
-from foldyn.mechanics.flat import flat
 from foldyn.mechanics.kernels import energies_of, force_of
 
 
@@ -338,6 +338,6 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     energies_of(model, s.displacement, work, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]
-    energy[groups + 1] = tally[1]
+    energy[groups + 1] = tally.dissipated
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[groups + 2] = tally[0] + moving_energy(system.moved_mass, s.factor)
+    energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)

@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 from numba.core.errors import NumbaError
 
 from foldyn.errors import InputError
 from foldyn.jit.compiled import callback
 from foldyn.materials.law import BarLaw, HingeLaw
-
-CUSTOM = -1
 
 
 def _compile(law: str, function: str, signature: str, source: Callable[..., float]) -> Any:
@@ -49,7 +47,6 @@ class CustomBarLaw(BarLaw):
     stress_of: Callable[[float], float]
     slope_of: Callable[[float], float]
     name: str = "custom"
-    code: ClassVar[int] = CUSTOM
 
     @cached_property
     def _functions(self) -> tuple[Any, Any, Any]:
@@ -95,7 +92,6 @@ class CustomHingeLaw(HingeLaw):
     moment_of: Callable[[float, float], float]
     slope_of: Callable[[float, float], float]
     name: str = "custom"
-    code: ClassVar[int] = CUSTOM
 
     @cached_property
     def _functions(self) -> tuple[Any, Any, Any]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
 from foldyn.values import number
 
+STRESS_FREE, AS_PUBLISHED = 2, 3  # codes
 TWO_PI = 2.0 * math.pi
 HALF_PI = 0.5 * math.pi
 
@@ -64,13 +65,30 @@ def slope(theta, theta1, theta2):
     return 1.0
 
 
+@scalar
+def rest_slope(theta, rest):
+    """Derivative of energy / k as published with respect to rest."""
+    return rest - theta
+
+
+@scalar
+def stress_free_rest_slope(theta, rest, theta1, theta2):
+    """The same of the stress-free law, whose moment and energy at rest move along."""
+    return slope(rest, theta1, theta2) * (rest - theta)
+
+
+@scalar
+def relieve(rest, parameters):
+    """Set the moment and the energy at rest, which the stress-free law subtracts."""
+    theta1, theta2 = parameters[0], parameters[1]
+    parameters[2] = moment(rest, rest, theta1, theta2)
+    parameters[3] = energy(rest, rest, theta1, theta2)
+
+
 @kernel
-def _at_rest(rest, theta1, theta2):
-    out = np.empty((rest.size, 2))
+def _relieve_each(rest, table):
     for i in range(rest.size):
-        out[i, 0] = moment(rest[i], rest[i], theta1, theta2)
-        out[i, 1] = energy(rest[i], rest[i], theta1, theta2)
-    return out
+        relieve(rest[i], table[i])
 
 
 @dataclass(frozen=True)
@@ -95,7 +113,6 @@ class EnhancedLinear(HingeLaw):
     theta1: float = 45.0
     theta2: float = 315.0
     rest: Literal["stress_free", "as_published"] = "stress_free"
-    code: ClassVar[int] = 2
     name: str = "enhanced"
 
     def __post_init__(self) -> None:
@@ -111,14 +128,25 @@ class EnhancedLinear(HingeLaw):
                 f"EnhancedLinear: rest = {self.rest!r}: choose 'stress_free' or 'as_published'"
             )
 
+    @property
+    def code(self) -> int:
+        """Which of the two: one subtracts its moment at rest."""
+        return AS_PUBLISHED if self.rest == "as_published" else STRESS_FREE
+
+    @property
+    def linear_between(self) -> tuple[float, float]:
+        """theta1 and theta2 (rad)."""
+        return math.radians(self.theta1), math.radians(self.theta2)
+
+    @property
+    def closed_at_rest(self) -> bool:
+        """Not without stress: its moment there is infinite."""
+        return self.rest == "as_published"
+
     def parameters(self, rest: NDArray) -> NDArray:
         """theta1, theta2 (rad), and the moment and energy at rest to subtract, per hinge."""
         table = np.zeros((len(rest), PARAMETERS))
-        table[:, 0], table[:, 1] = math.radians(self.theta1), math.radians(self.theta2)
-        if self.rest == "stress_free":
-            table[:, 2:] = _at_rest(
-                np.ascontiguousarray(rest, float),
-                math.radians(self.theta1),
-                math.radians(self.theta2),
-            )
+        table[:, :2] = self.linear_between
+        if self.code == STRESS_FREE:
+            _relieve_each(np.ascontiguousarray(rest, float), table)
         return table

@@ -8,25 +8,42 @@ hinges four parameters per element.
 
 from __future__ import annotations
 
-from abc import ABC
-from typing import ClassVar
+import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.errors import InputError
+
 PARAMETERS = 4
+CALLED = -1  # code of laws whose functions are called at their addresses
 
 
 class Law(ABC):
     """A scalar law with a name and the integer code of its compiled form."""
 
     name: str
-    code: ClassVar[int]
+    code: int = CALLED
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:
         """Addresses of the compiled (energy, response, slope) of a user's law; else None."""
         return None
+
+    def check(self, field: str) -> None:
+        """Refuse a built-in law that the compiled switch lacks: it gives nan for what it lacks."""
+        own = type(self).addresses is not Law.addresses  # asking for them would compile them
+        if not own and np.isnan(self._at_rest()).any():
+            raise InputError(
+                f"{field}: {self.name!r}, code {self.code}, is not a law that the kernels know; "
+                "give a CustomBarLaw or CustomHingeLaw (a new built-in law needs its line in "
+                "every function of materials/switch.py)"
+            )
+
+    @abstractmethod
+    def _at_rest(self) -> NDArray:
+        """All functions of the law at rest."""
 
 
 class BarLaw(Law):
@@ -44,6 +61,9 @@ class BarLaw(Law):
         """Slope dS/dE / E_y, E = (lambda^2 - 1)/2 the Green strain, at each stretch."""
         return self._table(stretch)[2]
 
+    def _at_rest(self) -> NDArray:
+        return self._table(1.0)
+
     def _table(self, stretch: ArrayLike) -> NDArray:
         from foldyn.materials import switch  # it imports the laws that subclass this
 
@@ -54,6 +74,11 @@ class BarLaw(Law):
 
 class HingeLaw(Law):
     """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
+
+    linear_between: tuple[float, float] | None = None
+    """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
+    closed_at_rest: bool = True
+    """Whether a hinge can be at rest closed, with a dihedral of 0 or 2 pi."""
 
     def parameters(self, rest: NDArray) -> NDArray:
         """Parameters of the compiled form, shape (n, 4), for hinges with rest angles (n,)."""
@@ -71,6 +96,13 @@ class HingeLaw(Law):
         """Slope of the moment / k at dihedral `theta`."""
         return self._table(theta, rest)[2]
 
+    def rest_slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
+        """Derivative of energy / k (rad) with respect to the rest dihedral."""
+        return self._table(theta, rest)[3]
+
+    def _at_rest(self) -> NDArray:
+        return self._table(math.pi, math.pi)
+
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         from foldyn.materials import switch
 
@@ -81,4 +113,4 @@ class HingeLaw(Law):
         flat = switch.hinge_table(
             self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
         )
-        return flat.reshape((3, *theta.shape))
+        return flat.reshape((4, *theta.shape))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from foldyn.jit.compiled import scalar
 from foldyn.materials.law import BarLaw, HingeLaw
+
+CODE = 0
 
 
 @scalar
@@ -40,11 +42,23 @@ def hinge_moment(theta, rest):
     return theta - rest
 
 
+@scalar
+def hinge_slope():
+    """Slope / k."""
+    return 1.0
+
+
+@scalar
+def hinge_rest_slope(theta, rest):
+    """Derivative of energy / k with respect to rest."""
+    return rest - theta
+
+
 @dataclass(frozen=True)
 class LinearBar(BarLaw):
     """Stress proportional to Green strain."""
 
-    code: ClassVar[int] = 0
+    code = CODE
     name: str = "linear"
 
 
@@ -52,5 +66,6 @@ class LinearBar(BarLaw):
 class LinearHinge(HingeLaw):
     """Moment proportional to the change of the dihedral."""
 
-    code: ClassVar[int] = 0
+    code = CODE
+    linear_between = (-math.inf, math.inf)
     name: str = "linear"

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from foldyn.jit.compiled import scalar
 from foldyn.materials.law import BarLaw
+
+CODE = 1
 
 
 @scalar
@@ -44,5 +45,5 @@ def slope(e):
 class Ogden(BarLaw):
     """Hyperelastic bar law that stiffens in tension and softens in compression (MERLIN2)."""
 
-    code: ClassVar[int] = 1
+    code = CODE
     name: str = "ogden"

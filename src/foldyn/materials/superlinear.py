@@ -7,13 +7,14 @@ Source: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLI
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from foldyn.jit.bits import bits_of, float_of
 from foldyn.jit.compiled import scalar
-from foldyn.materials.bits import bits_of, float_of
 from foldyn.materials.law import HingeLaw
+
+CODE = 1
 
 
 @scalar
@@ -47,9 +48,15 @@ def slope(theta, rest):
     return 4.0 / 3.0 * np.cbrt(abs(theta - rest))
 
 
+@scalar
+def rest_slope(theta, rest):
+    """Derivative of energy / k with respect to rest."""
+    return -moment(theta, rest)
+
+
 @dataclass(frozen=True)
 class Superlinear(HingeLaw):
     """Bend law with exponent 4/3: no stiffness at rest, stiffer as the panel bends."""
 
-    code: ClassVar[int] = 1
+    code = CODE
     name: str = "superlinear"

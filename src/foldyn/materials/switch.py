@@ -1,98 +1,112 @@
 """The one compiled switch from a law's integer code to its formulas.
 
-A new built-in law adds one line to each function here. Negative codes are user laws, called at
-`address`. Hinge parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
+A new built-in law adds its line to each function of its kind. A user's law is called at
+`address`; what is not known, having none, gives nan (`Law.check` refuses it before). Hinge
+parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from foldyn.jit.call import call1, call2
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials import enhanced_linear, linear, ogden, superlinear
-from foldyn.materials.call import call1, call2
+from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 
 
 @scalar
 def bar_energy(code, e, address):
     """W / E_y at e = stretch - 1."""
-    if code == 0:
+    if code == linear.CODE:
         return linear.bar_energy(e)
-    if code == 1:
+    if code == ogden.CODE:
         return ogden.energy(e)
-    return call1(address, 1.0 + e)
+    return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
 @scalar
 def bar_stress(code, e, address):
     """S / E_y at e = stretch - 1."""
-    if code == 0:
+    if code == linear.CODE:
         return linear.bar_stress(e)
-    if code == 1:
+    if code == ogden.CODE:
         return ogden.stress(e)
-    return call1(address, 1.0 + e)
+    return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
 @scalar
 def bar_slope(code, e, address):
     """(dS/dE) / E_y at e = stretch - 1."""
-    if code == 0:
+    if code == linear.CODE:
         return linear.bar_slope(e)
-    if code == 1:
+    if code == ogden.CODE:
         return ogden.slope(e)
-    return call1(address, 1.0 + e)
+    return call1(address, 1.0 + e) if address != 0 else np.nan
 
 
 @scalar
 def hinge_energy(code, theta, rest, a, b, c, d, address):
     """Energy / k at dihedral theta."""
-    if code == 0:
+    if code == linear.CODE:
         return linear.hinge_energy(theta, rest)
-    if code == 1:
+    if code == superlinear.CODE:
         return superlinear.energy(theta, rest)
-    if code == 2:
+    if code == AS_PUBLISHED:
+        return enhanced_linear.energy(theta, rest, a, b)
+    if code == STRESS_FREE:
         return enhanced_linear.energy(theta, rest, a, b) - c * (theta - rest) - d
-    return call2(address, theta, rest)
+    return call2(address, theta, rest) if address != 0 else np.nan
 
 
 @scalar
 def hinge_moment(code, theta, rest, a, b, c, d, address):
     """Moment / k at dihedral theta."""
-    if code == 0:
+    if code == linear.CODE:
         return linear.hinge_moment(theta, rest)
-    if code == 1:
+    if code == superlinear.CODE:
         return superlinear.moment(theta, rest)
-    if code == 2:
+    if code == AS_PUBLISHED:
+        return enhanced_linear.moment(theta, rest, a, b)
+    if code == STRESS_FREE:
         return enhanced_linear.moment(theta, rest, a, b) - c
-    return call2(address, theta, rest)
+    return call2(address, theta, rest) if address != 0 else np.nan
 
 
 @scalar
 def hinge_slope(code, theta, rest, a, b, address):
     """Slope of the moment / k at dihedral theta."""
-    if code == 0:
-        return 1.0
-    if code == 1:
+    if code == linear.CODE:
+        return linear.hinge_slope()
+    if code == superlinear.CODE:
         return superlinear.slope(theta, rest)
-    if code == 2:
+    if (code == AS_PUBLISHED) | (code == STRESS_FREE):
         return enhanced_linear.slope(theta, a, b)
-    return call2(address, theta, rest)
+    return call2(address, theta, rest) if address != 0 else np.nan
 
 
 @scalar
-def hinge_rest_slope(code, theta, rest, a, b, stress_free, address):
-    """Derivative of energy / k with respect to the rest angle; `address` is that of the energy.
-
-    stress_free : whether the enhanced law's moment and energy at rest are subtracted.
-    """
-    if code == 1:
-        return -superlinear.moment(theta, rest)
-    if code == 2 and stress_free:
-        return enhanced_linear.slope(rest, a, b) * (rest - theta)
-    if code >= 0:
-        return rest - theta
+def hinge_rest_slope(code, theta, rest, a, b, address):
+    """Derivative of energy / k with respect to the rest angle; `address` is that of the energy."""
+    if code == linear.CODE:
+        return linear.hinge_rest_slope(theta, rest)
+    if code == superlinear.CODE:
+        return superlinear.rest_slope(theta, rest)
+    if code == AS_PUBLISHED:
+        return enhanced_linear.rest_slope(theta, rest)
+    if code == STRESS_FREE:
+        return enhanced_linear.stress_free_rest_slope(theta, rest, a, b)
+    if address == 0:
+        return np.nan
     h = 1e-5  # error 1e-10 of the energy's third derivative
     return (call2(address, theta, rest + h) - call2(address, theta, rest - h)) / (2.0 * h)
+
+
+@scalar
+def move_rest(code, rest, parameters):
+    """Set what follows the rest angle in the four parameters of a hinge."""
+    if code == STRESS_FREE:
+        enhanced_linear.relieve(rest, parameters)
 
 
 @kernel
@@ -108,11 +122,12 @@ def bar_table(code, e, address):
 
 @kernel
 def hinge_table(code, theta, rest, p, address):
-    """Energy, moment and slope rows (3, n) of one law at theta (n,)."""
-    out = np.empty((3, theta.size))
+    """Energy, moment, slope and rest slope rows (4, n) of one law at theta (n,)."""
+    out = np.empty((4, theta.size))
     for i in range(theta.size):
         t, r = theta[i], rest[i]
         out[0, i] = hinge_energy(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[0])
         out[1, i] = hinge_moment(code, t, r, p[i, 0], p[i, 1], p[i, 2], p[i, 3], address[1])
         out[2, i] = hinge_slope(code, t, r, p[i, 0], p[i, 1], address[2])
+        out[3, i] = hinge_rest_slope(code, t, r, p[i, 0], p[i, 1], address[0])
     return out

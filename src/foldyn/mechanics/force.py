@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.materials.ogden import stress_of_excess as ogden_stress
-from foldyn.materials.superlinear import moment as superlinear_moment
+from foldyn.jit.flat import flat
+from foldyn.jit.prefetch import prefetch_range
+from foldyn.jit.rows import LANES, add_rows, load_rows
+from foldyn.materials import enhanced_linear, ogden, superlinear
+from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.switch import bar_stress, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
-from foldyn.mechanics.flat import flat
 from foldyn.mechanics.model import BLOCK, BarsHinges
-from foldyn.mechanics.prefetch import prefetch_range
-from foldyn.mechanics.rows import LANES, add_rows, load_rows
 from foldyn.mechanics.strips import Strips, strips
 from foldyn.mechanics.threads import Team, team, wait
 
@@ -174,9 +174,9 @@ def add_bar_forces(model, low, high, work):
                 dz, vz = x[5 * BLOCK + q] - x[2 * BLOCK + q], x[8 * BLOCK + q]
                 s[q] *= dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
                 x[q], x[BLOCK + q], x[2 * BLOCK + q] = vx + dx, vy + dy, vz + dz
-            if code == 1:
+            if code == ogden.CODE:
                 for q in range(lanes):
-                    s[q] = ogden_stress(s[q])
+                    s[q] = ogden.stress_of_excess(s[q])
             else:
                 for q in range(m):
                     s[q] = bar_stress(code, s[q] / (1.0 + math.sqrt(1.0 + s[q])), address)
@@ -199,9 +199,8 @@ def enhanced_moments(stiffness, rest, p, low, high, first, m, angle, value):
         for q in range(m):
             e = first + q
             if (angle[q] < low) | (angle[q] > high):
-                value[q] = stiffness[e] * hinge_moment(
-                    2, angle[q], rest[e], low, high, p[4 * e + 2], 0.0, 0
-                )
+                at = enhanced_linear.moment(angle[q], rest[e], low, high) - p[4 * e + 2]
+                value[q] = stiffness[e] * at
 
 
 @scalar
@@ -209,7 +208,7 @@ def superlinear_moments(stiffness, rest, first, m, angle, value):
     """Moments of hinges of the superlinear law."""
     for q in range(m):
         e = first + q
-        value[q] = stiffness[e] * superlinear_moment(angle[q], rest[e])
+        value[q] = stiffness[e] * superlinear.moment(angle[q], rest[e])
 
 
 @kernel
@@ -262,9 +261,9 @@ def add_hinge_forces(model, low, high, work, keep):
             if keep:
                 for q in range(m):
                     kept[first + q] = angle[q]
-            if code == 1:
+            if code == superlinear.CODE:
                 superlinear_moments(stiffness, rest, first, m, angle, value)
-            elif code == 2:  # theta1 and theta2 are those of the law, one for the whole run
+            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):  # theta1 and theta2 are the run's
                 enhanced_moments(
                     stiffness, rest, p, p[4 * start], p[4 * start + 1], first, m, angle, value
                 )

@@ -27,9 +27,9 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import acceleration, moving_energy
+from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.borrow import borrowed
-from foldyn.mechanics.flat import flat
+from foldyn.jit.flat import flat
 
 NONE: Mapping[str, float] = {}
 TOLERANCE = 1e-7  # of the residual; see `Scheme`

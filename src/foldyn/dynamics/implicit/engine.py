@@ -14,11 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics import outcome
-from foldyn.dynamics.course import Course, Plan, Samples, sample
+from foldyn.dynamics.course import (
+    DONE,
+    FULL,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    PENETRATION,
+    STUCK,
+    Course,
+    Plan,
+    Samples,
+    sample,
+)  # fmt: skip
+from foldyn.dynamics.implicit import convergence
 from foldyn.dynamics.implicit.banded import one_thread
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
-from foldyn.dynamics.implicit.convergence import NOT_FINITE, SOLVED
 from foldyn.dynamics.implicit.horizon import horizon
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
@@ -27,8 +37,6 @@ from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
 
-TIME, NEXT, ERROR, SCALE, LAST, SMALLEST, LARGEST = range(7)  # places in `Course.clock`
-STEPS, SAMPLED, REFUSED, EVALUATIONS = range(4)  # places in `Course.count`
 SAME_TIME = 1e-9  # of a step: times as near as that are one
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
@@ -77,28 +85,28 @@ class Implicit:
     def _advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         if self._newton is None:
             found = self._begin(course, plan, out)
-            if found != outcome.DONE:
+            if found != DONE:
                 return found, -1
         newton = self._newton
         assert newton is not None
-        last = course.count[STEPS] + stretch
+        last = course.tally.steps + stretch
         advance = self._fixed if plan.steps else self._adaptive
         end = min(last, plan.steps) if plan.steps else last
-        while course.count[STEPS] < end and (plan.steps or course.clock[TIME] < plan.end):
-            if plan.every and not plan.steps and course.count[SAMPLED] == len(out.time):
-                return outcome.FULL, -1
+        while course.tally.steps < end and (plan.steps or course.tally.time < plan.end):
+            if plan.every and not plan.steps and course.tally.samples == len(out.time):
+                return FULL, -1
             found, hinge = advance(newton, course, plan, out)
-            course.count[EVALUATIONS] = newton.evaluations
-            if found != outcome.DONE:
+            course.tally.evaluations = newton.evaluations
+            if found != DONE:
                 return found, hinge
-        return outcome.DONE, -1
+        return DONE, -1
 
     def _begin(self, course: Course, plan: Plan, out: Samples) -> int:
         bench = Bench(self._packed, course)
         scheme = self._make(bench)
         newton = Newton(scheme, StepMatrix(self._packed, scheme.symmetric))
         scheme.begin(plan.start)
-        course.clock[SCALE] = _largest(bench.displacement())
+        course.tally.farthest = _largest(bench.displacement())
         if self._packed.system.varies and not plan.steps:
             self._horizon = horizon(bench, newton.matrix, plan.end - plan.start)
         newton.prepare(plan.dt, plan.start)
@@ -115,67 +123,67 @@ class Implicit:
 
     def _fixed(self, newton: Newton, course: Course, plan: Plan, out: Samples) -> tuple[int, int]:
         """One step of dt, in parts where a load jumps or Newton's method fails."""
-        step = int(course.count[STEPS]) + 1
-        t, end, h = float(course.clock[TIME]), plan.start + step * plan.dt, plan.dt
+        step = int(course.tally.steps) + 1
+        t, end, h = float(course.tally.time), plan.start + step * plan.dt, plan.dt
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = _divide(t, goal, h, jump)
             found, hinge = self._attempt(newton, part, stop, jump)
-            if found == outcome.DONE:
+            if found == DONE:
                 self._accept(newton, course, part, stop, jump)
                 t = stop
                 continue
             if self._hopeless(part, plan.dt):
-                course.clock[TIME] = t
+                course.tally.time = t
                 return found, hinge
             h, whole = 0.5 * part, False
         self._halved += not whole
-        course.count[STEPS], course.clock[TIME] = step, end
+        course.tally.steps, course.tally.time = step, end
         if step % plan.every == 0:
             return self._note(newton, course, end, out), -1
-        return outcome.DONE, -1
+        return DONE, -1
 
     def _adaptive(
         self, newton: Newton, course: Course, plan: Plan, out: Samples
     ) -> tuple[int, int]:
         """One step whose error is within the tolerance."""
-        clock, count = course.clock, course.count
-        t = float(clock[TIME])
+        tally = course.tally
+        t = float(tally.time)
         due, waits = self._due(plan, course, out)
         while True:
-            wanted = min(float(clock[NEXT]), plan.dt)
+            wanted = min(float(tally.wanted), plan.dt)
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
-                return outcome.STUCK, -1
+                return STUCK, -1
             near = SAME_TIME * wanted
             goal, jump = self._next_jump(t, _next_stop(plan, t, due, near), near)
             h, end, jump = _divide(t, goal, wanted, jump)
             found, hinge = self._attempt(newton, h, end, jump)
-            if found != outcome.DONE:
+            if found != DONE:
                 if self._hopeless(h, plan.dt):
                     return found, hinge
-                clock[NEXT] = 0.5 * h
-                count[REFUSED] += 1
+                tally.wanted = 0.5 * h
+                tally.refused += 1
                 continue
-            error, scale = self._error(newton, plan, t, h, float(clock[SCALE]))
+            error, scale = self._error(newton, plan, t, h, float(tally.farthest))
             if error <= 1.0:
                 break
-            clock[NEXT] = smaller_step(h, error)
-            count[REFUSED] += 1
+            tally.wanted = smaller_step(h, error)
+            tally.refused += 1
         self._accept(newton, course, h, end, jump)
-        count[STEPS] += 1
-        clock[TIME], clock[SCALE] = end, scale
-        error = remembered(error, clock[ERROR], h, clock[LAST] or h)
-        clock[ERROR], clock[LAST] = error, h
-        clock[NEXT] = max(wanted if end == goal else 0.0, next_step(h, error))
-        clock[SMALLEST], clock[LARGEST] = min(clock[SMALLEST], h), max(clock[LARGEST], h)
-        if count[STEPS] % plan.every == 0 if plan.every else waits and end == due:
+        tally.steps += 1
+        tally.time, tally.farthest = end, scale
+        error = remembered(error, tally.error, h, tally.last or h)
+        tally.error, tally.last = error, h
+        tally.wanted = max(wanted if end == goal else 0.0, next_step(h, error))
+        tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
+        if tally.steps % plan.every == 0 if plan.every else waits and end == due:
             return self._note(newton, course, end, out), -1
-        return outcome.DONE, -1
+        return DONE, -1
 
     def _due(self, plan: Plan, course: Course, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps end, and whether a sample waits there."""
-        number = int(course.count[SAMPLED])
+        number = int(course.tally.samples)
         if plan.every or number == len(out.time):
             return plan.end, False
         time = plan.start + number * plan.interval
@@ -197,13 +205,13 @@ class Implicit:
         bench.predict(h)
         found = newton.solve(h, end if jump is None else math.nextafter(min(end, jump), -math.inf))
         if self._packed.callbacks.error is not None:
-            return outcome.NOT_FINITE, -1
+            return NOT_FINITE, -1
         turned = np.abs(bench.work.angle - bench.course.angle)
         if turned.max(initial=0.0) > TURN:
-            return outcome.PENETRATION, int(turned.argmax())
-        if found == SOLVED:
-            return outcome.DONE, -1
-        return (outcome.NOT_FINITE if found == NOT_FINITE else outcome.NOT_CONVERGED), -1
+            return PENETRATION, int(turned.argmax())
+        if found == convergence.SOLVED:
+            return DONE, -1
+        return (NOT_FINITE if found == convergence.NOT_FINITE else NOT_CONVERGED), -1
 
     def _hopeless(self, h: float, wanted: float) -> bool:
         """Whether a smaller step would not help either."""
@@ -214,8 +222,8 @@ class Implicit:
     ) -> None:
         scheme = newton.scheme
         done, lost = scheme.works(h)
-        course.tally[0] += done
-        course.tally[1] += lost
+        course.tally.work += done
+        course.tally.dissipated += lost
         course.angle[:] = scheme.bench.work.angle
         scheme.accept(h)
         if jump is not None:

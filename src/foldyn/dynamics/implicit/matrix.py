@@ -17,8 +17,8 @@ from scipy import sparse
 from foldyn.dynamics.implicit.banded import BandLU, Cholesky
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
+from foldyn.jit.flat import flat
 from foldyn.mechanics import Sparsity
-from foldyn.mechanics.flat import flat
 from foldyn.statics.backends import factorizer
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 

@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, Fix, Force
 from foldyn.errors import ComputationError, InputError
-from foldyn.materials import EnhancedLinear
-from foldyn.materials.linear import LinearHinge
 from foldyn.studies.herkal.opensees.mesh import Crease, PanelMesh, panel_mesh
 
 TIE = 100.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
@@ -29,7 +27,6 @@ TOLERANCE = 1e-7  # m and rad: norm of the last correction of a step
 ITERATIONS = 60
 SECTION, TIE_MATERIAL = 1, 1  # their numbers
 MOVES, TURN = (1, 2, 3), 4  # directions of a spring: along its three axes, about the first
-FREE = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +103,8 @@ class PanelShells:
         """Least and largest change of each dihedral (nc, 2), rad, up to which folds are linear."""
         structure = self.case.structure
         law, rest = structure.fold_law, structure.pattern.dihedrals
-        if isinstance(law, LinearHinge):
-            return np.tile(FREE, (len(rest), 1))
-        if isinstance(law, EnhancedLinear):
-            bounds = np.radians([law.theta1, law.theta2])
-            found = bounds - rest[:, None]
+        if law.linear_between is not None:
+            found = np.array(law.linear_between) - rest[:, None]
             if (found[:, 0] < 0.0).all() and (found[:, 1] > 0.0).all():
                 return found
         raise InputError(f"fold_law = {law}: this model takes folds that are linear at rest")

@@ -1,0 +1,133 @@
+"""What holds for every law: its functions agree with one another, and the kernels know it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, bar_law, hinge_law
+from foldyn.materials.switch import move_rest
+
+ROOT = Path(__file__).resolve().parents[2]
+STEP = 1e-5
+HINGES = {
+    **{name: hinge_law(name) for name in HINGE_LAWS},
+    # limits within the rest angles below: locked at rest
+    "locked, stress-free": fd.EnhancedLinear(90, 270),
+    "locked, as published": fd.EnhancedLinear(90, 270, rest="as_published"),
+    "custom": fd.CustomHingeLaw(
+        energy_of=lambda t, r: 0.5 * (t - r) ** 2 + 0.25 * (t - r) ** 4,
+        moment_of=lambda t, r: (t - r) + (t - r) ** 3,
+        slope_of=lambda t, r: 1.0 + 3.0 * (t - r) ** 2,
+    ),
+}
+THETA, REST = np.meshgrid(
+    np.radians([30.0, 120.0, 250.0, 330.0]), np.radians([40.0, 100.0, 200.0, 320.0])
+)
+
+
+def difference(function, x):
+    return (function(x + STEP) - function(x - STEP)) / (2.0 * STEP)
+
+
+def close(found, wanted):
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", BAR_LAWS)
+def test_functions_of_a_bar_law_are_derivatives(name):
+    law, stretch = bar_law(name), np.linspace(0.6, 1.8, 25)
+    close(law.stress(stretch) * stretch, difference(law.energy, stretch))
+    close(law.slope(stretch) * stretch, difference(law.stress, stretch))
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_functions_of_a_hinge_law_are_derivatives(name):
+    """In the dihedral and in the rest dihedral, along which moment and energy at rest move."""
+    law = HINGES[name]
+    close(law.moment(THETA, REST), difference(lambda theta: law.energy(theta, REST), THETA))
+    close(law.slope(THETA, REST), difference(lambda theta: law.moment(theta, REST), THETA))
+    close(law.rest_slope(THETA, REST), difference(lambda rest: law.energy(THETA, rest), REST))
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_parameters_of_a_hinge_law_follow_its_rest_angle(name):
+    law, rest = HINGES[name], REST[:, 0]
+    moved = law.parameters(rest[::-1].copy())
+    for row, angle in zip(moved, rest, strict=True):
+        move_rest(law.code, angle, row)
+    np.testing.assert_array_equal(moved, law.parameters(rest))
+
+
+@pytest.mark.parametrize("name", HINGES)
+def test_a_hinge_law_is_linear_where_it_says_so(name):
+    law = HINGES[name]
+    if law.linear_between is None:
+        assert np.ptp(law.slope(THETA, REST)) > 0.0
+        return
+    low, high = law.linear_between
+    within = (np.minimum(THETA, REST) > low) & (np.maximum(THETA, REST) < high)
+    np.testing.assert_array_equal(law.moment(THETA, REST)[within], (THETA - REST)[within])
+
+
+def test_codes_of_registered_laws_differ():
+    for laws in (BAR_LAWS, HINGE_LAWS):
+        codes = [kind().code for kind in laws.values()]
+        assert len(set(codes)) == len(codes)
+
+
+@dataclass(frozen=True)
+class UnknownBar(BarLaw):
+    code = 99
+    name: str = "unknown"
+
+
+@dataclass(frozen=True)
+class UnknownHinge(HingeLaw):
+    code = 99
+    name: str = "unknown"
+
+
+class Nameless(HingeLaw):
+    """Has neither a code nor functions."""
+
+    name = "nameless"
+
+
+@pytest.mark.parametrize(
+    ("field", "law"),
+    [
+        ("bar_law", UnknownBar()),
+        ("fold_law", UnknownHinge()),
+        ("bend_law", UnknownHinge()),
+        ("fold_law", Nameless()),
+    ],
+)
+def test_a_law_that_the_kernels_do_not_know_is_refused(field, law):
+    pattern, sheet = fd.patterns.simple_fold(), fd.Sheet(1e6, 0.25, 0.01)
+    with pytest.raises(InputError, match=rf"^{field}: '{law.name}', code .*, is not a law"):
+        fd.discretize(pattern, sheet, **{field: law})
+    if field == "fold_law":
+        with pytest.raises(InputError, match="is not a law that the kernels know"):
+            fd.shell(pattern, sheet, divisions=2, fold_law=law)
+
+
+def test_files_of_a_law():
+    """CONTRIBUTING lists the files that a new law touches: those that mention an old one."""
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    steps = text.split("### A law\n")[1].split("\n### ")[0]
+    listed = {name for name in re.findall(r"`(src/\S+\.py)`", steps)}
+    mention = re.compile(r"\bLinearBar\b|\blinear\.(bar_|CODE)")
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "src").rglob("*.py")
+        if mention.search(path.read_text("utf-8"))
+    }
+    assert {name.replace("cubic", "linear") for name in listed} == found
+    assert len(listed) <= 3
