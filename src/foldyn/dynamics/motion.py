@@ -163,11 +163,10 @@ class Motion:
 
     def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
-        damping = self.case.damping.alpha, self.case.damping.beta
         omega, growth = largest_frequency(self.case, u), self.method.growth
         assert growth is not None  # of explicit methods
-        if not is_stable(growth, omega, *damping, self.plan.dt):
-            limit = stability_limit(growth, omega, *damping)
+        if not is_stable(growth, omega, self.case.damping, self.plan.dt):
+            limit = stability_limit(growth, omega, self.case.damping)
             raise InstabilityError(
                 f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "

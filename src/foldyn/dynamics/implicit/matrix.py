@@ -73,12 +73,10 @@ class StepMatrix:
         self.stiffness = np.zeros(shape)
         self._blocks = Blocks(self.stiffness, np.zeros(shape), np.zeros(shape))
         self._blocks.mass[where] = nodal.data[:, None, None] * np.eye(3)
-        if system.stiff_data.size:
-            k0 = (system.stiff_data, system.stiff_indices, system.stiff_indptr)
-            blocks = sparse.csr_array(k0, (3 * nodes, 3 * nodes)).tobsr((3, 3))
-            blocks.sort_indices()
-            where = _slots(self.pattern, blocks.indptr, blocks.indices)
-            self._blocks.damping[where] = blocks.data
+        blocks = system.damping.viscous(3 * nodes).tobsr((3, 3))
+        blocks.sort_indices()
+        where = _slots(self.pattern, blocks.indptr, blocks.indices)
+        self._blocks.damping[where] = blocks.data
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[self.blocks.unused] = True
