@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
+from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import generalized_alpha
 from foldyn.dynamics.choice import AUTO, choose
@@ -31,7 +32,6 @@ from foldyn.dynamics.timing import (
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.fill import check_fill
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def prepare(
         )
     check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
-        check_fill(case.structure)
+        check_fill(case.structure.fill, case.structure.body.size)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
         memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY

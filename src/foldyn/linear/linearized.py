@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
 from foldyn.errors import FoldynWarning
@@ -17,7 +18,6 @@ from foldyn.linear.equilibrium import station
 from foldyn.linear.secant import equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
-from foldyn.statics.fill import check_fill
 from foldyn.values import number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
@@ -98,7 +98,7 @@ def linearize(
     """
     amplitude = _amplitude(secant)
     check_mass(case.structure.mass, case.fixed)
-    check_fill(case.structure)
+    check_fill(case.structure.fill, case.structure.body.size)
     where = station(case, state, load_factor)
     body = where.body
     free = np.concatenate([case.free_dofs, body.hidden])

@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, turn
 from foldyn.dynamics.damping import drag, drag_works, viscous_work
-from foldyn.dynamics.implicit.banded import substitute
 from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.banded import one_thread
 from foldyn.dynamics.course import (
     DONE,
     FULL,
@@ -27,7 +28,6 @@ from foldyn.dynamics.course import (
     sample,
 )  # fmt: skip
 from foldyn.dynamics.implicit import convergence
-from foldyn.dynamics.implicit.banded import one_thread
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
 from foldyn.dynamics.implicit.horizon import horizon
 from foldyn.dynamics.implicit.matrix import StepMatrix
