@@ -72,9 +72,16 @@ class Motion:
 
     def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """Integrate the motion; see `simulate`."""
+        self.samples(progress)
+        return self._dataset()
+
+    def samples(self, progress: bool | Reporter | None = None) -> Samples:
+        """Integrate the motion; its samples alone, which do not carry the case."""
         self._course, self._out = self._begin(), self._room(self.expected_samples)
         self._integrate(*reporter(progress))
-        return self._finish()
+        if told := self._doubts(self._audit()):
+            warnings.warn(told, FoldynWarning, stacklevel=3)
+        return self._written()
 
     def _room(self, count: int) -> Samples:
         nodes = len(self.case.structure.nodes)
@@ -222,14 +229,17 @@ class Motion:
 
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
-        plan, n, out = self.plan, self.stored, self._out
+        out = self._written()
         energies: dict[str, NDArray] = dict(
-            zip(audited(self.case.structure.energy_groups), out.energy[:n].T, strict=True)
+            zip(audited(self.case.structure.energy_groups), out.energy.T, strict=True)
         )
         return trajectory_dataset(
-            self.case, out.time[:n], out.displacement[:n], out.velocity[:n], out.reaction[:n],
-            energies, self._statistics(plan),
+            self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
+            self._statistics(self.plan),
         )  # fmt: skip
+
+    def _written(self) -> Samples:
+        return Samples(*(array[: self.stored] for array in self._out))
 
     def _statistics(self, plan: Plan) -> dict[str, Any]:
         tally = self._course.tally
@@ -268,13 +278,6 @@ class Motion:
             return 0.0
         scale = energy_scale(energy)
         return float(np.abs(energy_error(energy)).max() / scale) if scale > 0.0 else 0.0
-
-    def _finish(self) -> xarray.Dataset:
-        """Dataset of the whole motion; warns where its energy balance is poor, or tells nothing."""
-        told = self._doubts(self._audit())
-        if told:
-            warnings.warn(told, FoldynWarning, stacklevel=3)
-        return self._dataset()
 
     def _doubts(self, error: float) -> str:
         """What to say of a motion with a relative energy error; empty where nothing."""
