@@ -12,17 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.audit import AUDITED, Rounding, audited, energy_error, energy_scale
-from foldyn.dynamics.course import (
-    DONE,
-    FULL,
-    NOT_CONVERGED,
-    PENETRATION,
-    STUCK,
-    Course,
-    Plan,
-    Samples,
-    samples,
-)  # fmt: skip
+from foldyn.dynamics.course import Course, Outcome, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.kinds import fold_rest
@@ -107,9 +97,9 @@ class Motion:
                 self.seconds = time.perf_counter() - began
                 if callbacks.error is not None:
                     self._raise(callbacks.error)
-                if code == FULL:
+                if code == Outcome.FULL:
                     self._out = _enlarged(self._out)
-                elif code != DONE:
+                elif code != Outcome.DONE:
                     self._fail(code, hinge)
                 step, now = int(course.tally.steps), float(course.tally.time)
                 ended = step == plan.steps if plan.steps else now >= plan.end
@@ -197,7 +187,7 @@ class Motion:
             )
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
-        if code == PENETRATION:
+        if code == Outcome.PENETRATION:
             j, k, i, l = order[model.hinges[hinge]].tolist()  # noqa: E741
             raise PenetrationError(
                 f"at {moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
@@ -205,13 +195,13 @@ class Motion:
                 "smaller step keeps panels apart",
                 self._dataset(),
             )
-        if code == STUCK:
+        if code == Outcome.STUCK:
             raise InstabilityError(
                 f"at {moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps "
                 "too often, or the motion is too violent; raise the tolerance, or use rk4",
                 self._dataset(),
             )
-        if code == NOT_CONVERGED:
+        if code == Outcome.NOT_CONVERGED:
             raise InstabilityError(
                 f"at {moment} no end of a step was found that is in equilibrium, however small the "
                 "step: a mass or a stiffness may be missing, or the motion is too violent",
