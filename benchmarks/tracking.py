@@ -41,7 +41,7 @@ def prepare(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "path.nc").exists():
         file = fd.read_case(fd.studies.find_case("herkal/specimen"))
-        fd.save(fd.trace(file.case(), **file.analysis.arguments), folder / "path.nc")
+        fd.save(file.run(), folder / "path.nc")
     path = fd.load(folder / "path.nc")
     if not (folder / "motion.nc").exists():
         pressed = int(np.abs(path.displacement.sel(node=3, axis="x").values - 0.03).argmin())

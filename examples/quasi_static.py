@@ -55,10 +55,7 @@ def shares(number: int, bend_law: str) -> np.ndarray:
 def shipped(name: str):
     """A shipped case and its path."""
     case_file = fd.read_case(fd.studies.find_case(name))
-    settings = fd.statics.Settings(**case_file.analysis.settings)
-    return case_file.case(), fd.trace(
-        case_file.case(), **case_file.analysis.arguments, settings=settings
-    )
+    return case_file.case(), case_file.run()
 
 
 def release(case: fd.Case, path):

@@ -11,8 +11,8 @@ import pytest
 from pydantic import BaseModel
 
 import foldyn as fd
-from foldyn.cases import Table, read_case
-from foldyn.cases.kinds import KINDS
+from foldyn.analyses import ANALYSES, read_case
+from foldyn.cases import Table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -108,7 +108,7 @@ def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
 def sections() -> list[tuple[str, str]]:
     """(section, key) of the case file."""
     found = []
-    for schema in KINDS.values():
+    for schema in (kind.schema for kind in ANALYSES.values()):
         for name, field in schema.model_fields.items():
             types = [field.annotation, *getattr(field.annotation, "__args__", ())]
             models = [one for one in types if isinstance(one, type) and issubclass(one, BaseModel)]

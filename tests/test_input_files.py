@@ -9,8 +9,8 @@ import pytest
 
 import foldyn as fd
 from foldyn import experiment
+from foldyn.analyses.reading import read_document
 from foldyn.cases.csv_table import read_headings, read_numbers
-from foldyn.cases.reading import read_document
 from foldyn.errors import InputError
 from foldyn.experiment.calibration import fit_file, measured_files
 from foldyn.input_files import DEEPEST, from_json, from_toml, read_text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import shutil
 import subprocess
@@ -12,12 +11,6 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
-from foldyn.cases import analyses, vibrations
-from foldyn.cases.reading import SETTINGS
-from foldyn.linear import METHODS as RESPONSES
-from foldyn.linear.burst_random import ESTIMATORS
-from foldyn.linear.quantity import PER_FORCE
-from foldyn.plots.writers import WRITERS
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "src").glob("**/*.py"))
@@ -102,44 +95,6 @@ def test_every_registry_row_has_a_docs_row(page, registry):
     rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
     missing = [key for key in getattr(getattr(fd, module), name) if f"`{key}`" not in "".join(rows)]
     assert not missing, f"docs/{page} has no row for {missing}"
-
-
-def test_case_files_may_name_every_integrator():
-    assert set(analyses.METHODS) == set(fd.dynamics.METHODS)
-
-
-def test_case_files_may_name_every_kind_of_animation():
-    assert [f".{kind}" for kind in analyses.ANIMATIONS] == list(WRITERS)
-
-
-def test_case_files_may_name_every_method_of_following_a_path():
-    assert tuple(fd.statics.METHODS) == analyses.PATH_METHODS
-
-
-def test_frequency_responses_that_case_files_name_are_those_there_are():
-    keys = {
-        method.name: tuple(field.name for field in dataclasses.fields(method.options))
-        for method in RESPONSES.values()
-    }
-    assert keys == {name: tuple(keys) for name, keys in vibrations.FRF_METHODS.items()}
-    linear = [m.name for m in RESPONSES.values() if m.linear and m.secant is None]
-    assert tuple(linear) == vibrations.LINEAR_METHODS
-    assert tuple(PER_FORCE) == vibrations.QUANTITIES
-    assert set(ESTIMATORS) == set(vibrations.ESTIMATORS)
-
-
-def test_defaults_of_frequency_responses_in_case_files_are_those_of_the_methods():
-    for method in RESPONSES.values():
-        for option in dataclasses.fields(method.options):
-            ours = vibrations.FrfSection.model_fields[option.name].default
-            shared = sum(option.name in keys for keys in vibrations.FRF_METHODS.values())
-            assert ours == option.default or (ours is None and shared > 1), option.name
-
-
-def test_settings_of_a_path_in_case_files_are_those_of_the_solver():
-    section = analyses.StaticsSection(kind="statics")
-    settings = {name: getattr(section, name) for name in SETTINGS}
-    assert fd.statics.Settings(**settings) == fd.statics.Settings()
 
 
 def test_every_top_level_name_is_in_the_api_page():

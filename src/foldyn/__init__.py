@@ -49,7 +49,7 @@ _HOME = {
     "Harmonic": "cases",
     "Chirp": "cases",
     "Table": "cases",
-    "read_case": "cases",
+    "read_case": "analyses",
     "save": "results",
     "load": "results",
     "case_of": "results",
@@ -65,12 +65,13 @@ _HOME = {
     "fit": "experiment",
 }
 _MODULES = (
-    "cases", "checks", "dynamics", "errors", "experiment", "formats", "linear", "materials",
-    "mechanics", "patterns", "plots", "report", "results", "shells", "signals", "statics",
-    "structures", "studies",
+    "analyses", "cases", "checks", "dynamics", "errors", "experiment", "formats", "linear",
+    "materials", "mechanics", "patterns", "plots", "report", "results", "shells", "signals",
+    "statics", "structures", "studies",
 )  # fmt: skip
 
 if TYPE_CHECKING:
+    from foldyn.analyses import read_case
     from foldyn.cases import (
         Actuate,
         BaseMotion,
@@ -90,7 +91,6 @@ if TYPE_CHECKING:
         State,
         Step,
         Table,
-        read_case,
     )
     from foldyn.dynamics import critical_step, initial_state, simulate
     from foldyn.experiment import fit

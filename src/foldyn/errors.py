@@ -6,6 +6,8 @@ that fails raises `ComputationError` (exit status 1) and carries what was comput
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
@@ -38,7 +40,41 @@ class FoldynError(Exception):
 
 
 class InputError(FoldynError, ValueError):
-    """The input cannot be used; the message names the field, the value and the remedy."""
+    """The input cannot be used; the message names the field, the value and the remedy.
+
+    Parameters
+    ----------
+    reason : str
+        What is wrong and what to do. Where the field is given it goes on from there:
+        " = -1: must be ...", or ": missing; ...".
+    field : str
+        Path of what is wrong: "duration", "loads[0].history".
+    file : path, optional
+        File that says it.
+    """
+
+    def __init__(self, reason: object = "", field: str = "", file: object = None) -> None:
+        self.reason, self.field, self.file = str(reason), field, file
+        super().__init__(f"{'' if file is None else f'{file}: '}{field}{self.reason}")
+
+    @property
+    def key(self) -> str:
+        """First part of the field: "loads" of "loads[0].history"."""
+        return self.field.partition(".")[0].partition("[")[0]
+
+    def within(self, field: str, file: object = None) -> InputError:
+        """The same error, seen from further out: its field is a part of another, or of a file."""
+        inner = self.field if self.file is None else f"{self.file}: {self.field}"
+        return type(self)(self.reason, field + inner, file)
+
+
+@contextmanager
+def within(field: str, file: object = None) -> Iterator[None]:
+    """Put the place of what is read or checked meanwhile before the field of an `InputError`."""
+    try:
+        yield
+    except InputError as error:
+        raise error.within(field, file) from None
 
 
 class ComputationError(FoldynError, RuntimeError):

@@ -70,7 +70,7 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
     if needed <= there:
         here, remedy = f"half of {here}", f"{remedy}, or go on with --force"
     raise InputError(
-        f"{field}: {what} needs about {needed / GIB:.3g} GiB, more than {here}: {remedy}"
+        f": {what} needs about {needed / GIB:.3g} GiB, more than {here}: {remedy}", field
     )
 
 

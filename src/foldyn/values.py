@@ -80,7 +80,7 @@ def choice(name: str, value: Any, known: Iterable[str]) -> str:
     if isinstance(value, str) and value in known:
         return value
     hint = suggest(value, known) if isinstance(value, str) else ""
-    raise InputError(f"{name} = {show(value)}: {hint}choose one of {', '.join(known)}")
+    raise InputError(f" = {show(value)}: {hint}choose one of {', '.join(known)}", name)
 
 
 def number(
@@ -110,13 +110,13 @@ def number(
     """
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         kind = f" ({unit})" if unit else ""
-        raise InputError(f"{name} = {show(value)}: must be a number{kind}")
+        raise InputError(f" = {show(value)}: must be a number{kind}", name)
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise InputError(f"{name} = {show(value)}: must be a finite number")
+        raise InputError(f" = {show(value)}: must be a finite number", name)
     unit = f" {unit}" if unit else ""
     small = "0 or in size at least" if above is None else "in size at least"
     for fits, words, bound in (
@@ -128,7 +128,7 @@ def number(
         (result == 0.0 or abs(result) >= smallest, small, smallest),
     ):
         if not fits:
-            raise InputError(f"{name} = {show(value)}: must be {words} {bound:g}{unit}")
+            raise InputError(f" = {show(value)}: must be {words} {bound:g}{unit}", name)
     return result
 
 
@@ -154,10 +154,10 @@ def whole(
     result = int(value) if counts else 0
     if not counts or (least is not None and result < least):
         bound = "" if least is None else f", at least {least}"
-        raise InputError(f"{name} = {show(value)}: must be a whole number{bound}{what}")
+        raise InputError(f" = {show(value)}: must be a whole number{bound}{what}", name)
     if not -MOST - 1 <= result <= most:
         end = f"at most {most}" if result > 0 else f"at least {-MOST - 1}"
-        raise InputError(f"{name} = {show(result)}: must be {end}{what}")
+        raise InputError(f" = {show(result)}: must be {end}{what}", name)
     return result
 
 
@@ -170,11 +170,11 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
     try:
         array = np.asarray(value)
     except ValueError:
-        raise InputError(f"{name} = {show(value)}: rows have different lengths") from None
+        raise InputError(f" = {show(value)}: rows have different lengths", name) from None
     if array.dtype == object:  # whole numbers beyond 64 bits are numbers too, if too large
         array = _as_floats(array)
     if array.dtype.kind not in "iuf" or _has_truth_values(value):
-        raise InputError(f"{name} = {show(value)}: must be numbers")
+        raise InputError(f" = {show(value)}: must be numbers", name)
     result = np.array(array, dtype=np.float64)
     for usable, words in (
         (np.isfinite(result), "a finite number"),
@@ -183,11 +183,11 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
         bad = np.argwhere(~usable)
         if len(bad):
             place = "".join(f"[{i}]" for i in bad[0])
-            raise InputError(f"{name}{place} = {result[tuple(bad[0])]}: must be {words}")
+            raise InputError(f" = {result[tuple(bad[0])]}: must be {words}", f"{name}{place}")
     size = float(np.abs(result).max(initial=0.0))
     if 0.0 < size < SMALLEST:
         raise InputError(
-            f"{name}: the largest in size is {size:g}; must be 0 or at least {SMALLEST:g}"
+            f": the largest in size is {size:g}; must be 0 or at least {SMALLEST:g}", name
         )
     result.flags.writeable = False
     return result
@@ -216,7 +216,7 @@ def number_or_list(name: str, value: Any, what: str) -> float | tuple[float, ...
     if array.ndim == 0:
         return float(array)
     if array.ndim > 1 or not array.size:
-        raise InputError(f"{name} = {show(value)}: must be a number, or a list of one per {what}")
+        raise InputError(f" = {show(value)}: must be a number, or a list of one per {what}", name)
     return tuple(array.tolist())
 
 
@@ -233,17 +233,17 @@ def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ..
     array = np.atleast_1d(np.asarray(value, dtype=object))
     if array.ndim != 1 or array.size == 0:
         raise InputError(
-            f"{name} = {show(value)}: must be {what} numbers, as in [0, 1], {alternative}"
+            f" = {show(value)}: must be {what} numbers, as in [0, 1], {alternative}", name
         )
     for item in array:
         if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
-            raise InputError(f"{name} = {show(value)}: {show(item)} is not a {what} number")
+            raise InputError(f" = {show(value)}: {show(item)} is not a {what} number", name)
         if abs(int(item)) > MOST:
-            raise InputError(f"{name}: {show(item)}: is too large for a {what} number")
+            raise InputError(f": {show(item)}: is too large for a {what} number", name)
     chosen = tuple(int(item) for item in array)
     if len(set(chosen)) < len(chosen):
         twice = next(item for item, times in Counter(chosen).items() if times > 1)
-        raise InputError(f"{name} = {show(value)}: {what} {twice} is listed twice")
+        raise InputError(f" = {show(value)}: {what} {twice} is listed twice", name)
     return chosen
 
 
@@ -251,9 +251,9 @@ def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, floa
     """Return `value` as three finite floats, if asked not all of them zero."""
     array = numbers(name, value)
     if array.shape != (3,):
-        raise InputError(f"{name} = {show(value)}: must be three numbers (x, y, z)")
+        raise InputError(f" = {show(value)}: must be three numbers (x, y, z)", name)
     if nonzero and not array.any():
-        raise InputError(f"{name} = {show(value)}: must not be zero")
+        raise InputError(f" = {show(value)}: must not be zero", name)
     x, y, z = array.tolist()
     return x, y, z
 

@@ -64,7 +64,8 @@ def test_mp4_without_ffmpeg_is_refused_at_once(workplace, edited, monkeypatch) -
 
 def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
     """A sheet without loads shows some of its vertices, not hundreds of rows."""
-    from foldyn.report import album, motion
+    from foldyn.analyses import motion
+    from foldyn.report import album
 
     shown = []
     monkeypatch.setattr(motion.plots, "animate", lambda *_, **__: Path("r/structure.png"))

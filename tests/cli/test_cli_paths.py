@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cli import folder as results_folder
 from foldyn.cli import stamp
 from foldyn.cli.main import main
+from foldyn.cli.run import DRAWN
 
 CELL = """
 title = "a Miura unit cell, pulled slowly"
@@ -164,7 +164,7 @@ def test_a_path_that_cannot_go_on_is_kept_with_the_remedy(workplace) -> None:
 
 
 def test_an_interrupted_path_is_kept(workplace, monkeypatch) -> None:
-    from foldyn.cli import paths
+    from foldyn.analyses import path as paths
 
     class Impatient:
         """A bar after whose third point somebody presses Ctrl-C."""
@@ -259,7 +259,7 @@ def test_figures_of_a_loaded_path(workplace, slow) -> None:
     assert (done.status, done.err) == (0, "")
     files = {*PICTURES, "curve.png", "result.nc", "report.html"}
     assert set(done.new) == {"r", *(f"r/{name}" for name in files)}
-    assert files - {"result.nc"} <= set(results_folder.DRAWN)
+    assert files - {"result.nc"} <= set(DRAWN)
     page = Path("r/report.html").read_text(encoding="utf-8")
     for name in (*PICTURES, "curve.png"):
         assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
@@ -284,7 +284,7 @@ def test_figures_of_moved_supports(workplace, edited) -> None:
     assert (done.status, done.err) == (0, "")
     pictures = {*PICTURES, "reaction.png"}
     assert set(done.new) == {"r", *(f"r/{n}" for n in (*pictures, "result.nc", "report.html"))}
-    assert pictures <= set(results_folder.DRAWN)
+    assert pictures <= set(DRAWN)
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert "moved along -z (m)" in page
     path = fd.load("r/result.nc")
@@ -299,7 +299,7 @@ def test_figures_of_moved_supports(workplace, edited) -> None:
 def test_figures_of_an_earlier_motion_go(workplace, slow, tmp_path) -> None:
     folder = tmp_path / "case-results"
     folder.mkdir()
-    for name in results_folder.DRAWN:
+    for name in DRAWN:
         (folder / name).write_text("old")
     (folder / "notes.txt").write_text("mine")
     workplace.write(slow())

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.analyses.reading import read_as
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.cli.main import main
-from foldyn.cli.shortcuts import read_as
 from foldyn.errors import FoldynWarning, InputError
 
 GRID = {"first": 0.0, "last": 3.0, "count": 31}
@@ -85,7 +85,7 @@ def test_what_a_motion_starts_with_is_left_out(read, miura) -> None:
     text = miura.replace("[analysis]", "[initial]\nspin = [0, 0, 0]\n[analysis]")
     with pytest.warns(FoldynWarning, match=r"leaves out loads\[0\], \[initial\]"):
         found = read(text, "modes")
-    assert found.start is None
+    assert found.initial() is None
 
 
 def test_a_moving_base_drives_where_no_force_does(read, miura) -> None:
@@ -133,9 +133,9 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
     assert read(modes, "modes").analysis.arguments == {"count": 3, "state": None, "secant": 1.0}
     assert read(modes, "modes", count=5).analysis.arguments["count"] == 5
     stored = modes + '[initial]\nfile = "a.nc"\n'
-    assert read(stored, "modes", state="rest").start is None
-    other = read(stored, "modes", state=str(tmp_path / "b.nc")).start
-    assert other is not None and other.file == str(tmp_path / "b.nc")
+    assert read(stored, "modes", state="rest").initial() is None
+    with pytest.raises(InputError, match=r"initial\.file = .*b\.nc.*no such file"):
+        read(stored, "modes", state=str(tmp_path / "b.nc")).initial()
     drive = "[[drive]]\nnodes = 7\nforce = [1, 0, 0]\n"
     response = OWN + 'kind = "frf"\nmethod = "modal"\n' + drive  # without frequencies of its own
     found = read(response, "frf", frequencies=GRID, method="direct")

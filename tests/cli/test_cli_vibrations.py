@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cli import folder as results_folder
+from foldyn.cli.run import DRAWN
 from foldyn.errors import InputError, MotionInterrupted
 from foldyn.linear import frf, modes, peaks_of
 
@@ -59,7 +59,7 @@ def small(edited):
 @pytest.fixture(autouse=True)
 def short_films(monkeypatch):
     """Films of two pictures: what they show is tested with the figures."""
-    monkeypatch.setattr("foldyn.report.modes.FRAMES", 2)
+    monkeypatch.setattr("foldyn.analyses.modes.FRAMES", 2)
 
 
 def cells_of(page: str) -> list[list[str]]:
@@ -120,7 +120,7 @@ def test_figures_of_modes(workplace, small) -> None:
     results = ("result-circumcenter.nc", "result-panel.nc")
     drawn = (*PICTURES, "mac.png", "report.html")
     assert set(done.new) == {"r", *(f"r/{name}" for name in (*drawn, *results))}
-    assert set(drawn) <= set(results_folder.DRAWN)
+    assert set(drawn) <= set(DRAWN)
     page = Path("r/report.html").read_text(encoding="utf-8")
     for name in drawn[:-1]:
         assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
@@ -152,7 +152,7 @@ def test_figures_of_a_response(workplace, small) -> None:
     results = ("result-circumcenter.nc", "result-panel.nc")
     drawn = ("structure.png", "laws.png", "response.png", "nyquist.png", "report.html")
     assert set(done.new) == {"r", *(f"r/{name}" for name in (*drawn, *results))}
-    assert set(drawn) <= set(results_folder.DRAWN)
+    assert set(drawn) <= set(DRAWN)
     page = Path("r/report.html").read_text(encoding="utf-8")
     for name in drawn[:-1]:
         assert base64.b64encode(Path("r", name).read_bytes()).decode() in page, name
@@ -306,7 +306,7 @@ def test_an_interrupted_response_leaves_nothing(workplace, monkeypatch) -> None:
     workplace.write(RESPONSE)
     workplace.call("run", "case.toml", "--no-figures", "--out", "motion")
     (workplace.folder / "motion.nc").write_bytes(Path("motion/result.nc").read_bytes())
-    monkeypatch.setattr("foldyn.linear.frf", interrupted)
+    monkeypatch.setattr("foldyn.analyses.frf.frf", interrupted)
     stopped = workplace.call("run", "case.toml", "--no-figures")
     assert (stopped.status, stopped.new) == (130, [])
     assert stopped.err == "foldyn: interrupted at 0.1 s\n"

@@ -119,7 +119,7 @@ def test_exit_status_of_an_interrupt_within_code_made_from_text(tmp_path) -> Non
         "import sys\n"
         "from foldyn.cli import main\n"
         "def call(_):\n"
-        "    exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)\\nwhile True: pass')\n"
+        "    exec('import os, signal; os.kill(os.getpid(), signal.SIGTERM)\\nwhile True: pass')\n"
         "main._call = call\n"
         "sys.exit(main.main(['info']))\n"
     )
@@ -130,8 +130,9 @@ def test_exit_status_of_an_interrupt_within_code_made_from_text(tmp_path) -> Non
         capture_output=True,
         text=True,
         check=False,
+        timeout=60,
     )
-    assert (done.returncode, done.stderr) == (130, "foldyn: interrupted\n")
+    assert (done.returncode, done.stderr) == (143, "foldyn: interrupted\n")
 
 
 def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:

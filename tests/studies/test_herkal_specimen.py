@@ -10,7 +10,8 @@ import pytest
 import xarray as xr
 
 import foldyn as fd
-from foldyn.cases.reading import case_of_document, read_document
+from foldyn.analyses import read_case
+from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, History
@@ -31,9 +32,7 @@ def motion(tmp_path_factory):
     """The model itself, glued, released from 5 mm."""
     folder = tmp_path_factory.mktemp("truth")
     case = calibration.released_case(folder, step=COARSER, support="glued")
-    case_file = case_of_document(case, read_document(case))
-    start = case_file.initial(read=lambda path, at: fd.initial_state(fd.load(path), at))
-    return fd.simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
+    return read_case(case).run()
 
 
 def test_held_and_creeping(motion) -> None:

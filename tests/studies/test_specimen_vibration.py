@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from foldyn.cases import read_case
+from foldyn.analyses import read_case
 from foldyn.linear import frf, peaks_of
 from foldyn.studies import shipped_cases
 from foldyn.studies.herkal import vibration

@@ -16,14 +16,6 @@ from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, FoldynError, InputError
 from foldyn.writing import remove_leftovers
 
-DRAWN = (
-    "report.html",
-    *(f"{name}.png" for name in ("structure", "laws", "load", "motion", "energies")),
-    *(f"{name}.png" for name in ("reaction", "curve", "shapes")),
-    *(f"{name}.png" for name in ("modes", "mac", "response", "nyquist")),
-    *(f"{name}.{kind}" for name in ("motion", "path", "modes") for kind in ("gif", "mp4")),
-)
-"""All that the pages of `report` come with."""
 _RESULT = re.compile(r"result(-\w+)?\.nc")
 
 
@@ -188,7 +180,7 @@ def unwritten(file: Path, why: str) -> ComputationError:
 @contextmanager
 def held(
     folder: Path, out: str | None, names: Sequence[str], owner: Owner, replace: bool = False,
-    drawn: Sequence[str] = DRAWN, inside: Sequence[str] = (),
+    drawn: Sequence[str] = (), inside: Sequence[str] = (),
 ) -> Iterator[Results]:  # fmt: skip
     """Hold a folder for one run; what ends the run names what was kept.
 

@@ -16,9 +16,9 @@ REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplo
 def info() -> str:
     """Text of the command."""
     from foldyn.cases.models import MODELS
-    from foldyn.cases.vibrations import FRF_METHODS
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
+    from foldyn.linear.frf import METHODS as FRF_METHODS
     from foldyn.patterns import GENERATORS
     from foldyn.statics import METHODS as PATH_METHODS
 

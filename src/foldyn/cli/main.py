@@ -214,7 +214,7 @@ def _call(given: argparse.Namespace) -> None:
             given.replace,
         )  # fmt: skip
         return
-    from foldyn.cases.reading import read_case
+    from foldyn.analyses.reading import read_as, read_case
     from foldyn.cli.run import run
 
     model = given.model, given.divisions
@@ -223,8 +223,6 @@ def _call(given: argparse.Namespace) -> None:
     if given.command == "run":
         how |= {"read": lambda path: read_case(path, *model), "results": "results"}
     else:
-        from foldyn.cli.shortcuts import read_as
-
         kind, flags = given.command, _flags(given)
         how |= {"read": lambda path: read_as(path, kind, flags, *model), "results": kind}
     if given.model is not None:

@@ -9,33 +9,26 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from foldyn.cases.casefile import CaseFile
-from foldyn.cases.reading import read_case
+from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
 from foldyn.cli.folder import Results, held, reason
-from foldyn.cli.motions import Motions
-from foldyn.cli.paths import Paths
-from foldyn.cli.runs import Run, Task
 from foldyn.cli.speech import speech
 from foldyn.cli.stamp import Owner
-from foldyn.cli.vibrations import Modes, Responses
 from foldyn.errors import ComputationError, FoldynError, InputError, MotionInterrupted
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
     import xarray
 
-KINDS: Mapping[str, Callable[[CaseFile, bool], Task]] = {
-    "dynamics": Motions,
-    "statics": Paths,
-    "modes": Modes,
-    "frf": Responses,
-}
-"""What is computed for each kind of analysis."""
 PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
 }
 """What is counted of the structure of each model."""
+DRAWN = (
+    "report.html", "structure.png", "laws.png",
+    *(name for kind in ANALYSES.values() for name in kind.files),
+)  # fmt: skip
+"""All that pages come with."""
 
 
 def run(
@@ -58,46 +51,49 @@ def run(
     folder = Path(f"{path.stem}-{results}" if out is None else out)
     with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
         case_file = read(path)
-        task = KINDS[case_file.analysis.kind](case_file, figures)
+        task = [case_file.computation(mass) for mass in case_file.masses]
+        with case_file.placing():
+            case_file.analysis.check([one.compute for one in task], figures)
         if figures:
             _check_video(case_file)
-    names = [run.file for run in task.runs.values()]
+    names = [one.file for one in task]
     say = speech(quiet)
     introduction = _Introduction(case_file, task, told, say)
     owner = Owner.of(command, path, folder)
     pages = ["report.html"] if figures else []
-    with held(folder, out, [*names, *pages], owner, replace) as kept:
+    with held(folder, out, [*names, *pages], owner, replace, DRAWN) as kept:
         done = _computed(task, kept, introduction, not quiet and sys.stderr.isatty(), say)
         say(f"wrote {', '.join(kept.kept)}")
         if figures:
             say("drawing figures")
-            page = _drawn(path, task, done, folder)
+            page = _drawn(case_file, done, folder)
             say(f"wrote figures and {page}")
     return folder
 
 
 def _computed(
-    task: Task, results: Results, introduction: Callable[[], None], progress: bool,
+    task: list[Computation], results: Results, introduction: Callable[[], None], progress: bool,
     say: Callable[[str], None],
 ) -> dict[str, xarray.Dataset]:  # fmt: skip
     """Compute all there is, and save each result as soon as it is there."""
     done: dict[str, xarray.Dataset] = {}
-    for name, one in task.runs.items():
+    for one in task:
         try:
-            done[name] = one.compute(progress, introduction)
+            done[one.mass] = one.run(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
             failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
                 _keep(error.partial, one, results)
             raise failed from None
-        _keep(done[name], one, results)
-        say(one.line(done[name]))
-        _tell_missing(one.place, done[name], say)
+        result = done[one.mass]
+        _keep(result, one, results)
+        say(one.case_file.analysis.line(one.mass, result))
+        _tell_missing(one.place, result, say)
     return done
 
 
-def _keep(result: xarray.Dataset, one: Run, results: Results) -> None:
+def _keep(result: xarray.Dataset, one: Computation, results: Results) -> None:
     from foldyn.results import save
 
     results.keep(one.file, partial(save, result))
@@ -113,15 +109,15 @@ def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]
         say(f"  {name}: {text}")
 
 
-def _drawn(path: Path, task: Task, done: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+def _drawn(case_file: CaseFile, done: Mapping[str, xarray.Dataset], folder: Path) -> Path:
     """Draw the figures; whatever keeps them from being drawn, the results are there."""
     try:
-        return task.write(done, folder)
+        return case_file.analysis.page(case_file, done, folder)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("interrupted while figures were drawn") from None
     except Exception as error:
         kind = "" if isinstance(error, FoldynError | OSError) else f"{type(error).__name__}: "
-        raise ComputationError(f"{path}: figures: {kind}{reason(error)}") from None
+        raise ComputationError(f"{case_file.path}: figures: {kind}{reason(error)}") from None
 
 
 def _check_video(case_file: CaseFile) -> None:
@@ -142,7 +138,7 @@ class _Introduction:
     def __init__(
         self,
         case_file: CaseFile,
-        task: Task,
+        task: list[Computation],
         told: list[warnings.WarningMessage],
         say: Callable[[str], None],
     ) -> None:
@@ -159,7 +155,7 @@ class _Introduction:
         parts = PARTS[self.case_file.model]
         counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)
         self.say(f"{self.case_file.title or self.case_file.path.name}: {counted}")
-        if self.task.compiles():
+        if self.case_file.analysis.compiles([one.compute for one in self.task]):
             self.say(
                 "compiling the kernels: first use, up to half a minute; they are kept for later "
                 "runs"

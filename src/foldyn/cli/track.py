@@ -158,10 +158,8 @@ def model_of(name: str) -> Model:
     if name.endswith(".nc"):
         return Model.of(fd.load(name))
     case_file = fd.read_case(find_case(name))
-    case = case_file.case()
-    if case_file.analysis.kind != "statics":
-        return Model.of(case)
-    return Model.of(fd.trace(case, **case_file.analysis.arguments))
+    static = case_file.analysis.kind == "statics"
+    return Model.of(case_file.run() if static else case_file.case())
 
 
 def summary(ds: xarray.Dataset) -> str:

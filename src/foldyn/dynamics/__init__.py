@@ -2,7 +2,7 @@
 
 from foldyn.dynamics.critical_step import critical_step, largest_frequency
 from foldyn.dynamics.driver import prepare, simulate
-from foldyn.dynamics.initial import initial_state, start_of
+from foldyn.dynamics.initial import initial_state
 from foldyn.dynamics.methods import METHODS, compiled
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Progress
@@ -17,5 +17,4 @@ __all__ = [
     "largest_frequency",
     "prepare",
     "simulate",
-    "start_of",
 ]

@@ -168,13 +168,15 @@ def prepare(
     warn_of_unstable_damping(case, u)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
-            f"start = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
-            "nearer to 0"
+            f" = {plan.start:g} s: steps of {plan.dt:.3g} s are lost in its rounding; start "
+            "nearer to 0",
+            "start",
         )
     if not force and plan.dt > critical:
         raise InputError(
-            f"dt = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
-            "one or leave dt out (force = true integrates all the same)"
+            f" = {plan.dt:.6g} s is above the critical step of {critical:.6g} s: take a smaller "
+            "one or leave dt out (force = true integrates all the same)",
+            "dt",
         )
     check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
@@ -205,8 +207,9 @@ def _with_radius(method: Method, spectral_radius: float | None) -> Method:
         return method
     if method.name != "generalized_alpha":
         raise InputError(
-            f"spectral_radius = {spectral_radius!r}: {method.name} has none; leave it out, or "
-            "choose generalized_alpha"
+            f" = {spectral_radius!r}: {method.name} has none; leave it out, or "
+            "choose generalized_alpha",
+            "spectral_radius",
         )
     radius = number("spectral_radius", spectral_radius, least=0.0, most=1.0)
     return method._replace(scheme=generalized_alpha.scheme(radius))
@@ -221,8 +224,9 @@ def _plan(
         positive("tolerance", tolerance)
         if not method.adaptive and not method.implicit:
             raise InputError(
-                f"tolerance = {tolerance!r}: {method.name} has fixed steps; give dt, or choose "
-                "dormand_prince or an implicit method"
+                f" = {tolerance!r}: {method.name} has fixed steps; give dt, or choose "
+                "dormand_prince or an implicit method",
+                "tolerance",
             )
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE

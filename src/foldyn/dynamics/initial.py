@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from foldyn.cases import CaseFile, State
+from foldyn.cases import State
 from foldyn.errors import InputError
-from foldyn.results import load
 from foldyn.results.contents import check_variable
 
 
@@ -31,7 +30,7 @@ def initial_state(result: Any, at: int = -1) -> State:
     else:
         raise InputError("initial_state: the result has neither a time nor a step dimension")
     if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
-        raise InputError(f"at = {at!r}: the result has samples 0 to {count - 1}")
+        raise InputError(f" = {at!r}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
     found = {
         name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
@@ -39,15 +38,3 @@ def initial_state(result: Any, at: int = -1) -> State:
         if name == "displacement" or name in sample
     }
     return State(**found)
-
-
-def start_of(case_file: CaseFile, mass: str | None = None) -> State | None:
-    """State that a case file starts from, read from the result that it names; None for rest.
-
-    Parameters
-    ----------
-    case_file : CaseFile
-    mass : str, optional
-        As of `CaseFile.initial`, which says what is raised.
-    """
-    return case_file.initial(mass, read=lambda path, at: initial_state(load(path), at))

@@ -113,7 +113,7 @@ METHODS: Mapping[str, Method] = {
 def method_of(name: str) -> Method:
     """Integrator by its name."""
     if not isinstance(name, str) or name not in METHODS:
-        raise InputError(f"method = {name!r}: choose auto or one of {', '.join(METHODS)}")
+        raise InputError(f" = {name!r}: choose auto or one of {', '.join(METHODS)}", "method")
     return METHODS[name]
 
 
@@ -123,8 +123,9 @@ def suited(name: str, structure: Any) -> Method:
     if isinstance(structure, Shell) and not method.massless:
         fit = ", ".join(other.name for other in METHODS.values() if other.massless)
         raise InputError(
-            f"method = {name!r}: the rotations of a shell have no mass, which this method needs; "
-            f"choose one of {fit}"
+            f" = {name!r}: the rotations of a shell have no mass, which this method needs; "
+            f"choose one of {fit}",
+            "method",
         )
     return method
 

@@ -26,7 +26,7 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
     if callable(choice):
         return choice, lambda: None
     if choice is not None and not isinstance(choice, bool):
-        raise InputError(f"progress = {choice!r}: give True, False or a function of a Progress")
+        raise InputError(f" = {choice!r}: give True, False or a function of a Progress", "progress")
     if not choice:
         return lambda _: None, lambda: None
     from tqdm import tqdm

@@ -37,7 +37,7 @@ def fixed_steps(
     if dt is None:
         target = DEFAULT_FRACTION * critical
         if not math.isfinite(target):
-            raise InputError("dt: nothing limits the step of this case (no stiffness); give dt")
+            raise InputError(": nothing limits the step of this case (no stiffness); give dt", "dt")
         span = float(every) if in_seconds else duration
         _check_count(duration, min(target, span))
         count = max(1, math.ceil(span / target * (1.0 - 1e-12)))
@@ -49,12 +49,13 @@ def fixed_steps(
         if in_seconds and abs(per_sample * dt - every) > 1e-9 * every:
             near = every / max(1, math.ceil(every / dt))
             raise InputError(
-                f"every = {every:g} s is not a whole number of steps of dt = {dt:g} s; "
-                f"use dt = {near:.6g}, or leave dt out"
+                f" = {every:g} s is not a whole number of steps of dt = {dt:g} s; "
+                f"use dt = {near:.6g}, or leave dt out",
+                "every",
             )
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
-        raise InputError(f"every = {every}: longer than the motion of {steps} steps")
+        raise InputError(f" = {every}: longer than the motion of {steps} steps", "every")
     interval = per_sample * dt
     return Plan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
 
@@ -92,12 +93,12 @@ def expected_samples(plan: Plan) -> int:
 def counted_in_seconds(duration: float, every: int | float) -> bool:
     """Whether a sampling interval is in seconds; refuses one that fits no motion."""
     if isinstance(every, bool) or not isinstance(every, Real):
-        raise InputError(f"every = {show(every)}: an int counts steps, a float is seconds")
+        raise InputError(f" = {show(every)}: an int counts steps, a float is seconds", "every")
     if isinstance(every, Integral):
         whole("every", every, least=1, what="steps")
         return False
     if positive("every", every) > duration * (1.0 + 1e-9):
-        raise InputError(f"every = {every:g} s: longer than the duration of {duration:g} s")
+        raise InputError(f" = {every:g} s: longer than the duration of {duration:g} s", "every")
     return True
 
 
@@ -105,7 +106,7 @@ def _given_step(duration: float, dt: float) -> float:
     dt = positive("dt", dt)
     _check_count(duration, dt)
     if dt > duration * (1.0 + 1e-9):
-        raise InputError(f"dt = {dt:g} s: longer than the duration of {duration:g} s")
+        raise InputError(f" = {dt:g} s: longer than the duration of {duration:g} s", "dt")
     return dt
 
 
@@ -113,7 +114,8 @@ def _check_count(duration: float, dt: float) -> None:
     """Refuse a motion that no machine can finish, and that integers could not count."""
     if duration / dt > MOST_STEPS:
         raise InputError(
-            f"duration = {duration:g} s: takes {duration / dt:.3g} steps of {dt:.3g} s; shorten it"
+            f" = {duration:g} s: takes {duration / dt:.3g} steps of {dt:.3g} s; shorten it",
+            "duration",
         )
 
 

@@ -69,7 +69,8 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     if pencil.size <= DENSE or count + GUARD >= pencil.finite // 2:
         if pencil.size > MOST_DENSE:
             raise InputError(
-                f"count = {count}: ask for fewer than half of the modes of {pencil.size} free dofs"
+                f" = {count}: ask for fewer than half of the modes of {pencil.size} free dofs",
+                "count",
             )
         values, shapes = _all(pencil, known)
         values, shapes = _sorted(pencil, values, shapes, known)

@@ -62,15 +62,17 @@ def station(case: Case, state: State | str | None, load_factor: float = 1.0) -> 
             )
     elif isinstance(state, str):
         if state != "equilibrium":
-            raise InputError(f"state = {state!r}: give {PLACES}")
+            raise InputError(f" = {state!r}: give {PLACES}", "state")
         found = _judge(case, _equilibrium(case), 1.0, "equilibrium")
     elif isinstance(state, State):
         given = np.zeros(shape) if state.displacement is None else np.array(state.displacement)
         if given.shape != shape:
-            raise InputError(f"state: displacement of shape {given.shape}: the case has {shape}")
+            raise InputError(
+                f": displacement of shape {given.shape}: the case has {shape}", "state"
+            )
         found = _judge(case, given, load_factor, "state")
     else:
-        raise InputError(f"state: got {type(state).__name__}; give {PLACES}")
+        raise InputError(f": got {type(state).__name__}; give {PLACES}", "state")
     if found.relative > BALANCED:
         _warn(_imbalance(found, case))
     return found

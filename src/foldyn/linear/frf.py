@@ -236,8 +236,9 @@ def _in_time(
 def _refuse_secant(secant: float | None, how: Method, why: str) -> None:
     if secant is not None:
         raise InputError(
-            f"secant = {secant!r}: the method {how.name} {why}; leave secant out, and give the "
-            "amplitude of the drive instead"
+            f" = {secant!r}: the method {how.name} {why}; leave secant out, and give the "
+            "amplitude of the drive instead",
+            "secant",
         )
 
 
@@ -256,12 +257,14 @@ def _frequencies(given: ArrayLike, how: Method) -> NDArray[np.float64]:
     frequency = np.atleast_1d(numbers("frequencies", given))
     if frequency.ndim != 1 or not frequency.size:
         raise InputError(
-            "frequencies: give a list of frequencies (Hz), as numpy.arange(1, 20, 0.1)"
+            ": give a list of frequencies (Hz), as numpy.arange(1, 20, 0.1)", "frequencies"
         )
     if frequency[0] < 0.0 or (np.diff(frequency) <= 0.0).any():
-        raise InputError("frequencies: must increase from 0 Hz or more; sort them and drop doubles")
+        raise InputError(
+            ": must increase from 0 Hz or more; sort them and drop doubles", "frequencies"
+        )
     if frequency[0] == 0.0 and how.name in ("stepped_sine", "burst_random"):
-        raise InputError(f"frequencies: {how.name} cannot give 0 Hz; begin above it")
+        raise InputError(f": {how.name} cannot give 0 Hz; begin above it", "frequencies")
     if frequency[-1] == 0.0 and not how.linear:
-        raise InputError("frequencies: 0 Hz alone needs statics, or the direct method")
+        raise InputError(": 0 Hz alone needs statics, or the direct method", "frequencies")
     return frequency

@@ -96,8 +96,9 @@ def harmonic(
     case = system.case
     if len(case.actuated_creases) and isinstance(case.structure.fold_law, Superlinear):
         raise InputError(
-            "method = 'harmonic': cannot tell how far actuated folds of the superlinear law are "
-            "from their rest angle; give the folds another law, or take stepped_sine"
+            " = 'harmonic': cannot tell how far actuated folds of the superlinear law are "
+            "from their rest angle; give the folds another law, or take stepped_sine",
+            "method",
         )
     hinges = _Hinges(system)
     shape = drive_shape(system, drive)

@@ -93,8 +93,9 @@ def _pulse(highest: float, pulse: float, record: Record) -> NDArray[np.float64]:
     count = round(pulse / record.every)
     if count < FEWEST:
         raise InputError(
-            f"every = {record.every:g} s: the pulse of {pulse:g} s has only {count} samples, and "
-            f"at least {FEWEST} are needed; sample faster, or leave every out"
+            f" = {record.every:g} s: the pulse of {pulse:g} s has only {count} samples, and "
+            f"at least {FEWEST} are needed; sample faster, or leave every out",
+            "every",
         )
     if count + 2 * STILL >= record.samples:
         raise InputError(

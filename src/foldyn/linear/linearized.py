@@ -137,8 +137,9 @@ def _slope_change(
     if not isinstance(body, BarsHingesBody):
         if isinstance(case.structure.fold_law, Superlinear):
             raise InputError(
-                'fold_law = "superlinear": the folds of a shell have no slope at rest; modes and '
-                'frequency responses of shells take "linear" or "enhanced"'
+                ' = "superlinear": the folds of a shell have no slope at rest; modes and '
+                'frequency responses of shells take "linear" or "enhanced"',
+                "fold_law",
             )
         return None, 0
     model = body.model

@@ -69,7 +69,7 @@ def modal(
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
     if count > pencil.finite:
-        raise InputError(f"count = {count}: the case has only {pencil.finite} free dofs")
+        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
     shape = drive_shape(system, drive)
     load = modes.shapes.T @ shape

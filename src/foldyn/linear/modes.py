@@ -96,7 +96,7 @@ def modes(
     linear = linearize(case, state, secant, load_factor)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
     if count > pencil.finite:
-        raise InputError(f"count = {count}: the case has only {pencil.finite} free dofs")
+        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     space = rigid_space(linear)
     found = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(found)

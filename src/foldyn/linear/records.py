@@ -90,9 +90,10 @@ def check_resolved(frequency: NDArray, every: float) -> None:
     """Refuse frequencies that the sampling does not resolve."""
     if frequency[-1] * every * FEWEST > 1.0 + 1e-9:
         raise InputError(
-            f"every = {every:g} s: {frequency[-1]:g} Hz has only "
+            f" = {every:g} s: {frequency[-1]:g} Hz has only "
             f"{1.0 / (frequency[-1] * every):.3g} samples in a cycle, and at least {FEWEST} are "
-            "needed; sample faster, or leave every out"
+            "needed; sample faster, or leave every out",
+            "every",
         )
 
 
@@ -111,9 +112,10 @@ def common_spacing(frequency: NDArray) -> float:
             return float(frequency[-1] / np.rint(multiple[-1]))
     near = max(float(f"{step:.1g}"), 1e-300)
     raise InputError(
-        "frequencies: the lines of a record are multiples of one spacing, and these are of none "
+        ": the lines of a record are multiples of one spacing, and these are of none "
         f"above {step / MOST_LINES:.3g} Hz; give multiples, as numpy.arange({near:g}, "
-        f"{frequency[-1]:g}, {near:g})"
+        f"{frequency[-1]:g}, {near:g})",
+        "frequencies",
     )
 
 

@@ -22,20 +22,31 @@ if TYPE_CHECKING:
     from foldyn.plots.modes import draw_modes
     from foldyn.plots.nyquist import plot_nyquist
     from foldyn.plots.overlay import draw_overlay
-    from foldyn.plots.path import plot_load_displacement, plot_reaction, total_reaction
+    from foldyn.plots.path import (
+        moved_supports,
+        plot_load_displacement,
+        plot_reaction,
+        total_reaction,
+    )
     from foldyn.plots.path_energies import energy_shares, plot_path_energies
-    from foldyn.plots.shapes import draw_shapes
+    from foldyn.plots.shapes import chosen_points, draw_shapes
     from foldyn.plots.structure import draw_structure
     from foldyn.plots.tracks import plot_steps, plot_tracks
 
+ANIMATIONS = ("gif", "mp4")
+"""Kinds of animation that can be written."""
+
 __all__ = [
+    "ANIMATIONS",
     "animate",
     "animate_modes",
+    "chosen_points",
     "draw_modes",
     "draw_overlay",
     "draw_shapes",
     "draw_structure",
     "energy_shares",
+    "moved_supports",
     "plot_energies",
     "plot_frf",
     "plot_history",
@@ -54,11 +65,13 @@ __all__ = [
 _HOMES = {
     "animate": "animation",
     "animate_modes": "mode_film",
+    "chosen_points": "shapes",
     "draw_modes": "modes",
     "draw_overlay": "overlay",
     "draw_shapes": "shapes",
     "draw_structure": "structure",
     "energy_shares": "path_energies",
+    "moved_supports": "path",
     "plot_energies": "energies",
     "plot_frf": "frf",
     "plot_history": "history",

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import (
@@ -219,3 +220,14 @@ def _finish(
     axes.ticklabel_format(axis="x", scilimits=(-4, 4), useMathText=True)
     axes.xaxis.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
     return style.finish(figure)
+
+
+def moved_supports(case: Case) -> tuple[list[int], str] | None:
+    """Nodes that supports move together and farthest, and the direction; None where none moves."""
+    motion = sum((vector for vector, _ in case.imposed_terms), np.zeros(case.imposed.shape))
+    if not motion.any():
+        return None
+    _, axis = np.unravel_index(np.abs(motion).argmax(), motion.shape)
+    largest = motion[np.abs(motion[:, axis]).argmax(), axis]
+    together = np.isclose(motion[:, axis], largest, rtol=1e-9, atol=0.0)
+    return np.flatnonzero(together).tolist(), ("-" if largest < 0.0 else "") + AXES[axis]

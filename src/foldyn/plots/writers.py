@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from foldyn.errors import ComputationError, InputError
+from foldyn.plots import ANIMATIONS
 from foldyn.writing import whole
 
 _COLORS = 128  # of a GIF, for all its pictures: 256 for each would take three times the space
@@ -98,7 +99,7 @@ class Mp4Writer(FFMpegWriter):
         return find_ffmpeg()
 
 
-WRITERS = {".gif": GifWriter, ".mp4": Mp4Writer}
+WRITERS = dict(zip((f".{kind}" for kind in ANIMATIONS), (GifWriter, Mp4Writer), strict=True))
 """Writers of an animation by the end of the file's name."""
 
 

@@ -39,24 +39,25 @@ def plan(method: Method, load_factors: Any, steps: int | None, first_step: float
     factors = None if load_factors is None else _factors(load_factors)
     if first_step is not None and method.rule is None:
         raise InputError(
-            f"first_step: method {method.name!r} goes by load_factors or steps; leave it out"
+            f": method {method.name!r} goes by load_factors or steps; leave it out", "first_step"
         )
     if method.rule is None:
         return _driven(method, factors, steps)
     if factors is not None and len(factors) != 2:
         raise InputError(
-            f"load_factors: method {method.name!r} chooses its own; give two numbers, where the "
-            f"path begins and ends, instead of {len(factors)}, or leave them out"
+            f": method {method.name!r} chooses its own; give two numbers, where the "
+            f"path begins and ends, instead of {len(factors)}, or leave them out",
+            "load_factors",
         )
     begin, end = (0.0, None) if factors is None else factors
     if end == begin:
-        raise InputError(f"load_factors = {factors}: begin and end must differ")
+        raise InputError(f" = {factors}: begin and end must differ", "load_factors")
     way = 1.0 if end is None else end - begin
     step = FIRST_STEP * way if first_step is None else first_step
     if not number("first_step", step):
-        raise InputError(f"first_step = {show(first_step)}: give a number that is not zero")
+        raise InputError(f" = {show(first_step)}: give a number that is not zero", "first_step")
     if end is not None and step * way < 0.0:
-        raise InputError(f"first_step = {step:g} leads away from the last load factor {end:g}")
+        raise InputError(f" = {step:g} leads away from the last load factor {end:g}", "first_step")
     if end is not None and abs(step) > abs(way):
         step = way
     return Plan(begin, [], end, int(steps or STEPS_FREE), float(step))
@@ -73,21 +74,21 @@ def check_steps(steps: Any, dofs: int) -> None:
 def _driven(method: Method, factors: list[float] | None, steps: int | None) -> Plan:
     if factors is not None and steps is not None:
         raise InputError(
-            "load_factors and steps: give one of them; steps counts equal steps from 0 to 1"
+            " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
         )
     if factors is None:
         count = int(steps or STEPS_DRIVEN)
         factors = [k / count for k in range(count + 1)]
     for i, (one, other) in enumerate(pairwise(factors)):
         if one == other:
-            raise InputError(f"load_factors: number {i + 1} repeats the one before, {one:g}")
+            raise InputError(f": number {i + 1} repeats the one before, {one:g}", "load_factors")
     return Plan(factors[0], factors[1:], None, len(factors) - 1, 0.0)
 
 
 def _factors(given: Any) -> list[float]:
     array = numbers("load_factors", given)
     if array.ndim != 1 or not array.size:
-        raise InputError(f"load_factors = {show(given)}: give a list of numbers, at least one")
+        raise InputError(f" = {show(given)}: give a list of numbers, at least one", "load_factors")
     return array.tolist()
 
 
@@ -96,21 +97,23 @@ def constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
     if isinstance(constant, str):
         if constant != "gravity":
             raise InputError(
-                f'constant = {show(constant)}: give "gravity", or numbers of loads, as in [0]'
+                f' = {show(constant)}: give "gravity", or numbers of loads, as in [0]', "constant"
             )
         chosen = tuple(i for i, load in enumerate(case.loads) if isinstance(load, Gravity))
         if not chosen:
-            raise InputError('constant = "gravity": the case has no Gravity among its loads')
+            raise InputError(' = "gravity": the case has no Gravity among its loads', "constant")
         return chosen
     if not isinstance(constant, Sequence | np.ndarray):
-        raise InputError(f'constant = {show(constant)}: give "gravity", or numbers of loads')
+        raise InputError(f' = {show(constant)}: give "gravity", or numbers of loads', "constant")
     for which in constant:
         if isinstance(which, bool) or not isinstance(which, Integral):
-            raise InputError(f"constant = {show(constant)}: give whole numbers of loads, as in [0]")
+            raise InputError(
+                f" = {show(constant)}: give whole numbers of loads, as in [0]", "constant"
+            )
         if not 0 <= int(which) < len(case.loads):
             raise InputError(
-                f"constant: the case has no load {show(which)}; it has {len(case.loads)}, counted "
-                "from 0"
+                f": the case has no load {show(which)}; it has {len(case.loads)}, counted from 0",
+                "constant",
             )
     return tuple(sorted({int(which) for which in constant}))
 
@@ -121,14 +124,14 @@ def start_state(case: Case, start: Any) -> NDArray | None:
         return None
     if not isinstance(start, State):
         raise InputError(
-            f"start: got {type(start).__name__}; give a State, as fd.initial_state(path, at=-1)"
+            f": got {type(start).__name__}; give a State, as fd.initial_state(path, at=-1)", "start"
         )
     shape = case.structure.nodes.shape
     if start.displacement is None:
         return np.zeros(shape)
     array = np.array(start.displacement, float)
     if array.shape != shape:
-        raise InputError(f"start: displacement of shape {array.shape}: the case has {shape}")
+        raise InputError(f": displacement of shape {array.shape}: the case has {shape}", "start")
     return array
 
 
@@ -143,8 +146,9 @@ def check_case(
     moves = bool(case.imposed.any()) or is_actuated(case)
     if method.name == "displacement" and not moves:
         raise InputError(
-            "method 'displacement' needs something that moves: an Impose among the supports or "
-            "an Actuate among the loads; paths under forces take 'newton' or 'arc_length'"
+            " 'displacement' needs something that moves: an Impose among the supports or an "
+            "Actuate among the loads; paths under forces take 'newton' or 'arc_length'",
+            "method",
         )
     if not goes.factors and goes.begin == 0.0 and method.rule is None:
         return  # one point, of what is constant
@@ -163,7 +167,7 @@ def check_start(problem: OrigamiProblem) -> None:
     short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
     if short.size:
         one, other = structure.bars[short[0]]
-        raise InputError(f"start: the neighboring nodes {one} and {other} fall together")
+        raise InputError(f": the neighboring nodes {one} and {other} fall together", "start")
 
 
 def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:
@@ -174,6 +178,7 @@ def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:
         beyond = np.flatnonzero(np.isnan(problem.actuation.rest(factor)))
         if beyond.size:
             raise InputError(
-                f"load_factors: at {factor:g} the rest angle of crease {beyond[0]} would leave 0 "
-                "to 360 degrees; actuated folds reach their angle at the factor 1"
+                f": at {factor:g} the rest angle of crease {beyond[0]} would leave 0 "
+                "to 360 degrees; actuated folds reach their angle at the factor 1",
+                "load_factors",
             )

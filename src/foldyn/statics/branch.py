@@ -88,7 +88,7 @@ def switch_branch(
     check_steps(steps, path["displacement"][0].size)
     rule = method_of(method).rule
     if rule is None:
-        raise InputError(f"method = {method!r}: a branch takes 'arc_length' or 'mgdcm'")
+        raise InputError(f" = {method!r}: a branch takes 'arc_length' or 'mgdcm'", "method")
     problem = problem_of(path, case, at)
     solver = Solver(problem, settings)
     crossing = station_of(solver, problem, path, at)

@@ -33,5 +33,5 @@ METHODS: Mapping[str, Method] = {
 def method_of(name: str) -> Method:
     """Method by its name."""
     if not isinstance(name, str) or name not in METHODS:
-        raise InputError(f"method = {name!r}: choose one of {', '.join(METHODS)}")
+        raise InputError(f" = {name!r}: choose one of {', '.join(METHODS)}", "method")
     return METHODS[name]

@@ -28,12 +28,14 @@ class Relief:
         try:
             self._mass = case.structure.mass
         except InputError as error:
-            raise InputError(f"inertia_relief: needs the mass of the structure: {error}") from None
+            raise InputError(
+                f": needs the mass of the structure: {error}", "inertia_relief"
+            ) from None
         motions = self._motions(start)
         self._count = motions.shape[1]
         if not self._count:
             raise InputError(
-                "inertia_relief: the supports leave no rigid motion free: leave it out"
+                ": the supports leave no rigid motion free: leave it out", "inertia_relief"
             )
         free = np.flatnonzero(~self._held)
         first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first

@@ -143,7 +143,7 @@ def trace(
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
-        raise InputError(f"inertia_relief = {inertia_relief!r}: give True or False")
+        raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
     check_fill(case.structure)
     problem = OrigamiProblem(case, held, state, adaptive_load, inertia_relief)
     check_start(problem)

@@ -11,10 +11,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationError
 
+from foldyn.analyses.messages import describe
+from foldyn.analyses.reading import read_document
+from foldyn.analyses.sections import Count, Section
 from foldyn.cases.decode import unknown_key
-from foldyn.cases.messages import describe
-from foldyn.cases.reading import read_document
-from foldyn.cases.schema import Count, Section
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measured_files import READERS, read_measurement
 from foldyn.experiment.calibration.measured_motions import History, Spectrum

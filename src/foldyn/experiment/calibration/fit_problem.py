@@ -6,23 +6,21 @@ import hashlib
 import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.casefile import CaseFile
-from foldyn.cases.reading import case_of_document, read_document, validated
-from foldyn.dynamics import simulate, start_of
+from foldyn.analyses import CaseFile
+from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.key_paths import replaced, value_at
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.program import program
-from foldyn.statics import Settings, trace
 from foldyn.values import show
 
 STEADY = "generalized_alpha"
@@ -118,7 +116,7 @@ class Problem:
         found.update(json.dumps(told).encode())
         for run in self.runs:
             found.update(json.dumps(run.document, sort_keys=True, default=str).encode())
-            state = start_of(self.case_file(run, self.space.column("start")))
+            state = self.case_file(run, self.space.column("start")).initial()
             for array in () if state is None else (state.displacement, state.velocity):
                 found.update(b"" if array is None else np.asarray(array).tobytes())
             for file in sorted(_files(run.document)):
@@ -234,19 +232,20 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     """Path or motion that a case file asks for, at the load factors that are measured."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        state, case = start_of(case_file), case_file.case()
         if case_file.analysis.kind == "dynamics":
-            return simulate(case, initial=state, **_steady(case_file))
-        given = case_file.analysis.arguments
+            return case_file.run(**_steady(case_file))
+        case, given = case_file.case(), case_file.analysis.arguments
         factors = np.unique(np.concatenate([one.factors(case) for one in members]))
-        way = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
-        kept = {key: given[key] for key in ("constant", "inertia_relief")}
-        settings = Settings(**{**case_file.analysis.settings, "stability": False})
-        return trace(case, load_factors=way, start=state, settings=settings, **kept)
+        path = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
+        settings = replace(given["settings"], stability=False)
+        return case_file.run(
+            method="newton", load_factors=path, steps=None, first_step=None, until=None,
+            settings=settings,
+        )  # fmt: skip
 
 
 def _steady(case_file: CaseFile) -> dict[str, Any]:
-    """Arguments of `simulate` with steps that do not depend on the parameters.
+    """Arguments of `simulate` for steps that do not depend on the parameters.
 
     Steps chosen by their error would make the misfit jump between neighboring values.
     """

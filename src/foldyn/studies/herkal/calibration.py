@@ -19,9 +19,8 @@ import tomli_w
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from foldyn.cases import CaseFile, read_case
-from foldyn.cases.reading import case_of_document, read_document
-from foldyn.dynamics import simulate, start_of
+from foldyn.analyses import CaseFile, read_case
+from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.experiment import (
     Fit,
     ForceDisplacement,
@@ -36,7 +35,7 @@ from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import save
 from foldyn.signals import matrix_pencil
-from foldyn.statics import Settings, trace
+from foldyn.statics import Settings
 from foldyn.studies import find_case
 from foldyn.writing import write_text
 
@@ -89,20 +88,14 @@ rest, and resists the large turns of the panels.
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
     """Path of the specimen whose top is pressed down to fractions of 56 mm."""
-    case = shipped("specimen", changes).case()
-    return trace(case, load_factors=list(factors), settings=Settings(stability=False))
+    at = {"method": "newton", "load_factors": list(factors), "steps": None}
+    return shipped("specimen", changes).run(settings=Settings(stability=False), **at)
 
 
 def shipped(name: str, changes: Mapping[str, Any] | None = None) -> CaseFile:
     """A shipped case file ("specimen", "specimen-frf", ...) with other values of some keys."""
     path = find_case(f"herkal/{name}")
     return case_of_document(path, replaced(read_document(path), changes or {}))
-
-
-def motion_of(case_file: CaseFile) -> Any:
-    """Motion of a case file, from the state that it names."""
-    start = start_of(case_file)
-    return simulate(case_file.case(), initial=start, **case_file.analysis.arguments)
 
 
 def force_on_top(path: Any) -> NDArray[np.float64]:
@@ -190,7 +183,7 @@ def released_case(
 
 def release_data(case: Path) -> list[Measurement]:
     """Histories of node 8, and of all other front nodes held out, as a film has them."""
-    motion = motion_of(read_case(case))
+    motion = read_case(case).run()
     time = np.arange(0.0, SEEN, 1.0 / RATE)
     along = motion["displacement"].sel(axis="x")
     others = tuple(node for node in FRONT if node != WATCHED)

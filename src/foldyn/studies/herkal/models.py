@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
-from foldyn.cases import Case, CaseFile, Force, HalfSine
+from foldyn.analyses import CaseFile
+from foldyn.cases import Case, Force, HalfSine
 from foldyn.errors import InputError
 from foldyn.shells import shell
 from foldyn.structures import discretize

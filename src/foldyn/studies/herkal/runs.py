@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from foldyn.cases import Case, CaseFile, read_case
+from foldyn.analyses import CaseFile, read_case
+from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import modes

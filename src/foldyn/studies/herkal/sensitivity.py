@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import foldyn
-from foldyn.cases import CaseFile, read_case
+from foldyn.analyses import CaseFile, read_case
 from foldyn.errors import InputError
 from foldyn.input_files import from_json, read_text
 from foldyn.studies import find_case

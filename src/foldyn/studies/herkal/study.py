@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import CaseFile, read_case
+from foldyn.analyses import CaseFile, read_case
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO, errors, ranks
 from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of, rules

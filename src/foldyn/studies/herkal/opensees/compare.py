@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, CaseFile, read_case
+from foldyn.analyses import CaseFile, read_case
+from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace

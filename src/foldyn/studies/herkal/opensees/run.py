@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from foldyn.cases import CaseFile, read_case
+from foldyn.analyses import CaseFile, read_case
 from foldyn.errors import FoldynError
 from foldyn.studies import find_case
 from foldyn.studies.herkal.opensees.model import PanelShells

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-from foldyn.cases import read_case
-from foldyn.cases.reading import case_of_document, read_document
+from foldyn.analyses import read_case
+from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
 from foldyn.experiment.calibration.key_paths import replaced
@@ -253,7 +253,7 @@ def motions(released: Released) -> dict[str, xr.Dataset]:
         damping = released.fits.get(support, released.fits[FILM_SUPPORT]).values
         document = replaced(read_document(case), damping)
         write_text(case.with_name("fitted.toml"), tomli_w.dumps(document))
-        found[support] = calibration.motion_of(case_of_document(case, document))
+        found[support] = case_of_document(case, document).run()
     return found
 
 

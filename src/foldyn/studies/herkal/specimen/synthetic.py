@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn import experiment
-from foldyn.cases import read_case
+from foldyn.analyses import read_case
 from foldyn.studies.herkal import calibration
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def film(folder: Path, shot: Shot) -> experiment.SyntheticFilm:
 def released(folder: Path, shot: Shot) -> xarray.Dataset:
     """The true motion; the release is at `shot.held`."""
     case = calibration.released_case(folder, OTHERWISE, support=SUPPORT, duration=shot.free)
-    return held_and_creeping(calibration.motion_of(read_case(case)), shot.held)
+    return held_and_creeping(read_case(case).run(), shot.held)
 
 
 def held_and_creeping(motion: xarray.Dataset, held: float) -> xarray.Dataset:

@@ -7,8 +7,9 @@ import pytest
 from casefile_checks import check, edited
 
 import foldyn as fd
-from foldyn.cases import read_case
-from foldyn.cases.models import MASSLESS_METHODS, MODELS
+from foldyn.analyses import read_case
+from foldyn.analyses.motion import MASSLESS_METHODS
+from foldyn.cases.models import MODELS
 from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
@@ -154,7 +155,7 @@ WRONG = {
     ),
     "a secant": (
         [SHELL, MODES[0], (STATICS, 'kind = "modes"\nsecant = 1')],
-        "analysis.secant = 1.0: is for superlinear bends, which a shell has not; leave it out",
+        "analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out",
     ),
     "a support on the mesh": (
         [SHELL, ("nodes = [4, 5]", "nodes = [4, 6]")],
@@ -267,11 +268,8 @@ def test_a_state_of_another_mesh_is_refused(filed, tmp_path):
     fd.save(bent, tmp_path / "coarse.nc")
     path = filed(SHELL, MOTION, text=FOLD + '[initial]\nfile = "coarse.nc"\n')
 
-    def read(file, at):
-        return fd.initial_state(fd.load(file), at)
-
-    state = read_case(path).initial(read=read)
+    state = read_case(path).initial()
     assert state is not None
     np.testing.assert_array_equal(state.displacement, bent.displacement.values[-1])
     with pytest.raises(InputError, match="a result of the same pattern and model"):
-        read_case(path, divisions=3).initial(read=read)
+        read_case(path, divisions=3).initial()

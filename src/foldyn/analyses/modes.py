@@ -1,23 +1,27 @@
-"""Figures and the page of modes: what `foldyn run` and `foldyn modes` leave to look at."""
+"""Modes: [analysis] of kind "modes", arguments of `modes`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PlainValidator
 
 from foldyn import plots
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
+from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
-from foldyn.cases.casefile import CaseFile
-from foldyn.linear import character, mac, pair_modes
-from foldyn.plots.modes import chosen_modes, main_axis
-from foldyn.plots.scene import Sheet3D
+from foldyn.errors import InputError
+from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.report.album import Album
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.report.sections import Heading, Picture, Table, Text
+from foldyn.report.sections import Section as PageSection
+from foldyn.values import indices, show
 
 if TYPE_CHECKING:
     import xarray
@@ -30,19 +34,100 @@ MOST_TRIANGLES = 25_000
 """Triangles that each of its pictures has at most, unless a single mode has more."""
 
 
-def write_modes(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: str | Path
-) -> Path:
-    """Draw a case and its modes into `folder`; returns the path of report.html.
+def _shapes(value: Any) -> int | tuple[int, ...]:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= MOST_SHAPES:
+            raise InputError(
+                f" = {value}: give 1 to {MOST_SHAPES} modes, or a list of their numbers"
+            )
+        return value
+    chosen = indices("", value, "mode", "or how many modes to draw")
+    if min(chosen, default=1) < 1:
+        raise InputError(f" = {show(value)}: modes are counted from 1")
+    if len(chosen) > MOST_SHAPES:
+        raise InputError(f": {len(chosen)} modes; give at most {MOST_SHAPES}")
+    return chosen
 
-    Parameters
-    ----------
-    case_file : CaseFile
-    results : mapping
-        Modes by mass rule.
-    folder : path
-        Exists already; files of the same names are replaced.
-    """
+
+class ModesSection(Section):
+    """[analysis] of kind "modes"."""
+
+    kind: str
+    count: Count = 6
+    state: About = "rest"
+    secant: Annotated[float, Field(gt=0, le=180)] | None = None
+
+
+class ModesOutput(Section):
+    """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(AXES)] = None
+    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 6
+    animation: Animation = "gif"
+
+
+class ModesSchema(VibrationSchema):
+    """A case file of kind "modes"."""
+
+    analysis: ModesSection
+    output: ModesOutput = ModesOutput()
+
+
+class ModesAnalysis(Analysis):
+    """Natural frequencies and mode shapes about a state."""
+
+    kind = "modes"
+    schema = ModesSchema
+    needs_density = "modes need"
+    files = ("modes.png", "mac.png", "modes.gif", "modes.mp4")
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        given = super().of(schema, case).arguments
+        return cls({**given, "state": None if given["state"] == "rest" else given["state"]})
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        given = {**self.arguments, **about(case_file, mass), **changes}
+        case = case_file.case(mass)
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            from tqdm import tqdm
+
+            text = f"modes with mass rule {mass} (first use compiles kernels)"
+            with bar_closed(tqdm(bar_format=text, leave=False, disable=not progress)):
+                result = modes(case, **given)
+            begun()
+            return result
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Frequencies and effort."""
+        rigid, unstable = result["rigid"].values, result["eigenvalue"].values < 0.0
+        elastic = result["frequency"].values[~rigid & ~unstable]
+        special = [
+            f"{int(found.sum())} {what}"
+            for found, what in ((rigid, "rigid"), (unstable, "unstable"))
+            if found.any()
+        ]
+        reach = f", {elastic[0]:.4g} to {elastic[-1]:.4g} Hz" if len(elastic) else ""
+        told = f" ({', '.join(special)})" if special else ""
+        return (
+            f"  {name}: {counted(result.sizes['mode'], 'mode')}{told}{reach}, "
+            f"{result.attrs['wall_seconds']:.1f} s"
+        )
+
+    def page(
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
+    ) -> Path:
+        """Draw the modes; see `Analysis`."""
+        return _draw(case_file, results, folder)
+
+
+def _draw(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
     album = Album(folder)
     first = next(iter(results))
     case, modes = case_file.case(first), results[first]
@@ -50,7 +135,7 @@ def write_modes(
     told = _character(case_file, modes, case)
     about = _about(modes)
     rule = f", mass rule {first}" if len(results) > 1 else ""
-    sections: list[Section] = [
+    sections: list[PageSection] = [
         *album.structure(case),
         Heading("The modes"),
         album.figure(
@@ -81,12 +166,13 @@ def write_modes(
     sections += [Heading("The numbers"), _table(modes, told, rule)]
     sections += [_compared(results, same)] if others else []
     sections += [_run(case_file, results), Text(_notes(modes, case))]
-    title = case_file.title or case_file.path.stem
-    return write_report(album.folder / "report.html", title, sections)
+    return write_report(album.folder / "report.html", case_file.heading, sections)
 
 
 def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
     """Numbers of the modes that are drawn: those named, or the first that are not rigid."""
+    from foldyn.plots.modes import chosen_modes
+
     if isinstance(shapes, tuple):
         return chosen_modes(modes, shapes)
     return chosen_modes(modes, None)[:shapes]
@@ -102,6 +188,9 @@ def _about(modes: xarray.Dataset) -> str:
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
     """What the modes do along the axis that the file names, or the main one."""
+    from foldyn.plots.modes import main_axis
+    from foldyn.plots.scene import Sheet3D
+
     chosen = case_file.output
     axis = chosen.axis or main_axis(Sheet3D.of(case))
     return character(modes, axis, chosen.nodes if chosen.named else None, case=case)
@@ -185,9 +274,9 @@ def _share(percent: float) -> float | None:
 def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
     header = ["mass rule", "free dofs", "state", "secant (degrees)", "proven complete", "solver"]
     rows = []
-    for rule, modes in results.items():
-        a = modes.attrs
-        complete = f"{int(a['complete'])} of {modes.sizes['mode']}"
+    for rule, found in results.items():
+        a = found.attrs
+        complete = f"{int(a['complete'])} of {found.sizes['mode']}"
         rows.append(
             [rule, a["free_dofs"], a["state"], a.get("secant"), complete, a["solver"],
              a["wall_seconds"]]

@@ -1,6 +1,6 @@
 """The case file's contract: the sections that all kinds of analysis share, their keys and types.
 
-What differs from kind to kind is in `cases.analyses`. Limits of values live here only where a
+Each kind's own sections are in its file of `analyses`. Limits of values live here only where a
 message should name the key; everything else is checked by the objects that are built from the
 sections. Validators raise InputError with a text that continues the key's path (" = -1: must be
 ...", ".kind: missing ...").
@@ -8,7 +8,7 @@ sections. Validators raise InputError with a text that continues the key's path 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -30,14 +30,34 @@ from foldyn.cases.supports import check_axis, check_per_node
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
+from foldyn.plots import ANIMATIONS
 from foldyn.structures.options import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, number, numbers, show, vector
+
+AXES = ("x", "y", "z")
+DIRECTIONS = (*AXES, "-x", "-y", "-z")
+MOST_SHAPES = 12
+"""Deformed shapes or modes that one figure shows at most."""
 
 
 class Section(BaseModel):
     """A table of the case file: no unknown keys, no coercion, no NaN or infinity."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+def one_of(known: Iterable[str]) -> PlainValidator:
+    """Take one of some words."""
+    return PlainValidator(lambda value: choice("", value, known))
+
+
+def refused(why: str) -> PlainValidator:
+    """Take nothing, and say why."""
+
+    def refuse(value: Any) -> None:
+        raise InputError(f" = {show(value)}: {why}")
+
+    return PlainValidator(refuse)
 
 
 def _pattern(value: Any) -> dict[str, Any]:
@@ -136,6 +156,7 @@ Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_creases)]
+Animation = Annotated[str, one_of(ANIMATIONS)]
 HistorySpec = Annotated[History | None, PlainValidator(_history)]
 
 
@@ -152,16 +173,14 @@ class SheetSection(Section):
 class ModelSection(Section):
     """[model]: arguments of `discretize` or `shell`; what is left out has its default there."""
 
-    kind: Annotated[str, PlainValidator(lambda value: choice("", value, MODELS))] = BARS_AND_HINGES
-    scheme: Annotated[Any, PlainValidator(lambda value: choice("", value, SCHEMES))] = None
+    kind: Annotated[str, one_of(MODELS)] = BARS_AND_HINGES
+    scheme: Annotated[Any, one_of(SCHEMES)] = None
     divisions: Count | None = None
     mass: Annotated[list[str] | None, PlainValidator(_masses)] = None
     bar_law: BarLawSpec = None
     fold_law: HingeLawSpec = None
     bend_law: HingeLawSpec = None
-    calibration: Annotated[Any, PlainValidator(lambda value: choice("", value, CALIBRATIONS))] = (
-        None
-    )
+    calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
 
@@ -194,7 +213,7 @@ class DampingSection(Section):
 
     alpha: Annotated[float, Field(ge=0)] = 0.0
     beta: Annotated[float, Field(ge=0)] = 0.0
-    state: Annotated[str, PlainValidator(lambda value: choice("", value, STATES))] = "rest"
+    state: Annotated[str, one_of(STATES)] = "rest"
 
 
 class SupportSection(Section):

@@ -110,7 +110,8 @@ def test_a_stored_state_and_a_list_of_mass_rules(read, tmp_path) -> None:
     found = read(text + '[initial]\nfile = "pressed.nc"\nat = 3\n' + PRELOADS)
     assert found.masses == ["panel", "centroid"]
     assert found.analysis.arguments["state"] is None
-    assert found.start is not None and found.start.at == 3
+    with pytest.raises(InputError, match=r'initial\.file = "pressed\.nc": .*no such file'):
+        found.initial()
 
 
 AT_REST = 'write state = "equilibrium" under [analysis], or leave it out'
@@ -269,11 +270,11 @@ BAD_RESPONSE = {
     ),
     "averages": (
         [('"frf"', '"frf"\nmethod = "burst_random"\naverages = 1')],
-        "analysis.averages = 1: must be at least 2",
+        "analysis.averages = 1: must be a whole number, at least 2",
     ),
     "burst": (
         [('"frf"', '"frf"\nmethod = "burst_random"\nburst = 1')],
-        "analysis.burst = 1: must be less than 1",
+        "analysis.burst = 1.0: must be a part of the record, between 0 and 1",
     ),
     "estimator": (
         [('"frf"', '"frf"\nmethod = "burst_random"\nestimator = "h3"')],

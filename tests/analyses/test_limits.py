@@ -7,8 +7,8 @@ import warnings
 
 import pytest
 
-from foldyn.cases import limits
-from foldyn.cases.reading import read_case
+from foldyn.analyses import limits
+from foldyn.analyses.reading import read_case
 from foldyn.errors import InputError
 
 CASE = """

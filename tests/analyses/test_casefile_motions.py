@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+import foldyn as fd
 from foldyn.cases import (
     Actuate,
     BaseMotion,
@@ -15,7 +13,6 @@ from foldyn.cases import (
     Harmonic,
     Impose,
     Ramp,
-    State,
     Table,
 )
 from foldyn.errors import InputError
@@ -63,7 +60,7 @@ def test_moving_supports_and_actuated_creases(read, short, tmp_path) -> None:
     np.testing.assert_array_equal(np.argwhere(case.imposed), [[6, 2], [7, 1], [8, 2]])
     np.testing.assert_array_equal(found.output.nodes, [3, 4, 5, 6, 7, 8])  # what can move
     assert found.initial() is None
-    assert found.start is None
+    assert found.initial() is None
 
 
 def test_a_rigid_start_turns_about_the_center_of_mass(read, short) -> None:
@@ -119,37 +116,27 @@ def test_a_rigid_start_may_not_move_imposed_nodes(read, short) -> None:
 
 def test_a_start_from_a_result(read, short, tmp_path) -> None:
     found = read(f"{short}[initial]\nfile = 'runs/first.nc'\nat = -2\n")
-    count = len(found.case().structure.nodes)
-    state = State(np.ones((count, 3)))
-    asked: list[tuple[Path, int]] = []
-
-    def reader(path: Path, at: int) -> State:
-        asked.append((path, at))
-        return state
-
-    assert found.initial(read=reader) is state
-    assert asked == [(tmp_path / "runs/first.nc", -2)]
-    with pytest.raises(InputError, match=r"initial\.file: needs a reader"):
+    with pytest.raises(
+        InputError, match=r'case2\.toml: initial\.file = "runs/first\.nc": .*no such'
+    ):
         found.initial()
-
-    def complain(text: str):
-        def reader(path: Path, at: int) -> State:
-            raise InputError(text)
-
-        return reader
-
-    with pytest.raises(InputError, match=r"case2\.toml: initial\.at = 9: the result has samples 0"):
-        found.initial(read=complain("at = 9: the result has samples 0 to 3"))
-    with pytest.raises(InputError, match=r'initial\.file = "runs/first\.nc": x\.nc: there is no'):
-        found.initial(read=complain("x.nc: there is no such file"))
-    for short_state in (State(np.ones((count - 1, 3))), State(velocity=np.ones((count - 1, 3)))):
-        with pytest.raises(InputError) as caught:
-            found.initial(read=lambda path, at, state=short_state: state)
-        assert f'"runs/first.nc": holds a motion of {count - 1} nodes, but this structure has ' in (
-            str(caught.value)
-        )
-
-
-def test_the_sample_of_a_result_is_the_last_by_default(read, short) -> None:
-    found = read(textwrap.dedent(short) + "[initial]\nfile = 'first.nc'\n")
-    assert (found.start.file, found.start.at) == ("first.nc", -1)
+    (tmp_path / "runs").mkdir()
+    first = tmp_path / "runs/first.nc"
+    motion = read(short).run(duration=0.01, every=1)
+    fd.save(motion, first)
+    state = found.initial()
+    np.testing.assert_array_equal(state.displacement, motion.displacement.values[-2])
+    np.testing.assert_array_equal(state.velocity, motion.velocity.values[-2])
+    last = read(f"{short}[initial]\nfile = 'runs/first.nc'\n").initial()
+    np.testing.assert_array_equal(last.displacement, motion.displacement.values[-1])
+    with pytest.raises(
+        InputError, match=r"case2\.toml: initial\.at = 9999: the result has samples 0"
+    ):
+        read(f"{short}[initial]\nfile = 'runs/first.nc'\nat = 9999\n").initial()
+    count = len(found.case().structure.nodes)
+    fd.save(motion.isel(node=slice(1, None)), first)
+    with pytest.raises(InputError) as caught:
+        found.initial()
+    assert f'"runs/first.nc": holds a motion of {count - 1} nodes, but this structure has ' in (
+        str(caught.value)
+    )

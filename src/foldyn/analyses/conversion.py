@@ -1,4 +1,4 @@
-"""`foldyn modes` and `foldyn frf`: small vibrations of a case file of any kind."""
+"""A case file turned into one of another model, or into one of small vibrations."""
 
 from __future__ import annotations
 
@@ -7,61 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from foldyn.cases.casefile import CaseFile, placed
-from foldyn.cases.kinds import KINDS, schema_of
-from foldyn.cases.messages import describe
-from foldyn.cases.models import remodeled
-from foldyn.cases.reading import case_of_document, read_document
-from foldyn.cases.vibrations import STATES
+from foldyn.analyses.motion import MASSLESS_METHODS
+from foldyn.analyses.vibration import STATES
+from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.values import choice
 
 Document = dict[str, Any]
 
 
-def read_as(
-    path: Path,
-    kind: str,
-    flags: Mapping[str, Any],
-    model: str | None = None,
-    divisions: int | None = None,
-) -> CaseFile:
-    """Read a case file of any kind as one of modes or of a frequency response.
-
-    Parameters
-    ----------
-    path : Path
-    kind : {"modes", "frf"}
-    flags : mapping
-        Keys of [analysis] that the command line gives instead of the file; `state` may be a
-        result's file, too.
-    model, divisions
-        As of `read_case`.
-
-    Warns
-    -----
-    FoldynWarning
-        Loads, motions of the base or a start have no place there, and are left out.
-    """
-    document: Document = read_document(path)
-    shape = schema_of(document)
-    try:
-        shape.model_validate(document, context={"folder": path.parent})
-    except ValidationError as error:
-        if shape is not KINDS[kind]:  # where it is, flags may give what is missing
-            raise InputError(f"{path}: {describe(error, shape, KINDS)}") from None
-    with placed(path, ""):
-        document = remodeled(document, model, divisions)
-    flags = {key: value for key, value in flags.items() if value is not None}
-    if shape is not KINDS[kind]:
-        document = _converted(path, document, kind, flags.get("state", "rest"))
-    if kind == "frf" and not {"frequencies"} & {*flags, *document["analysis"]}:
-        raise InputError(f"{path}: at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)")
-    return case_of_document(path, _flagged(document, flags))
-
-
-def _flagged(document: Document, flags: Mapping[str, Any]) -> Document:
+def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
     """The document with what the command line says of its analysis."""
     analysis = {**document["analysis"], **flags}
     if "state" not in flags:
@@ -74,7 +29,7 @@ def _flagged(document: Document, flags: Mapping[str, Any]) -> Document:
     return {**others, "analysis": analysis, "initial": start}
 
 
-def _converted(path: Path, document: Document, kind: str, state: str) -> Document:
+def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document of another kind with what has a place in one of `kind`."""
     left: list[str] = []
     atrest = state == "rest"
@@ -143,3 +98,44 @@ def _shown(output: Document, kind: str) -> Document:
 
 def _without(table: Document, *keys: str) -> Document:
     return {key: value for key, value in table.items() if key not in keys}
+
+
+def remodeled(
+    document: Mapping[str, Any], model: str | None, divisions: int | None
+) -> dict[str, Any]:
+    """Case file for another model, or a shell of other divisions.
+
+    What means nothing to the other model is left out: keys of [model] that it does not have, the
+    mass rules, and for a shell explicit methods with their steps, and secant amplitudes.
+
+    Parameters
+    ----------
+    document : mapping
+        What the file says; the sections that change are valid, or left for its check.
+    model : {"bars_and_hinges", "shell"}, optional
+    divisions : int, optional
+        Pieces of every edge of a shell.
+    """
+    changed = dict(document)
+    given = document.get("model", {})
+    if not isinstance(given, Mapping):
+        return changed
+    now = given.get("kind", BARS_AND_HINGES)
+    kind = now if model is None else choice("model", model, MODELS)
+    if kind != now:
+        shared = set(MODELS[kind].keys) - {"mass"}
+        given = {key: value for key, value in given.items() if key in shared}
+    if kind != now and kind == SHELL:
+        changed["analysis"] = _of_a_shell(document["analysis"])
+    told = {} if divisions is None else {"divisions": divisions}
+    changed["model"] = {**given, "kind": kind, **told}
+    return changed
+
+
+def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """The table [analysis] without what means nothing to a shell."""
+    left = {"secant"}
+    key = "method" if analysis["kind"] == "dynamics" else "integrator"
+    if analysis.get(key, "rk4") not in ("auto", *MASSLESS_METHODS):
+        left |= {key, "dt", "force"}
+    return {key: value for key, value in analysis.items() if key not in left}

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from casefile_checks import check, edited
 
+import foldyn as fd
+from foldyn.analyses.path import Reached
 from foldyn.cases import Fix, Force, Gravity, Impose
-from foldyn.cases.until import Reached
 from foldyn.errors import InputError
+from foldyn.statics import Settings
 from foldyn.structures import ModelOptions
 
 PATH = """
@@ -66,12 +68,12 @@ def test_what_is_left_out_has_its_default(read) -> None:
         "constant": (),
         "until": None,
         "inertia_relief": False,
+        "settings": Settings(),
     }
-    assert found.analysis.settings == {"tolerance": 1e-9, "largest_turn": 10.0, "stability": True}
     output = found.output
     np.testing.assert_array_equal(output.nodes, [6, 7])  # the loaded ones
     assert (output.axis, output.shapes, output.animation) == (None, 4, "gif")
-    assert (output.every, output.max_frequency) == (None, None)
+    assert output.max_frequency is None
     assert found.masses == [ModelOptions().mass]
     assert found.case().loads == (Force([7, 6], (1, 0, 0)),)
     assert found.initial() is None
@@ -87,8 +89,8 @@ def test_everything_that_can_be_said(read) -> None:
         "constant": (1,),
         "until": Reached(7, "x", 0.02),
         "inertia_relief": False,
+        "settings": Settings(tolerance=1e-10, largest_turn=3.0, stability=False),
     }
-    assert found.analysis.settings == {"tolerance": 1e-10, "largest_turn": 3.0, "stability": False}
     assert found.output.shapes == (0, 5, -1)
     assert (found.output.axis, found.output.animation) == ("-x", "mp4")
     assert found.case().loads[1] == Gravity((0, 0, -9.81))
@@ -119,15 +121,13 @@ def test_where_a_path_ends() -> None:
 
 
 def test_a_path_starts_from_a_stored_state(read, tmp_path) -> None:
-    found = read(PATH + '[initial]\nfile = "first.nc"\nat = 3\n')
-    asked = []
-    with pytest.raises(InputError, match=r'initial\.file = "first\.nc": there is none'):
-        found.initial(read=lambda path, at: asked.append((path, at)) or _none())
-    assert asked == [(tmp_path / "first.nc", 3)]
-
-
-def _none():
-    raise InputError("there is none")
+    found = read(PATH + '[initial]\nfile = "first.nc"\nat = 1\n')
+    with pytest.raises(InputError, match=r'initial\.file = "first\.nc": .*no such file'):
+        found.initial()
+    first = read(PATH).run(load_factors=[0.0, 1e-5, 2e-5])
+    fd.save(first, tmp_path / "first.nc")
+    np.testing.assert_array_equal(found.initial().displacement, first.displacement.values[1])
+    assert found.start().load_factor == 1e-5
 
 
 # what is replaced in the text, by what, and how the message begins
@@ -233,7 +233,7 @@ BAD = {
     ),
     "base": (
         [("[[loads]]", '[[supports]]\nbase = "x"\n[[loads]]')],
-        'supports[1].base = "x": a base moves over time, which a path has not; give nodes, axis',
+        'supports[1].base = "x": a base moves over time, and a path has no time; give nodes, axis',
     ),
     "masses": (
         [("[[supports]]", '[model]\nmass = ["panel", "centroid"]\n[[supports]]')],

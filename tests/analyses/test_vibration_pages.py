@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foldyn.cases import read_case
-from foldyn.linear import frf, modes, peaks_of
-from foldyn.report import write_modes, write_responses
-from foldyn.report.frf import driven_axis
-from foldyn.report.modes import shown_modes
+from foldyn.analyses import read_case
+from foldyn.analyses.frf_page import driven_axis
+from foldyn.analyses.modes import shown_modes
+from foldyn.linear import peaks_of
 
 SHEET = """
 [pattern]
@@ -32,17 +31,14 @@ PUSH = '[[drive]]\nnodes = "xmax"\nforce = [0, 0, 1e-4]\n'
 @pytest.fixture
 def write(tmp_path, monkeypatch):
     """Function that computes a case file and writes its page without a film."""
-    monkeypatch.setattr("foldyn.report.modes.FRAMES", 2)
+    monkeypatch.setattr("foldyn.analyses.modes.FRAMES", 2)
 
     def write_page(text: str):
         file = tmp_path / "case.toml"
         file.write_text(SHEET + text, "utf-8")
         case_file = read_case(file)
-        pages = {"modes": (modes, write_modes), "frf": (frf, write_responses)}
-        compute, draw = pages[case_file.analysis.kind]
-        arguments = case_file.analysis.arguments
-        results = {rule: compute(case_file.case(rule), **arguments) for rule in case_file.masses}
-        page = draw(case_file, results, tmp_path).read_text("utf-8")
+        results = {rule: case_file.run(rule) for rule in case_file.masses}
+        page = case_file.analysis.page(case_file, results, tmp_path).read_text("utf-8")
         return next(iter(results.values())), page
 
     return write_page
@@ -68,7 +64,7 @@ def test_which_modes_are_shown(write):
 
 
 def test_a_film_of_a_large_sheet_shows_fewer_modes(write, monkeypatch):
-    monkeypatch.setattr("foldyn.report.modes.MOST_TRIANGLES", 70)  # 32 in a mode
+    monkeypatch.setattr("foldyn.analyses.modes.MOST_TRIANGLES", 70)  # 32 in a mode
     _, page = write('[analysis]\nkind = "modes"\ncount = 3\nsecant = 1\n')
     assert "The same modes (the first 2) in motion" in page
 

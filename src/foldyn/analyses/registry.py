@@ -1,4 +1,4 @@
-"""The kinds of analysis that a case file may ask for, and what a file of each looks like."""
+"""The kinds of analysis that a case file may ask for."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
-from foldyn.cases.analyses import MotionSchema, PathSchema
-from foldyn.cases.schema import CaseSchema
-from foldyn.cases.vibrations import FrfSchema, ModesSchema
+from foldyn.analyses.casefile import Analysis
+from foldyn.analyses.frf import FrfAnalysis
+from foldyn.analyses.modes import ModesAnalysis
+from foldyn.analyses.motion import MotionAnalysis
+from foldyn.analyses.path import PathAnalysis
+from foldyn.analyses.sections import CaseSchema
 from foldyn.errors import InputError
 from foldyn.values import choice
 
-KINDS: Mapping[str, type[CaseSchema]] = {
-    "dynamics": MotionSchema,
-    "statics": PathSchema,
-    "modes": ModesSchema,
-    "frf": FrfSchema,
+ANALYSES: Mapping[str, type[Analysis]] = {
+    analysis.kind: analysis
+    for analysis in (MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis)
 }
-"""What a case file of each kind looks like."""
+"""By the name that `analysis.kind` has for them."""
 
 
 def _known_kind(value: Any) -> Any:
@@ -27,8 +28,8 @@ def _known_kind(value: Any) -> Any:
     if not isinstance(value, Mapping):
         return value
     if "kind" not in value:
-        raise InputError(f".kind: missing; choose one of {', '.join(KINDS)}")
-    choice(".kind", value["kind"], KINDS)
+        raise InputError(f": missing; choose one of {', '.join(ANALYSES)}", ".kind")
+    choice(".kind", value["kind"], ANALYSES)
     return value
 
 
@@ -45,4 +46,6 @@ def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
     """Schema of a case file by the kind that it names."""
     analysis = document.get("analysis")
     kind = analysis.get("kind") if isinstance(analysis, Mapping) else None
-    return KINDS.get(kind, UnknownSchema) if isinstance(kind, str) else UnknownSchema
+    if isinstance(kind, str) and kind in ANALYSES:
+        return ANALYSES[kind].schema
+    return UnknownSchema

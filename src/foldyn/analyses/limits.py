@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from foldyn.cases.messages import dotted
+from foldyn.analyses.messages import dotted
 from foldyn.errors import InputError
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 

@@ -1,4 +1,4 @@
-"""Figures and the page of frequency responses: what `foldyn run` and `foldyn frf` leave to see."""
+"""Figures and the page of frequency responses."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foldyn import plots
+from foldyn.analyses.casefile import CaseFile
 from foldyn.cases import BaseMotion, Case
-from foldyn.cases.casefile import CaseFile
-from foldyn.cases.vibrations import LINEAR_METHODS
 from foldyn.linear import Peak, peaks_of
+from foldyn.linear.frf import METHODS
 from foldyn.linear.quantity import PER_FORCE, quantity_of
-from foldyn.plots.frf import PROMINENCE
-from foldyn.plots.responses import unit_of
 from foldyn.report.album import Album, shown_nodes
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Section, Table, Text
@@ -29,19 +27,10 @@ MOST_REASONS = 6
 """Peaks of which the page says why a number is missing, at most."""
 
 
-def write_responses(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: str | Path
-) -> Path:
-    """Draw a case and its frequency responses into `folder`; returns the path of report.html.
+def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+    """Draw a case and its frequency responses into `folder`; returns the path of report.html."""
+    from foldyn.plots.frf import PROMINENCE
 
-    Parameters
-    ----------
-    case_file : CaseFile
-    results : mapping
-        Frequency responses by mass rule.
-    folder : path
-        Exists already; files of the same names are replaced.
-    """
     album = Album(folder)
     first = next(iter(results))
     case, response = case_file.case(first), results[first]
@@ -85,8 +74,7 @@ def write_responses(
         _run(case_file, results),
         Text(_notes(response, case, found)),
     ]
-    title = case_file.title or case_file.path.stem
-    return write_report(album.folder / "report.html", title, sections)
+    return write_report(album.folder / "report.html", case_file.heading, sections)
 
 
 def driven_axis(response: xarray.Dataset) -> str:
@@ -114,6 +102,8 @@ def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:
 def _peaks(
     found: Mapping[tuple[str, int], tuple[Peak, ...]], quantity: str, axis: str, several: bool
 ) -> Table:
+    from foldyn.plots.responses import unit_of
+
     header = [*(["mass rule"] if several else []), "node", "peak (Hz)"]
     header += [f"height{unit_of(quantity)}", "3 dB (%)", "textbook (%)"]
     header += ["f0 (Hz)", "circle (%)", "misfit (%)"]
@@ -154,7 +144,7 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
         "window_rate": "window (1/s)",
     }
     a = next(iter(results.values())).attrs
-    if a["method"] in LINEAR_METHODS:
+    if METHODS[a["method"]].linear and METHODS[a["method"]].secant is None:
         del keys["amplitude"]
     present = [key for key in keys if key in a]
     header = ["mass rule", "method", "state", *(keys[key] for key in present), "time (s)"]

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.cases import read_case
-from foldyn.report import write_path
-from foldyn.report.path import moved_supports
+from foldyn.analyses import read_case
+from foldyn.plots import moved_supports
 
 FOLD = """
 [pattern]
@@ -55,8 +54,9 @@ def write(tmp_path, text):
     file = tmp_path / "case.toml"
     file.write_text(FOLD + text, "utf-8")
     case_file = read_case(file)
-    path = fd.trace(case_file.case(), **case_file.analysis.arguments)
-    return path, write_path(case_file, path, tmp_path).read_text("utf-8")
+    path = case_file.run()
+    page = case_file.analysis.page(case_file, {case_file.masses[0]: path}, tmp_path)
+    return path, page.read_text("utf-8")
 
 
 @pytest.mark.filterwarnings("ignore:the path loses stability")

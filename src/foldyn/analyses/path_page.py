@@ -1,4 +1,4 @@
-"""Figures and the page of an equilibrium path: what `foldyn run` leaves for people to look at."""
+"""Figures and the page of a path of equilibria."""
 
 from __future__ import annotations
 
@@ -8,11 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from foldyn import plots
-from foldyn.cases import Case
-from foldyn.cases.casefile import CaseFile
-from foldyn.plots.along import AXES, along, evenly, main_direction
-from foldyn.plots.path import total_reaction
-from foldyn.plots.shapes import chosen_points
+from foldyn.analyses.casefile import CaseFile
+from foldyn.plots.along import along, evenly, main_direction
 from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
@@ -29,18 +26,10 @@ MOST_COLUMNS = 4
 """Nodes whose displacements the table shows at most."""
 
 
-def write_path(case_file: CaseFile, path: xarray.Dataset, folder: str | Path) -> Path:
-    """Draw a case and its path into `folder`; returns the path of report.html.
-
-    Parameters
-    ----------
-    case_file : CaseFile
-    path : xarray.Dataset
-    folder : path
-        Exists already; files of the same names are replaced.
-    """
+def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path) -> Path:
+    """Draw a case and its path into `folder`; returns the path of report.html."""
     album, case = Album(folder), case_file.case()
-    moved = moved_supports(case)
+    moved = plots.moved_supports(case)
     chosen = case_file.output.nodes.tolist()
     nodes, some = shown_nodes(chosen, MOST_CURVES)
     direction = case_file.output.axis or main_direction({"": path}, nodes)
@@ -96,19 +85,7 @@ def write_path(case_file: CaseFile, path: xarray.Dataset, folder: str | Path) ->
             "from it, and motions can start from its points."
         ),
     ]
-    title = case_file.title or case_file.path.stem
-    return write_report(album.folder / "report.html", title, sections)
-
-
-def moved_supports(case: Case) -> tuple[list[int], str] | None:
-    """Nodes that supports move together and farthest, and the direction; None where none moves."""
-    motion = sum((vector for vector, _ in case.imposed_terms), np.zeros(case.imposed.shape))
-    if not motion.any():
-        return None
-    _, axis = np.unravel_index(np.abs(motion).argmax(), motion.shape)
-    largest = motion[np.abs(motion[:, axis]).argmax(), axis]
-    together = np.isclose(motion[:, axis], largest, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(together).tolist(), ("-" if largest < 0.0 else "") + AXES[axis]
+    return write_report(album.folder / "report.html", case_file.heading, sections)
 
 
 def _growing(
@@ -135,7 +112,7 @@ def _points(
     moved: tuple[list[int], str] | None,
 ) -> Table:
     special = np.flatnonzero(path["point"].values != "regular").tolist()
-    drawn = chosen_points(path, case_file.output.shapes or 4)
+    drawn = plots.chosen_points(path, case_file.output.shapes or 4)
     rows = sorted({*special, *drawn, *evenly(path, MOST_ROWS)})
     shares = plots.energy_shares(path)
     total = sum(path[f"strain_{name}"].values for name in shares)
@@ -143,7 +120,7 @@ def _points(
     columns: list[np.ndarray] = [path["load_factor"].values]
     if moved is not None:
         header += [f"moved along {moved[1]} (m)", "force (N)"]
-        columns += [along(path, *moved), total_reaction(path, *moved)]
+        columns += [along(path, *moved), plots.total_reaction(path, *moved)]
     shown = [node for node in nodes if moved is None or node not in moved[0]]
     header += [f"node {node} along {direction} (m)" for node in shown]
     columns += [along(path, [node], direction) for node in shown]

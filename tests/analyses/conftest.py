@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from foldyn.cases import read_case
+from foldyn.analyses import read_case
 
 # the example of the design, section 4, with loads that its supports leave free
 EXAMPLE = """

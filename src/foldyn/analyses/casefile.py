@@ -1,0 +1,300 @@
+"""A case file that has been read, and what a kind of analysis gives to it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.analyses.sections import CaseSchema
+from foldyn.analyses.start import Start, start_of
+from foldyn.cases import Case, State, resolve_nodes
+from foldyn.cases.models import MODELS
+from foldyn.errors import InputError, within
+from foldyn.patterns import Pattern
+from foldyn.structures import Sheet
+from foldyn.values import choice
+
+if TYPE_CHECKING:
+    import xarray
+
+Begun = Callable[[], None]
+Compute = Callable[[bool, Begun], "xarray.Dataset"]
+"""Computes a result, with or without a bar; calls what it is given when nothing is left to be
+refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """What to keep and show.
+
+    Attributes
+    ----------
+    nodes : ndarray of int64
+        Nodes that figures and spectra show.
+    named : bool
+        Whether the file names these nodes, or they are those of the default.
+    axis : str or None
+        Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
+        one in which a node moves most.
+    animation : str
+        "gif" or "mp4".
+    max_frequency : float or None
+        Of a motion: where the axes of spectra end (Hz); None: at half the sampling rate.
+    shapes : int, tuple of int or None
+        Of a path: how many deformed shapes are drawn, or the numbers of their points. Of modes:
+        how many are drawn, or their numbers.
+    quantity : str or None
+        Of a frequency response: "receptance", "mobility" or "accelerance"; None: what it is.
+    """
+
+    nodes: NDArray[np.int64]
+    named: bool = False
+    axis: str | None = None
+    animation: str = "gif"
+    max_frequency: float | None = None
+    shapes: int | tuple[int, ...] | None = None
+    quantity: str | None = None
+
+
+class Analysis(ABC):
+    """One kind of analysis, as a case file asks for it.
+
+    A new kind is a subclass of this in a file of its own, listed in `analyses.registry`.
+
+    Attributes
+    ----------
+    kind : str
+        What a case file calls it.
+    schema : type
+        What such a case file looks like.
+    files : tuple of str
+        Figures and animations that its page comes with.
+    needs_density : str
+        Beginning of a message, "a motion needs"; "" where it does without.
+    arguments : dict
+        Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
+    """
+
+    kind: ClassVar[str]
+    schema: ClassVar[type[CaseSchema]]
+    files: ClassVar[tuple[str, ...]]
+    needs_density: ClassVar[str]
+
+    def __init__(self, arguments: dict[str, Any]) -> None:
+        self.arguments = arguments
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """What the checked sections of a case file ask for."""
+        return cls({name: value for name, value in schema.analysis if name != "kind"})
+
+    @abstractmethod
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """Check a computation with one mass rule as far as that is possible before it starts.
+
+        changes : arguments that take the place of the file's.
+        """
+
+    @abstractmethod
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Tell in a line what came of the computation with the mass rule `name`."""
+
+    @abstractmethod
+    def page(
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
+    ) -> Path:
+        """Draw results, by mass rule, into an existing folder; returns the path of report.html."""
+
+    def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
+        """Refuse what the computations of all mass rules cannot do together."""
+
+    def compiles(self, computations: Sequence[Compute]) -> bool:
+        """Whether kernels have to be compiled first and no bar says so."""
+        return False
+
+    def shown(self, case: Case) -> NDArray[np.int64]:
+        """Nodes to show where the file names none: those with a force, else all that can move."""
+        return case.loaded_nodes if case.loaded_nodes.size else movable(case)
+
+
+def movable(case: Case) -> NDArray[np.int64]:
+    """Vertices that supports do not hold altogether."""
+    vertices = len(case.structure.pattern.vertices)
+    return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
+
+
+def driven_nodes(case: Case, groups: Sequence[tuple[str, Any]]) -> NDArray[np.int64]:
+    """Nodes of several selections, each with the key that names it."""
+    found = [resolve_nodes(case.structure, nodes, key) for key, nodes in groups]
+    return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
+
+
+def counted(number: int, what: str) -> str:
+    """Write a number with its noun: "1 point", "2 points"."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+@dataclass(frozen=True, eq=False)
+class CaseFile:
+    """A case file that has been read and checked.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    title : str
+        Its title, or "".
+    pattern : Pattern
+    sheet : Sheet
+    model : str
+        "bars_and_hinges" or "shell".
+    masses : list of str
+        Mass rules, one or several to compare.
+    analysis : Analysis
+        What to compute; its `arguments` are those of `simulate`, `trace`, `modes` or `frf`.
+    output : Output
+    """
+
+    path: Path
+    title: str
+    pattern: Pattern
+    sheet: Sheet
+    model: str
+    masses: list[str]
+    analysis: Analysis
+    output: Output
+    _schema: CaseSchema = field(repr=False)
+    _make: Callable[[str], Case] = field(repr=False)
+    _cases: dict[str, Case] = field(repr=False)
+
+    @property
+    def heading(self) -> str:
+        """Title of its page: its own, or the name of the file."""
+        return self.title or self.path.stem
+
+    def case(self, mass: str | None = None) -> Case:
+        """Case with one of the mass rules, by default the first that the file names."""
+        rule = self._rule(mass)
+        if rule not in self._cases:
+            self._cases[rule] = self._make(rule)
+        return self._cases[rule]
+
+    def initial(self, mass: str | None = None) -> State | None:
+        """State that the motion or path starts from, or about which modes swing; None for rest.
+
+        Parameters
+        ----------
+        mass : str, optional
+            Mass rule, by default the first that the file names: it decides where the center of
+            mass is.
+
+        Raises
+        ------
+        InputError
+            A support holds a node that the rigid motion moves; the result cannot be read or has
+            other nodes.
+        """
+        return self.start(mass).state
+
+    def start(self, mass: str | None = None) -> Start:
+        """As `initial`, with the load factor of a stored state."""
+        section = getattr(self._schema, "initial", None)
+        with within("initial: " if getattr(section, "file", "") is None else "initial.", self.path):
+            return start_of(section, self.case(mass), self.path.parent)
+
+    def run(
+        self, mass: str | None = None, progress: bool = False, **changes: Any
+    ) -> xarray.Dataset:
+        """Compute what the file asks for.
+
+        Parameters
+        ----------
+        mass : str, optional
+            Mass rule, by default the first that the file names.
+        progress : bool
+            Whether to show a bar.
+        **changes
+            Arguments of `simulate`, `trace`, `modes` or `frf` that take the place of the file's.
+
+        Returns
+        -------
+        xarray.Dataset
+            What that function returns.
+
+        Raises
+        ------
+        InputError
+            The message names the file and the key.
+        ComputationError
+            The computation fails; what was computed until then is its `partial`.
+
+        Examples
+        --------
+        >>> import foldyn as fd
+        >>> case_file = fd.read_case(fd.studies.find_case("herkal/case1-static"))
+        >>> path = case_file.run(load_factors=[0.0, 0.5])
+        >>> path["load_factor"].values.tolist()
+        [0.0, 0.5]
+        """
+        return self.computation(mass, **changes).run(progress)
+
+    def computation(self, mass: str | None = None, **changes: Any) -> Computation:
+        """A computation that is checked, but not begun; arguments as of `run`."""
+        return Computation(self, self._rule(mass), changes)
+
+    @contextmanager
+    def placing(self, mass: str | None = None) -> Iterator[None]:
+        """Put the file, the mass rule and the table of the key before bad input."""
+        rule = f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
+        try:
+            yield
+        except InputError as error:
+            if error.file is not None:
+                raise
+            raise error.within(rule + self._section(error.key), self.path) from None
+
+    def _section(self, key: str) -> str:
+        """Table in which the file has a key, with a dot; "" for what is none."""
+        for name in ("analysis", "output", "model"):
+            if key and key in type(getattr(self._schema, name)).model_fields:
+                return f"{name}."
+        return ""
+
+    def _rule(self, mass: str | None) -> str:
+        if mass is None:
+            return self.masses[0]
+        return choice("mass", mass, MODELS[self.model].masses)
+
+
+class Computation:
+    """One result of a case file, checked as far as that is possible before it is computed.
+
+    Attributes
+    ----------
+    file : str
+        Name for the file of the result.
+    """
+
+    def __init__(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> None:
+        self.case_file, self.mass = case_file, mass
+        self.file = f"result-{mass}.nc" if len(case_file.masses) > 1 else "result.nc"
+        with case_file.placing(mass):
+            self.compute = case_file.analysis.prepare(case_file, mass, changes)
+
+    @property
+    def place(self) -> str:
+        """Beginning of messages about it."""
+        several = len(self.case_file.masses) > 1
+        return f"{self.case_file.path}: " + (f'mass = "{self.mass}": ' if several else "")
+
+    def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
+        """Compute it; `begun` is called when nothing is left to be refused."""
+        with self.case_file.placing(self.mass):
+            return self.compute(progress, begun)

@@ -1,0 +1,270 @@
+"""Frequency responses: [analysis] of kind "frf", arguments of `frf` and options of its methods.
+
+What shakes the structure stands under [[drive]].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PlainValidator, create_model, model_validator
+
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, driven_nodes, movable
+from foldyn.analyses.frf_page import frf_page
+from foldyn.analyses.motion import check_massless
+from foldyn.analyses.sections import AXES, Nodes, Positive, Section, Vector, one_of, refused
+from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
+from foldyn.cases import BaseMotion, Case, Force
+from foldyn.cases.decode import check_keys
+from foldyn.cases.models import SHELL
+from foldyn.cases.supports import check_axis
+from foldyn.dynamics import Progress
+from foldyn.errors import InputError, within
+from foldyn.linear import frf
+from foldyn.linear.frf import METHODS
+from foldyn.linear.quantity import PER_FORCE
+from foldyn.values import number, show, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+MOST_FREQUENCIES = 100_000
+OPTIONS: Mapping[str, Any] = {
+    key: kind for method in METHODS.values() for key, kind in get_type_hints(method.options).items()
+}
+"""Options of all methods, and their types."""
+
+
+def _frequencies(value: Any) -> NDArray[np.float64]:
+    if isinstance(value, dict):
+        return _range(value)
+    if not isinstance(value, list) or not value:
+        raise InputError(
+            f" = {show(value)}: must be {{ first = 1, last = 25, count = 241 }}, in Hz, or a list "
+            "of frequencies"
+        )
+    listed = [number(f"[{i}]", item, least=0.0) for i, item in enumerate(value)]
+    for i in range(1, len(listed)):
+        if listed[i] <= listed[i - 1]:
+            raise InputError(
+                f"[{i}] = {show(value[i])}: must be greater than the frequency before it "
+                f"({show(value[i - 1])})"
+            )
+    return np.array(listed)
+
+
+def _range(table: dict[str, Any]) -> NDArray[np.float64]:
+    """Frequencies spaced evenly, first and last among them."""
+    known = ("first", "last", "count")
+    check_keys(table, known)
+    for key in known:
+        if key not in table:
+            raise InputError(": missing; give first and last (Hz) and their count", f".{key}")
+    first = number(".first", table["first"], least=0.0)
+    last = number(".last", table["last"], above=first)
+    count = whole(".count", table["count"], least=2, most=MOST_FREQUENCIES)
+    return np.linspace(first, last, count)
+
+
+_fields: dict[str, Any] = {key: (kind | None, None) for key, kind in OPTIONS.items()}
+_Options: Any = create_model("_Options", __base__=Section, **_fields)
+
+
+class FrfSection(_Options):
+    """[analysis] of kind "frf"."""
+
+    kind: str
+    frequencies: Annotated[Any, PlainValidator(_frequencies)]
+    method: Annotated[str, one_of(METHODS)] = "direct"
+    state: About = "rest"
+    secant: Annotated[float, Field(gt=0, le=180)] | None = None
+    amplitude: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _fits_the_method(self) -> Self:
+        given, method = self.model_fields_set, METHODS[self.method]
+        for key in sorted(given & set(OPTIONS)):
+            owners = [name for name, other in METHODS.items() if key in _keys(other)]
+            if self.method not in owners:
+                raise InputError(
+                    f": only for method = {' or '.join(show(owner) for owner in owners)}; leave it "
+                    "out",
+                    f".{key}",
+                )
+        if "secant" in given and not (method.linear and method.secant is None):
+            raise InputError(
+                f" = {show(self.secant)}: the method {self.method} goes by the amplitude of the "
+                "drive; leave it out, and give amplitude",
+                ".secant",
+            )
+        with within("."):
+            method.options(**self.options())
+        return self
+
+    def options(self) -> dict[str, Any]:
+        """What the file says of the options of its method."""
+        return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
+
+
+def _keys(method: Any) -> list[str]:
+    return [item.name for item in fields(method.options)]
+
+
+class DriveSection(Section):
+    """One of [[drive]]: a force on nodes, or a motion of the base."""
+
+    nodes: Nodes = None
+    force: Vector = None
+    base: Annotated[Any, PlainValidator(lambda value: check_axis("", value))] = None
+    displacement: Positive = 1.0
+    history: Annotated[
+        Any,
+        refused(
+            "a drive has an amplitude only, analysis.method says how it goes over time; leave it "
+            "out"
+        ),
+    ] = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        if "base" in given and given & {"nodes", "force"}:
+            raise InputError(
+                ": moves all nodes that supports hold along its axis; leave out nodes and force",
+                ".base",
+            )
+        if "base" in given:
+            return self
+        if "displacement" in given:
+            raise InputError(
+                ': is that of a base, as in base = "x"; leave it out, or give base',
+                ".displacement",
+            )
+        if not given:
+            raise InputError(": give nodes and force, or base (the axis of a base that moves)")
+        for key in ("nodes", "force"):
+            if key not in given:
+                raise InputError(": missing; give its value", f".{key}")
+        return self
+
+    def part(self) -> Force | BaseMotion:
+        """What it says, as an object."""
+        if self.base is not None:
+            return BaseMotion(self.base, value=self.displacement)
+        return Force(self.nodes, self.force)
+
+
+class FrfOutput(Section):
+    """[output] of a frequency response: what is shown."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(AXES)] = None
+    quantity: Annotated[Any, one_of(PER_FORCE)] = None
+
+
+class FrfSchema(VibrationSchema):
+    """A case file of kind "frf"."""
+
+    analysis: FrfSection
+    drive: list[DriveSection] = Field(min_length=1)
+    output: FrfOutput = FrfOutput()
+
+    @model_validator(mode="after")
+    def _moves_the_model(self) -> Self:
+        if self.model.kind == SHELL:
+            check_massless("integrator", getattr(self.analysis, "integrator", None))
+        return self
+
+    @model_validator(mode="after")
+    def _drives_alike(self) -> Self:
+        bases = [i for i, item in enumerate(self.drive) if item.base is not None]
+        if bases and len(self.drive) > 1:
+            raise InputError(
+                ": a base drives alone, along one axis; run a case file for each",
+                f"drive[{bases[0]}]",
+            )
+        if bases and self.output.quantity is not None:
+            raise InputError(
+                f" = {show(self.output.quantity)}: a base drives, and what responds to it is shown "
+                "as transmissibility; leave it out",
+                "output.quantity",
+            )
+        return self
+
+
+class FrfAnalysis(Analysis):
+    """The response to a drive of each frequency about a state."""
+
+    kind = "frf"
+    schema = FrfSchema
+    needs_density = "a frequency response needs"
+    files = ("response.png", "nyquist.png")
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        section = schema.analysis
+        given: dict[str, Any] = {
+            key: getattr(section, key) for key in ("frequencies", "method", "secant", "amplitude")
+        }
+        given["state"] = None if section.state == "rest" else section.state
+        return cls({**given, **section.options(), "drive": [one.part() for one in schema.drive]})
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`; `frf` refuses bad input before it tells of its first progress."""
+        given = {**self.arguments, **about(case_file, mass), **changes}
+        case = case_file.case(mass)
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            told = False
+
+            def tell(now: Progress) -> None:
+                nonlocal told
+                if not told:
+                    bar.clear()
+                    begun()
+                told = True
+                bar.total = now.duration
+                bar.update(now.time - bar.n)
+
+            with bar_closed(_bar(progress)) as bar:
+                return frf(case, progress=tell, **given)
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Method, frequencies and effort."""
+        f = result["frequency"].values
+        count = f"{len(f)} frequencies" if len(f) > 1 else "1 frequency"
+        return (
+            f"  {name}: {result.attrs['method']}, {count} from {f[0]:.4g} to {f[-1]:.4g} Hz, "
+            f"{result.attrs['wall_seconds']:.1f} s"
+        )
+
+    def shown(self, case: Case) -> NDArray[np.int64]:
+        """Nodes with a driving force, else all that can move."""
+        parts = enumerate(self.arguments["drive"])
+        driven = driven_nodes(
+            case, [(f"drive[{i}].nodes", one.nodes) for i, one in parts if isinstance(one, Force)]
+        )
+        return driven if driven.size else movable(case)
+
+    def page(
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
+    ) -> Path:
+        """Draw the responses; see `Analysis`."""
+        return frf_page(case_file, results, folder)
+
+
+def _bar(shown: bool) -> Any:
+    """Bar of a response: what it counts depends on the method."""
+    from tqdm import tqdm
+
+    layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
+    text = "response (first use compiles kernels)"
+    return tqdm(total=1.0, desc=text, bar_format=layout, leave=False, disable=not shown)

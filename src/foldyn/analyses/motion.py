@@ -1,0 +1,248 @@
+"""Motions: [analysis] of kind "dynamics", arguments of `simulate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, PlainValidator, model_validator
+
+from foldyn import plots
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
+from foldyn.analyses.sections import (
+    AXES,
+    Animation,
+    CaseSchema,
+    Nodes,
+    Positive,
+    Section,
+    one_of,
+)
+from foldyn.analyses.start import MotionStart
+from foldyn.cases import Case
+from foldyn.cases.models import SHELL
+from foldyn.dynamics import METHODS, compiled, prepare
+from foldyn.dynamics.timing import check_samples
+from foldyn.errors import InputError
+from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Picture, Table, Text
+from foldyn.report.sections import Section as PageSection
+from foldyn.signals.spectrum import MINIMUM_SAMPLES
+from foldyn.values import number, show, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+SAMPLES = 2000
+"""Samples that a motion keeps when the file does not say."""
+MASSLESS_METHODS = tuple(name for name, method in METHODS.items() if method.massless)
+"""Integrators that take dofs without mass, as the rotations of a shell are."""
+
+
+def _every(value: Any) -> int | float:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return whole("", value, least=1, what="steps")
+    return number("", value, above=0.0)
+
+
+class MotionSection(Section):
+    """[analysis] of kind "dynamics"."""
+
+    kind: str
+    duration: Positive
+    method: Annotated[str, one_of(("auto", *METHODS))] = "rk4"
+    dt: Positive | None = None
+    force: bool = False
+    tolerance: Positive | None = None
+    start: float = 0.0
+    spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+
+class MotionOutput(Section):
+    """[output] of a motion: what is kept and shown."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(AXES)] = None
+    every: Annotated[Any, PlainValidator(_every)] = None
+    max_frequency: Positive | None = None
+    animation: Animation = "gif"
+
+
+class MotionSchema(CaseSchema):
+    """A case file of kind "dynamics"."""
+
+    initial: MotionStart | None = None
+    analysis: MotionSection
+    output: MotionOutput = MotionOutput()
+
+    @model_validator(mode="after")
+    def _moves_the_model(self) -> Self:
+        if self.model.kind == SHELL:
+            if "method" not in self.analysis.model_fields_set:
+                self.analysis.method = "auto"
+            check_massless("method", self.analysis.method, ("auto", *MASSLESS_METHODS))
+        return self
+
+
+def check_massless(key: str, method: str | None, fit: Sequence[str] = MASSLESS_METHODS) -> None:
+    """Refuse an integrator that a shell cannot have."""
+    if method is not None and method not in fit:
+        raise InputError(
+            f" = {show(method)}: needs mass everywhere, and the rotations of a shell have none; "
+            f"choose one of {', '.join(fit)}, or leave it out",
+            f"analysis.{key}",
+        )
+
+
+class MotionAnalysis(Analysis):
+    """The motion from an initial state under loads and moving supports."""
+
+    kind = "dynamics"
+    schema = MotionSchema
+    needs_density = "a motion needs"
+    files = ("load.png", "motion.png", "energies.png")
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`; output.every is an argument of `simulate` too."""
+        found = super().of(schema, case)
+        every = schema.output.every
+        found.arguments["every"] = schema.analysis.duration / SAMPLES if every is None else every
+        return found
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
+        return _Prepared(prepare(case_file.case(mass), **given))
+
+    def check(self, computations: Sequence[Compute], figures: bool) -> None:
+        """Refuse more samples than memory holds, or fewer than spectra need."""
+        motions = [one.motion for one in computations if isinstance(one, _Prepared)]
+        samples = min(motion.expected_samples for motion in motions)
+        if figures and samples < MINIMUM_SAMPLES:
+            raise InputError(
+                f": gives {samples} samples, spectra need {MINIMUM_SAMPLES}: lower it, lengthen "
+                "analysis.duration, or run with --no-figures",
+                "every",
+            )
+        case = motions[0].case
+        check_samples(
+            sum(motion.expected_samples for motion in motions),
+            len(case.structure.nodes),
+            len(case.supported_dofs),
+            len(motions),
+        )
+
+    def compiles(self, computations: Sequence[Compute]) -> bool:
+        """Whether the integrator is used for the first time."""
+        motions = [one.motion for one in computations if isinstance(one, _Prepared)]
+        return not all(compiled(motion.method.name) for motion in motions)
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Method and its reason if it was chosen, steps, speed and accuracy."""
+        a = result.attrs
+        per_second = a["steps"] / max(a["wall_seconds"], 1e-9)
+        size = f"{a['dt']:.3g} s"
+        if "smallest_step" in a:
+            size = f"{a['smallest_step']:.3g} to {a['largest_step']:.3g} s"
+        detail = f"critical {a['critical_step']:.3g} s"
+        if "iterations" in a:
+            detail = f"{a['iterations'] / max(a['steps'], 1):.1f} iterations each"
+            detail += f", {a['halved_steps']} in parts" if a["halved_steps"] else ""
+        chosen = ""
+        if "method_reason" in a:
+            chosen = f"  {name}: {a['method']}, {a['method_reason']}\n"
+        return (
+            f"{chosen}  {name}: {a['steps']} steps of {size} ({detail}), "
+            f"{per_second:,.0f} steps/s, energy error {a['energy_error']:.1e}"
+        )
+
+    def page(
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
+    ) -> Path:
+        """Draw the motions; see `Analysis`."""
+        album = Album(folder)
+        first = next(iter(results))
+        case, trajectory = case_file.case(first), results[first]
+        nodes, some = shown_nodes(case_file.output.nodes.tolist())
+        start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
+        scale = visible_scale(case, trajectory)
+        rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
+        sections: list[PageSection] = album.structure(case)
+        if case.loads or case.imposed_terms or case.base_terms:
+            sections.append(
+                album.figure(
+                    "load",
+                    "Loads and imposed motions over time.",
+                    lambda: plots.plot_load_history(case, duration, start=start),
+                )
+            )
+        shown = case_file.output
+        film = album.folder / f"motion.{shown.animation}"
+        sections += [
+            Heading("The motion"),
+            album.figure(
+                "motion",
+                f"Displacement of the chosen nodes{some} (left) and its frequency content "
+                f"(right), {rules}.",
+                lambda: plots.plot_history(
+                    results, nodes, axes=shown.axis, max_frequency=shown.max_frequency
+                ),
+            ),
+            Picture(
+                plots.animate(case, trajectory, film, scale=scale),
+                f"The motion with mass rule {first}{enlarged(scale)}; at rest in gray.",
+            ),
+            album.figure(
+                "energies",
+                f"Energies over time and the error of their balance, mass rule {first}.",
+                lambda: plots.plot_energies(trajectory),
+            ),
+            Heading("The numbers"),
+            _table(case_file, results, nodes),
+            Text(
+                f"Computed with Foldyn {trajectory.attrs['foldyn_version']}. The energy error is "
+                "the largest imbalance of kinetic + strain + dissipated energy - work, relative to "
+                "the largest of them. The results carry their own case and can be run again from "
+                "it."
+            ),
+        ]
+        return write_report(album.folder / "report.html", case_file.heading, sections)
+
+
+class _Prepared:
+    """A motion that has been checked."""
+
+    def __init__(self, motion: Any) -> None:
+        self.motion = motion
+
+    def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
+        begun()
+        return self.motion.run(progress)
+
+
+def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: list[int]) -> Table:
+    columns: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
+        "steps": lambda a: a["steps"],
+        "step (s)": lambda a: a["dt"],
+        "critical step (s)": lambda a: (
+            a["critical_step"] if np.isfinite(a["critical_step"]) else None
+        ),
+        "steps per second": lambda a: a["steps"] / max(a["wall_seconds"], 1e-9),
+        "energy error": lambda a: a["energy_error"],
+    }
+    rows = []
+    for rule, result in results.items():
+        moved = result["displacement"].to_numpy()[:, nodes]
+        largest = float(np.linalg.norm(moved, axis=-1).max())
+        rows.append([rule, *(of(result.attrs) for of in columns.values()), largest])
+    shown = ", ".join(map(str, nodes))
+    return Table(
+        ["mass rule", *columns, "largest displacement (m)"],
+        rows,
+        f"{case_file.path.name}: the runs; displacement of nodes {shown}",
+        digits=3,
+    )

@@ -1,0 +1,271 @@
+"""Paths of equilibria: [analysis] of kind "statics", arguments of `trace` and of its settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.path_page import path_page
+from foldyn.analyses.sections import (
+    DIRECTIONS,
+    MOST_SHAPES,
+    Animation,
+    CaseSchema,
+    Count,
+    LoadSection,
+    ModelSection,
+    Nodes,
+    Positive,
+    Section,
+    SupportSection,
+    Whole,
+    check_mass,
+    one_of,
+    refused,
+)
+from foldyn.analyses.start import StoredStart
+from foldyn.cases import Case, resolve_nodes
+from foldyn.cases.supports import AXES, check_axis
+from foldyn.errors import InputError
+from foldyn.statics import METHODS, Point, Settings, trace
+from foldyn.values import indices, number, show
+
+if TYPE_CHECKING:
+    import xarray
+
+SETTINGS = ("tolerance", "largest_turn", "stability")
+"""Keys that are settings of the solver."""
+
+
+def _one_mass(value: Any, info: ValidationInfo) -> list[str]:
+    if isinstance(value, list):
+        raise InputError(
+            f" = {show(value)}: a path is computed once; give one rule, or none: only gravity and "
+            "inertia relief use the mass"
+        )
+    return [check_mass("", value, info)]
+
+
+def _constant(value: Any) -> str | tuple[int, ...]:
+    if value == "gravity":
+        return "gravity"
+    if isinstance(value, str):
+        raise InputError(f' = {show(value)}: give "gravity", or numbers of [[loads]], as in [0]')
+    return indices("", value, "load", 'or "gravity"')
+
+
+def _load_factors(value: Any) -> list[float]:
+    if not isinstance(value, list) or not value:
+        raise InputError(f" = {show(value)}: must be a list of numbers, as in [0, 0.5, 1]")
+    return [number(f"[{i}]", item) for i, item in enumerate(value)]
+
+
+def _shapes(value: Any) -> int | tuple[int, ...]:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= MOST_SHAPES:
+            raise InputError(f" = {value}: give 1 to {MOST_SHAPES} shapes, or a list of points")
+        return value
+    chosen = indices("", value, "point", "or how many shapes to draw")
+    if len(chosen) > MOST_SHAPES:
+        raise InputError(f": {len(chosen)} points; give at most {MOST_SHAPES}")
+    return chosen
+
+
+Timeless = Annotated[
+    Any,
+    refused(
+        "a path has no time; leave it out: what loads and moves the structure grows with the load "
+        "factor (or is named in analysis.constant)"
+    ),
+]
+
+
+class UntilSection(Section):
+    """Where a path ends: a node's displacement along an axis reaches a value."""
+
+    node: Whole
+    axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
+    displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if self.displacement == 0.0:
+            raise InputError(
+                " = 0: the path begins there; give where it shall end", ".displacement"
+            )
+        return self
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Whether a node has reached a displacement, as a function for `until` of `trace`.
+
+    Attributes
+    ----------
+    node : int
+    axis : {"x", "y", "z"}
+    displacement : float
+        Displacement (m) from the rest position, not zero; reached where the node's own is as far
+        from zero on the same side.
+    """
+
+    node: int
+    axis: str
+    displacement: float
+
+    def __call__(self, displacement: NDArray, load_factor: float) -> bool:
+        """Whether it is so for displacements (n, 3), m."""
+        moved = displacement[self.node, AXES.index(self.axis)]
+        return bool(moved / self.displacement >= 1.0)
+
+
+class PathSection(Section):
+    """[analysis] of kind "statics"."""
+
+    kind: str
+    method: Annotated[str, one_of(METHODS)] = "newton"
+    load_factors: Annotated[list[float] | None, PlainValidator(_load_factors)] = None
+    steps: Count | None = None
+    first_step: float | None = None
+    constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
+    until: UntilSection | None = None
+    inertia_relief: bool = False
+    tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
+    largest_turn: Positive = Settings.largest_turn
+    stability: bool = Settings.stability
+
+
+class PathOutput(Section):
+    """[output] of a path: what is shown."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(DIRECTIONS)] = None
+    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 4
+    animation: Animation = "gif"
+
+
+class PathModel(ModelSection):
+    """[model] of a path, with one mass rule at most."""
+
+    mass: Annotated[list[str] | None, PlainValidator(_one_mass)] = None
+
+
+class PathSupport(SupportSection):
+    """One of the [[supports]] of a path: nodes held, or moved with the load factor."""
+
+    base: Annotated[
+        Any,
+        refused(
+            "a base moves over time, and a path has no time; give nodes, axis and displacement "
+            "instead"
+        ),
+    ] = None
+    history: Timeless = None
+
+
+class PathLoad(LoadSection):
+    """One of the [[loads]] of a path, which grow with the load factor."""
+
+    history: Timeless = None
+
+
+class PathSchema(CaseSchema):
+    """A case file of kind "statics"."""
+
+    model: PathModel = PathModel()
+    supports: list[PathSupport] = Field(default_factory=list)
+    loads: list[PathLoad] = Field(default_factory=list)
+    initial: StoredStart | None = None
+    analysis: PathSection
+    output: PathOutput = PathOutput()
+
+
+class PathAnalysis(Analysis):
+    """The path of equilibria under loads and moving supports that grow together."""
+
+    kind = "statics"
+    schema = PathSchema
+    files = (
+        *(f"{name}.png" for name in ("reaction", "curve", "energies", "shapes")),
+        "path.gif", "path.mp4",
+    )  # fmt: skip
+    needs_density = ""
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        given = super().of(schema, case).arguments
+        until = schema.analysis.until
+        if until is not None:
+            resolve_nodes(case.structure, (until.node,), "analysis.until.node")
+            given["until"] = Reached(**until.model_dump())
+        settings = Settings(**{name: given.pop(name) for name in SETTINGS})
+        return cls({**given, "settings": settings})
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`; bad input is refused before the first point, a mechanism for example."""
+        given = {"start": case_file.start(mass).state, **self.arguments, **changes}
+        case = case_file.case(mass)
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            bar = _bar(progress)
+            found = 0
+
+            def tell(point: Point) -> None:
+                nonlocal found
+                if not found:
+                    bar.clear()
+                    begun()
+                found += 1
+                bar.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
+                bar.update()
+
+            try:
+                return trace(case, progress=tell, **given)
+            finally:
+                bar.close()
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """Points, what is special about them, effort."""
+        a, kinds = result.attrs, result["point"].values
+        limits, crossings = int((kinds == "limit").sum()), int((kinds == "bifurcation").sum())
+        special = f" ({counted(limits, 'limit point')}, {counted(crossings, 'bifurcation')})"
+        unstable = f", {a['unstable_points']} of them unstable," if a["unstable_points"] > 0 else ""
+        return (
+            f"  {a['method']}: {counted(result.sizes['step'], 'point')}"
+            f"{special if limits or crossings else ''}{unstable} to the load factor "
+            f"{float(result['load_factor'][-1]):.4g}, {a['newton_iterations']} iterations, "
+            f"{a['wall_seconds']:.1f} s"
+        )
+
+    def shown(self, case: Case) -> NDArray[np.int64]:
+        """Those with a force, else those that supports move, else all that can move."""
+        if not case.loaded_nodes.size and case.imposed.any():
+            return np.flatnonzero(case.imposed.any(axis=1))
+        return super().shown(case)
+
+    def page(
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
+    ) -> Path:
+        """Draw the path; see `Analysis`."""
+        (path,) = results.values()
+        return path_page(case_file, path, folder)
+
+
+def _bar(shown: bool) -> Any:
+    """Bar of points: how many there will be is not known."""
+    from tqdm import tqdm
+
+    layout = "points: {n_fmt}{postfix} [{elapsed}]"
+    bar = tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=not shown)
+    bar.set_postfix_str("first use compiles kernels, up to half a minute")
+    return bar

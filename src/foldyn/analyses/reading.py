@@ -1,0 +1,237 @@
+"""Reading a case file: a TOML text that is checked whole before anything runs."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from foldyn.analyses.casefile import CaseFile, Output
+from foldyn.analyses.conversion import converted, flagged, remodeled
+from foldyn.analyses.limits import check_values
+from foldyn.analyses.messages import describe
+from foldyn.analyses.registry import ANALYSES, schema_of
+from foldyn.analyses.sections import LoadSection, SupportSection
+from foldyn.cases import (
+    Actuate,
+    BaseMotion,
+    Case,
+    Fix,
+    Force,
+    Gravity,
+    Impose,
+    Rayleigh,
+    resolve_nodes,
+)
+from foldyn.cases.decode import call_from
+from foldyn.cases.models import MODELS, SHELL
+from foldyn.cases.supports import Support
+from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.formats import read_pattern
+from foldyn.input_files import from_toml, read_text
+from foldyn.patterns import GENERATORS, Pattern
+from foldyn.structures import Sheet
+
+MOST = 2
+"""Size of a case file (MiB)."""
+
+
+def read_case(
+    path: str | os.PathLike[str], model: str | None = None, divisions: int | None = None
+) -> CaseFile:
+    """Read a case file and check it whole.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file; see the documentation for its keys. Relative paths in it start at its folder.
+    model : {"bars_and_hinges", "shell"}, optional
+        Model instead of that of the file. Creases, supports, loads and output stay; what means
+        nothing to the other model is left out: keys of [model] that it does not have, the mass
+        rules, and for a shell an explicit method with its step, and a secant amplitude.
+    divisions : int, optional
+        Pieces of every edge of a shell, instead of those of the file.
+
+    Returns
+    -------
+    CaseFile
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or anything in it cannot be used; the message names the file, the
+        key, the value and what to do.
+    """
+    path = Path(path)
+    document = read_document(path)
+    if model is not None or divisions is not None:
+        validated(path, document)
+        with within("", path):
+            document = remodeled(document, model, divisions)
+    return case_of_document(path, document)
+
+
+def read_as(
+    path: Path,
+    kind: str,
+    flags: Mapping[str, Any],
+    model: str | None = None,
+    divisions: int | None = None,
+) -> CaseFile:
+    """Read a case file of any kind as one of modes or of a frequency response.
+
+    Parameters
+    ----------
+    path : Path
+    kind : {"modes", "frf"}
+    flags : mapping
+        Keys of [analysis] that the command line gives instead of the file; `state` may be a
+        result's file, too.
+    model, divisions
+        As of `read_case`.
+
+    Warns
+    -----
+    FoldynWarning
+        Loads, motions of the base or a start have no place there, and are left out.
+    """
+    document = read_document(path)
+    flags = {key: value for key, value in flags.items() if value is not None}
+    own = schema_of(document) is ANALYSES[kind].schema
+    if not own or not flags:  # else flags may give what is missing
+        validated(path, document)
+    with within("", path):
+        document = remodeled(document, model, divisions)
+    if not own:
+        document = converted(path, document, kind, flags.get("state", "rest"))
+    if kind == "frf" and not {"frequencies"} & {*flags, *document["analysis"]}:
+        raise InputError("at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)", "", path)
+    return case_of_document(path, flagged(document, flags))
+
+
+def validated(path: Path, document: Mapping[str, Any]) -> Any:
+    """Sections of a case file, checked one by one and with each other."""
+    shape: Any = schema_of(document)
+    try:
+        return shape.model_validate(document, context={"folder": path.parent})
+    except ValidationError as error:
+        shapes = {kind: analysis.schema for kind, analysis in ANALYSES.items()}
+        raise InputError(describe(error, shape, shapes), "", path) from None
+
+
+def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
+    """Check what a case file says and make its cases; see `read_case`."""
+    schema = validated(path, document)
+    model = MODELS[schema.model.kind]
+    masses = list(schema.model.mass or [model.mass])
+    cases: dict[str, Case] = {}
+    with within("", path):
+        pattern = _pattern(schema.pattern, path.parent)
+        sheet = Sheet(**schema.sheet.model_dump())
+        kind = ANALYSES[schema.analysis.kind]
+        if sheet.density is None and kind.needs_density:
+            raise InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density")
+        if schema.model.kind == SHELL:
+            _check_vertices(schema, len(pattern.vertices))
+        with within("damping."):
+            damping = Rayleigh(**schema.damping.model_dump())
+        supports = []
+        for i, item in enumerate(schema.supports):
+            with within(f"supports[{i}]."):
+                supports.append(_support(item))
+        loads = [_load(item) for item in schema.loads]
+
+    def make(mass: str) -> Case:
+        """Make the case with one mass rule."""
+        with within("model: ", path):
+            structure = model.make(pattern, sheet, mass=mass, **schema.model.options)
+            if sheet.density is not None:
+                _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
+        with within("", path):
+            return Case(structure, supports, loads, damping)
+
+    cases[masses[0]] = case = make(masses[0])
+    with warnings.catch_warnings():  # the other rules would only repeat them
+        warnings.simplefilter("ignore", FoldynWarning)
+        cases |= {mass: make(mass) for mass in masses[1:]}
+    with within("", path):
+        analysis = kind.of(schema, case)
+        chosen = schema.output.nodes
+        nodes = (
+            analysis.shown(case)
+            if chosen is None
+            else resolve_nodes(case.structure, chosen, "output.nodes")
+        )
+    shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
+    found = CaseFile(
+        path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
+        Output(nodes, chosen is not None, **shown), schema, make, cases,
+    )  # fmt: skip
+    start = getattr(schema, "initial", None)
+    if start is not None and start.file is None:
+        for mass in masses:
+            found.start(mass)  # a support may hold what the rigid motion moves
+    return found
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Read what a case file says, unchecked."""
+    text = read_text(path, "a case file (TOML)", MOST, "put long tables into files of their own")
+    with within("", path):
+        document = from_toml(text)
+        check_values(document)
+    return document
+
+
+def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
+    if "kind" in table:
+        arguments = {name: value for name, value in table.items() if name != "kind"}
+        with within("pattern"):
+            return call_from(GENERATORS[table["kind"]], arguments)
+    if "file" in table:
+        with within(f'pattern.file = "{table["file"]}": '):
+            return read_pattern(folder / table["file"])
+    with within("pattern: "):
+        return Pattern(table["vertices"], table["faces"], table.get("assignments"))
+
+
+def _check_vertices(schema: Any, count: int) -> None:
+    """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
+    places = {f"supports[{i}].nodes": item.nodes for i, item in enumerate(schema.supports)}
+    places |= {f"loads[{i}].nodes": item.nodes for i, item in enumerate(schema.loads)}
+    drive = getattr(schema, "drive", None) or []
+    places |= {f"drive[{i}].nodes": item.nodes for i, item in enumerate(drive)}
+    until = getattr(schema.analysis, "until", None)
+    places |= {} if until is None else {"analysis.until.node": (until.node,)}
+    places["output.nodes"] = schema.output.nodes
+    for place, nodes in places.items():
+        if nodes is None or isinstance(nodes, str):
+            continue
+        beyond = [node for node in nodes if not 0 <= node < count]
+        if beyond:
+            raise InputError(
+                f": {beyond[0]} is no vertex of the pattern, which has 0 to {count - 1}; a case "
+                "file names nodes of a shell by vertex, whatever its divisions",
+                place,
+            )
+
+
+def _support(item: SupportSection) -> Support:
+    if item.base is not None:
+        value = 1.0 if item.displacement is None else item.displacement
+        return BaseMotion(item.base, item.history, value)
+    if item.axis is not None:
+        return Impose(item.nodes, item.axis, item.displacement, item.history)
+    return Fix(item.nodes, item.axes)
+
+
+def _load(item: LoadSection) -> Force | Gravity | Actuate:
+    if item.gravity is not None:
+        return Gravity(item.gravity, item.history)
+    if item.creases is not None:
+        return Actuate(item.creases, item.angle, item.history)
+    return Force(item.nodes, item.force, item.history)

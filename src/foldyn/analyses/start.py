@@ -1,0 +1,128 @@
+"""How a motion or path starts, or about what modes swing, as a case file says it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+from pydantic import PlainValidator, model_validator
+
+from foldyn.analyses.sections import Section, Vector, Whole
+from foldyn.cases import Case, State
+from foldyn.cases.supports import AXES
+from foldyn.dynamics import initial_state
+from foldyn.errors import InputError, within
+from foldyn.results import load
+from foldyn.results.contents import check_variable
+from foldyn.values import show
+
+TOLERANCE = 1e-9
+"""Velocity of a supported node, relative to the largest, that counts as rounding."""
+
+
+def _result_file(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f" = {show(value)}: must be the path of a result, as result.nc")
+    return value
+
+
+class StoredStart(Section):
+    """[initial]: a state of a stored result."""
+
+    file: Annotated[str, PlainValidator(_result_file)]
+    at: Whole = -1
+
+
+class MotionStart(Section):
+    """[initial] of a motion: a rigid motion, or a stored state."""
+
+    velocity: Vector = None
+    spin: Vector = None
+    file: Annotated[Any, PlainValidator(_result_file)] = None
+    at: Whole = -1
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = self.model_fields_set
+        rigid = sorted(given & {"velocity", "spin"})
+        if not given:
+            raise InputError(": give velocity or spin or both, or file (a result)")
+        if "file" in given and rigid:
+            raise InputError(
+                f": holds the velocities too; leave out {' and '.join(reversed(rigid))}", ".file"
+            )
+        if "at" in given and "file" not in given:
+            raise InputError(": is the number of a sample of a result; give file too", ".at")
+        return self
+
+
+class Start(NamedTuple):
+    """A state, and of a stored one how far its folds are folded, if it says so."""
+
+    state: State | None = None  # rest
+    load_factor: float | None = None
+
+
+def start_of(section: MotionStart | StoredStart | None, case: Case, folder: Path) -> Start:
+    """What a case starts from.
+
+    Raises
+    ------
+    InputError
+        A support holds a node that the rigid motion moves; the result cannot be read or has other
+        nodes. The field is inside `initial`.
+    """
+    if section is None:
+        return Start()
+    if section.file is None:
+        assert isinstance(section, MotionStart)
+        return Start(_rigid_motion(case, section))
+    return _stored(section, case, folder)
+
+
+def _stored(section: MotionStart | StoredStart, case: Case, folder: Path) -> Start:
+    said = f"file = {show(section.file)}: "
+    with within(said):
+        result = load(folder / section.file)
+    try:
+        state = initial_state(result, section.at)
+    except InputError as error:
+        raise error.within("" if error.key == "at" else said) from None
+    wanted = len(case.structure.nodes)
+    for array in (state.displacement, state.velocity):
+        if array is not None and len(np.asarray(array)) != wanted:
+            raise InputError(
+                f"holds a motion of {len(np.asarray(array))} nodes, but this structure has "
+                f"{wanted}; give a result of the same pattern and model",
+                said,
+            )
+    if "load_factor" not in result:
+        return Start(state)
+    return Start(state, float(check_variable(result, "load_factor", ("step",))[section.at]))
+
+
+def _rigid_motion(case: Case, start: MotionStart) -> State:
+    """State at rest in shape, with the velocities of a rigid body.
+
+    v = velocity + spin x (x - center), with the center of the nodes' masses at rest.
+    """
+    x = case.structure.nodes
+    mass = np.asarray(case.structure.mass.sum(axis=1)).ravel()
+    arm = x - mass @ x / mass.sum()
+    velocity = np.array(start.velocity or (0.0, 0.0, 0.0)) + np.cross(start.spin or (0, 0, 0), arm)
+    speed = np.abs(velocity)
+    held = np.argwhere(case.fixed & (speed > TOLERANCE * speed.max()))
+    if held.size:
+        node, axis = held[0].tolist()
+        given = " and ".join(
+            f"{name} = {show(value)}"
+            for name, value in (("velocity", start.velocity), ("spin", start.spin))
+            if value is not None
+        )
+        raise InputError(
+            f"{given}: moves node {node} along {AXES[axis]} with {velocity[node, axis]:.4g} m/s, "
+            "where a support holds it; free this node, or start from another motion"
+        )
+    velocity[case.fixed] = 0.0
+    return State(velocity=velocity)

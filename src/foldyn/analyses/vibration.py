@@ -1,0 +1,114 @@
+"""What modes and frequency responses share: one state, about which structures swing.
+
+Supports and loads are preloads, which act in full in its equilibrium and have no history.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from foldyn.analyses.casefile import CaseFile
+from foldyn.analyses.sections import CaseSchema, LoadSection, SupportSection, one_of, refused
+from foldyn.analyses.start import StoredStart
+from foldyn.cases.models import SHELL
+from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.values import show
+
+STATES = ("rest", "equilibrium")
+"""States about which a case file may have its structure vibrate, beside a stored one."""
+About = Annotated[str, one_of(STATES)]
+Timeless = Annotated[
+    Any,
+    refused(
+        "small vibrations are about one state, in which loads and displacements act in full; leave "
+        "it out"
+    ),
+]
+
+
+class VibrationSupport(SupportSection):
+    """One of the [[supports]] of small vibrations: nodes held, at rest or where they were moved."""
+
+    base: Annotated[
+        Any,
+        refused(
+            "a base moves over time, and small vibrations are about one state; leave it out (what "
+            'a moving base does: analysis.kind = "frf" with [[drive]] and base)'
+        ),
+    ] = None
+    history: Timeless = None
+
+
+class VibrationLoad(LoadSection):
+    """One of the [[loads]] of small vibrations, which act in full in their state."""
+
+    history: Timeless = None
+
+
+class VibrationSchema(CaseSchema):
+    """What case files of small vibrations share."""
+
+    supports: list[VibrationSupport] = Field(default_factory=list)
+    loads: list[VibrationLoad] = Field(default_factory=list)
+    initial: StoredStart | None = None
+    analysis: Any
+
+    @model_validator(mode="after")
+    def _knows_the_model(self) -> Self:
+        if self.model.kind == SHELL and "secant" in self.analysis.model_fields_set:
+            raise InputError(
+                f" = {show(self.analysis.secant)}: is for superlinear bends, and a shell has none; "
+                "leave it out",
+                "analysis.secant",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _has_one_state(self) -> Self:
+        stated = "state" in self.analysis.model_fields_set
+        if self.initial is not None and stated:
+            raise InputError(
+                f" = {show(self.analysis.state)}: the state is that of initial.file; leave out one "
+                "of the two",
+                "analysis.state",
+            )
+        if self.initial is not None or self.analysis.state != "rest":
+            return self
+        remedy = 'write state = "equilibrium" under [analysis], or leave it out'
+        if self.loads:
+            raise InputError(f": does not act in the state of rest; {remedy}", "loads[0]")
+        for i, support in enumerate(self.supports):
+            if support.axis is not None:
+                raise InputError(
+                    f": moves nothing in the state of rest; {remedy}, or hold its nodes by axes",
+                    f"supports[{i}]",
+                )
+        return self
+
+
+def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
+    """Arguments for the stored state that a case file names; none where it names none."""
+    start = case_file.start(mass)
+    found = {"state": start.state, "load_factor": start.load_factor}
+    return {key: value for key, value in found.items() if value is not None}
+
+
+@contextmanager
+def bar_closed(bar: Any) -> Iterator[Any]:
+    """Close a bar in the end.
+
+    What a search for the equilibrium or a simulated motion has come to is no result of this kind,
+    and is not kept.
+    """
+    try:
+        yield bar
+    except ComputationError as error:
+        raise ComputationError(str(error)) from None
+    except MotionInterrupted as stop:
+        raise KeyboardInterrupt(str(stop)) from None
+    finally:
+        bar.close()
