@@ -118,7 +118,7 @@ class _Writer:
             "supports": [self._part(support) for support in case.supports],
             "loads": [self._part(load) for load in case.loads],
         }
-        if not self.obstacles and not _same(structure, _structure(_resolve(sections, self.arrays))):
+        if not self.obstacles and not structure.as_made:
             self.obstacles.append(
                 "its structure differs from what discretize makes of its pattern, sheet and options"
             )
@@ -259,16 +259,6 @@ def _structure(sections: Mapping[str, Any]) -> Any:
             centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two structures hold the same arrays."""
-    for item in dataclasses.fields(one):
-        first, second = getattr(one, item.name), getattr(other, item.name)
-        arrays = isinstance(first, np.ndarray) or isinstance(second, np.ndarray)
-        if arrays and not np.array_equal(first, second):
-            return False
-    return True
 
 
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
