@@ -39,7 +39,7 @@ class FoldynEngine:
         The loop evaluates the force once more at its end; that part is taken off.
         """
         case, packed, dt = self.problem.case, self.packed, self.problem.dt
-        plan = Plan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0)
+        plan = Plan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0, 0.0, np.zeros(0))
         start = self.problem.start[self._back]
         course = begin(case, start, np.zeros_like(start), plan, packed)
         course.tally.samples = 1  # so that no step is due for a sample

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import pytest
 from frf_structures import chain, chain_modes, chain_response, largest_error, miura_case
@@ -25,6 +27,24 @@ def error_of(method, case=None, **options) -> float:
     found = frf(case or chain(**DAMPING), PUSH, F, method=method, **options)
     exact = chain_response(F, **DAMPING)[:, :, 0]
     return largest_error(found.receptance.values[:, 1:, 0], exact)
+
+
+def test_simulated_motions_write_no_document_and_discretize_nothing(monkeypatch):
+    """The response alone carries the case, whose structure is known to be made again."""
+    case, calls = miura_case(alpha=2.0), []
+    for module, name in (
+        ("foldyn.structures.discretize", "n5b8"),
+        ("foldyn.results.dataset", "to_document"),
+    ):
+        home = importlib.import_module(module)
+        function = getattr(home, name)
+        monkeypatch.setattr(
+            home, name, lambda *given, f=function, n=name: calls.append(n) or f(*given)
+        )
+    drive = fd.Force([7], (1e-6, 0, 0))
+    found = frf(case, drive, [1.0, 2.0], method="stepped_sine", settled=0.5)
+    assert calls == ["to_document"]
+    assert found.attrs["rerunnable"] == 1
 
 
 # ------------------------------------------------------------------------ linear structures

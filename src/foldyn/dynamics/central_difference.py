@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import DONE, observe, tell
+from foldyn.dynamics.course import Outcome, observe, tell
 from foldyn.dynamics.system import acceleration
 from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
@@ -60,7 +60,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
         found, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
-        if found != DONE:
+        if found != Outcome.DONE:
             return found, hinge
     for step in range(begun + 1, end + 1):
         for i in range(u.size):
@@ -80,6 +80,6 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if team.number == 0:
             course.tally.evaluations += 1
         found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-        if found != DONE:
+        if found != Outcome.DONE:
             return found, hinge
-    return DONE, -1
+    return Outcome.DONE, -1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,17 @@ from foldyn.dynamics.system import record
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics import largest, part, total, wait
 
-# How a stretch of steps ended. FULL: no room for another sample; STUCK: the error asks for a step
-# that time cannot resolve; NOT_CONVERGED: an implicit step was not solved, however small.
-DONE, NOT_FINITE, PENETRATION, FULL, STUCK, NOT_CONVERGED = range(6)
+
+class Outcome(IntEnum):
+    """How a stretch of compiled steps ended."""
+
+    DONE = 0
+    NOT_FINITE = 1
+    PENETRATION = 2
+    FULL = 3  # no room for another sample
+    STUCK = 4  # the error asks for a step that time cannot resolve
+    NOT_CONVERGED = 5  # the equations of an implicit step were not solved, however small the step
+
 
 WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
 
@@ -32,29 +41,17 @@ class Plan(NamedTuple):
     stops: NDArray  # times (s) in order at which steps that vary end: knots of the histories
 
 
-# What is counted and measured along a motion
+# What is counted along a motion: steps done, samples written, steps refused, force evaluations
+COUNTED = ("steps", "samples", "refused", "evaluations")
+# What is measured: work of the loads and energy dissipated (J), their powers at the last step (W);
+# the time reached, and of steps that vary the next one wanted, the last, shortest and longest (s);
+# the last one's error over the tolerance; the largest displacement (m) and velocity (m/s) so far
+MEASURED = (
+    "work", "dissipated", "power_in", "power_out", "time", "wanted", "last", "shortest", "longest",
+    "error", "farthest", "fastest",
+)  # fmt: skip
 TALLY = np.dtype(
-    (
-        np.record,
-        [
-            ("steps", np.int64),  # done
-            ("samples", np.int64),  # written
-            ("refused", np.int64),  # steps whose error was too large
-            ("evaluations", np.int64),  # of the force
-            ("work", float),  # of the loads, J
-            ("dissipated", float),  # J
-            ("power_in", float),  # at the last step, W
-            ("power_out", float),
-            ("time", float),  # reached, s
-            ("wanted", float),  # next step, and the others of methods whose steps vary, s
-            ("last", float),
-            ("shortest", float),
-            ("longest", float),
-            ("error", float),  # of the last step over the tolerance
-            ("farthest", float),  # largest displacement so far, m
-            ("fastest", float),  # largest velocity so far, m/s
-        ],
-    )
+    (np.record, [(n, np.int64) for n in COUNTED] + [(n, np.float64) for n in MEASURED])
 )
 
 
@@ -117,9 +114,9 @@ def sample(model, system, mass, u, v, a, t, course, out, work, s):
         out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
     if not np.isfinite(out.energy[k].sum()):
-        return NOT_FINITE
+        return Outcome.NOT_FINITE
     course.tally.samples += 1
-    return DONE
+    return Outcome.DONE
 
 
 @scalar
@@ -151,13 +148,13 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         tally.dissipated += total(team, DISSIPATED)
         tally.time = t
         tally.steps = step
-        found = DONE
+        found = Outcome.DONE
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
             found = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
-        team.note[0, FOUND] = found
+        team.note[0, FOUND] = found + 0  # as a number
     wait(team)
     if wrong > 0.0:
-        return NOT_FINITE, -1
+        return Outcome.NOT_FINITE, -1
     if hinge >= 0:
-        return PENETRATION, hinge
+        return Outcome.PENETRATION, hinge
     return int(team.note[0, FOUND]), -1

@@ -77,7 +77,8 @@ def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
         return 0.0, 0.0
     carried = moving_energy(moved_mass, before) + moving_energy(moved_mass, after)
     carried *= damping.alpha * h
-    return carried, h * drag_power(damping, kinetic_energy(mass, velocity, product)) + carried
+    taken = 2.0 * damping.alpha * h * kinetic_energy(mass, velocity, product)
+    return carried, taken + carried
 
 
 @scalar

@@ -10,15 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import (
-    DONE,
-    FULL,
-    NOT_FINITE,
-    PENETRATION,
-    STUCK,
-    passed_through,
-    sample,
-)
+from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
 from foldyn.jit.borrow import borrowed
@@ -161,7 +153,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             found = sample(
                 model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
             )
-            if found != DONE:
+            if found != Outcome.DONE:
                 return found, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
@@ -182,7 +174,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             h = goal - t
         stops = stops and h == goal - t
         if h < SMALLEST * max(abs(plan.end), abs(t)):
-            return STUCK, -1
+            return Outcome.STUCK, -1
         for stage in range(1, 7):
             _combine(u, speeds, A[stage], h, stage, fut)
             _combine(v, accelerations, A[stage], h, stage, fvt)
@@ -205,7 +197,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.wanted = 0.2 * h
             tally.refused += 1
             if tally.wanted < SMALLEST * max(abs(plan.end), abs(t)):
-                return NOT_FINITE, -1
+                return Outcome.NOT_FINITE, -1
             continue
         factor = 5.0 if error == 0.0 else 0.9 * error**-0.17 * tally.error**0.04
         if error > 1.0:
@@ -214,7 +206,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             continue
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
-            return PENETRATION, hinge
+            return Outcome.PENETRATION, hinge
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
@@ -229,7 +221,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             acceleration(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
             found = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
-            if found != DONE:
+            if found != Outcome.DONE:
                 return found, -1
             due = plan.start + tally.samples * plan.interval
         tally.work = _integral(begun[0], powers[0], h, A[6], 6)
@@ -255,10 +247,10 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
             tally.evaluations += 1
             found = sample(model, system, mass, course.u, course.v, a, after, course, out, work, s)
-            if found != DONE:
+            if found != Outcome.DONE:
                 return found, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
     for i in range(n):
         flat(course.carry)[i] = accelerations[0, i]
     full = plan.every > 0 and tally.samples == out.time.size and tally.time < plan.end
-    return (FULL if full else DONE), -1
+    return (Outcome.FULL if full else Outcome.DONE), -1

@@ -11,7 +11,6 @@ from foldyn.dynamics import (
     dormand_prince,
     energy_momentum,
     generalized_alpha,
-    newmark,
     resolution,
     rk4,
 )
@@ -89,7 +88,13 @@ METHODS: Mapping[str, Method] = {
             dormand_prince.growth,
             adaptive=True,
         ),
-        Method("newmark", newmark.ORDER, residual, scheme=newmark.scheme, massless=True),
+        Method(
+            "newmark",
+            generalized_alpha.ORDER,
+            residual,
+            scheme=generalized_alpha.newmark,
+            massless=True,
+        ),
         Method(
             "generalized_alpha",
             generalized_alpha.ORDER,

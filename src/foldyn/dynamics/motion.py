@@ -12,17 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.dynamics.audit import Rounding, audited, energy_error, energy_scale
-from foldyn.dynamics.course import (
-    DONE,
-    FULL,
-    NOT_CONVERGED,
-    PENETRATION,
-    STUCK,
-    Course,
-    Plan,
-    Samples,
-    samples,
-)  # fmt: skip
+from foldyn.dynamics.course import Course, Outcome, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.methods import Method
@@ -71,9 +61,16 @@ class Motion:
 
     def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """Integrate the motion; see `simulate`."""
+        self.samples(progress)
+        return self._dataset()
+
+    def samples(self, progress: bool | Reporter | None = None) -> Samples:
+        """Integrate the motion; its samples alone, which do not carry the case."""
         self._course, self._out = self._begin(), self._room(self.expected_samples)
         self._integrate(*reporter(progress))
-        return self._finish()
+        if told := self._doubts(self._audit()):
+            warnings.warn(told, FoldynWarning, stacklevel=3)
+        return self._written()
 
     def _room(self, count: int) -> Samples:
         structure = self.case.structure
@@ -100,9 +97,9 @@ class Motion:
                 self.seconds = time.perf_counter() - began
                 if callbacks.error is not None:
                     self._raise(callbacks.error)
-                if code == FULL:
+                if code == Outcome.FULL:
                     self._out = _enlarged(self._out)
-                elif code != DONE:
+                elif code != Outcome.DONE:
                     self._fail(code, hinge)
                 step, now = int(course.tally.steps), float(course.tally.time)
                 ended = step == plan.steps if plan.steps else now >= plan.end
@@ -189,7 +186,7 @@ class Motion:
             )
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
-        if code == PENETRATION:
+        if code == Outcome.PENETRATION:
             j, k, i, l = order[model.hinges[hinge]].tolist()  # noqa: E741
             raise PenetrationError(
                 f"at {moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
@@ -197,13 +194,13 @@ class Motion:
                 "smaller step keeps panels apart",
                 self._dataset(),
             )
-        if code == STUCK:
+        if code == Outcome.STUCK:
             raise InstabilityError(
                 f"at {moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps "
                 "too often, or the motion is too violent; raise the tolerance, or use rk4",
                 self._dataset(),
             )
-        if code == NOT_CONVERGED:
+        if code == Outcome.NOT_CONVERGED:
             raise InstabilityError(
                 f"at {moment} no end of a step was found that is in equilibrium, however small the "
                 "step: a mass or a stiffness may be missing, or the motion is too violent",
@@ -221,14 +218,17 @@ class Motion:
 
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
-        plan, n, out = self.plan, self.stored, self._out
+        out = self._written()
         energies: dict[str, NDArray] = dict(
-            zip(audited(self.case.structure.energy_groups), out.energy[:n].T, strict=True)
+            zip(audited(self.case.structure.energy_groups), out.energy.T, strict=True)
         )
         return trajectory_dataset(
-            self.case, out.time[:n], out.displacement[:n], out.velocity[:n], out.reaction[:n],
-            energies, self._statistics(plan),
+            self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
+            self._statistics(self.plan),
         )  # fmt: skip
+
+    def _written(self) -> Samples:
+        return Samples(*(array[: self.stored] for array in self._out))
 
     def _statistics(self, plan: Plan) -> dict[str, Any]:
         tally = self._course.tally
@@ -267,13 +267,6 @@ class Motion:
             return 0.0
         scale = energy_scale(energy)
         return float(np.abs(energy_error(energy)).max() / scale) if scale > 0.0 else 0.0
-
-    def _finish(self) -> xarray.Dataset:
-        """Dataset of the whole motion; warns where its energy balance is poor, or tells nothing."""
-        told = self._doubts(self._audit())
-        if told:
-            warnings.warn(told, FoldynWarning, stacklevel=3)
-        return self._dataset()
 
     def _doubts(self, error: float) -> str:
         """What to say of a motion with a relative energy error; empty where nothing."""

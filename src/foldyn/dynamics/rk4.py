@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import DONE, observe, tell
+from foldyn.dynamics.course import Outcome, observe, tell
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
 from foldyn.jit.borrow import borrowed
@@ -56,7 +56,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
                 found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-                if found != DONE or step == end:
+                if found != Outcome.DONE or step == end:
                     return found, hinge
                 for i in range(u.size):
                     du[i], dv[i] = vt[i], fa[i]
@@ -78,4 +78,4 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tell(team, dt / 6.0 * work_in, dt / 6.0 * work_out, wrong)
         if team.number == 0:
             course.tally.evaluations += 4
-    return DONE, -1
+    return Outcome.DONE, -1

@@ -23,7 +23,7 @@ from foldyn.cases import (
     resolve_nodes,
 )
 from foldyn.cases.supports import AXES, Support
-from foldyn.dynamics import METHODS, Progress, simulate
+from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.equilibrium import Station
 from foldyn.linear.excitation import Drive
@@ -115,16 +115,11 @@ class Rig:
         """Times, response (nt, n, 3) less the state, and the state at the end of a motion."""
         how = self.integration
         dt = None if how.dt is None else every / math.ceil(every / how.dt * (1.0 - 1e-12))
-        motion = simulate(
+        time, displacement, velocity, _, _ = prepare(
             self.driven(history), duration, self.integrator, dt, every,
-            initial or State(self.state), tolerance=how.tolerance, start=start, progress=progress,
-        )  # fmt: skip
-        displacement, velocity = motion["displacement"].values, motion["velocity"].values
-        return (
-            motion["time"].values,
-            displacement - self.state,
-            State(displacement[-1], velocity[-1]),
-        )
+            initial or State(self.state), tolerance=how.tolerance, start=start,
+        ).samples(progress)  # fmt: skip
+        return time, displacement - self.state, State(displacement[-1], velocity[-1])
 
 
 def forces(vectors: NDArray, history: History | None = None) -> list[Force]:

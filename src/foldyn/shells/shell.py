@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import ClassVar
 
@@ -69,6 +69,8 @@ class Shell:
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
         What it was made of.
+    as_made : bool
+        Whether `shell` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -80,6 +82,7 @@ class Shell:
     pattern: Pattern
     sheet: Sheet
     options: ShellOptions
+    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -370,7 +373,7 @@ def shell(
         if (stiffness < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
     rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
-    return Shell(
+    made = Shell(
         nodes=x,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
@@ -381,6 +384,8 @@ def shell(
         sheet=sheet,
         options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
     )
+    object.__setattr__(made, "as_made", True)
+    return made
 
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:

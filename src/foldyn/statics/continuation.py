@@ -46,7 +46,7 @@ def follow(
     solver, start
         Where the path begins.
     rule : ArcRule
-        That of a method, such as `arc_length.Cylinder`.
+        That of a method, such as `arc_rules.Cylinder`.
     first_step : float
         Change of the load factor in the first step; the next steps are as long.
     direction : (m,) or None

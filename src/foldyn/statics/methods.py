@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from foldyn.errors import InputError
-from foldyn.statics.arc_length import Cylinder
+from foldyn.statics.arc_rules import Cylinder, Plane
 from foldyn.statics.continuation import ArcRule
-from foldyn.statics.mgdcm import Plane
 
 
 class Method(NamedTuple):

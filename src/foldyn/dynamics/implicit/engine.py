@@ -15,18 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
-from foldyn.dynamics.course import (
-    DONE,
-    FULL,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    PENETRATION,
-    STUCK,
-    Course,
-    Plan,
-    Samples,
-    sample,
-)  # fmt: skip
+from foldyn.dynamics.course import Course, Outcome, Plan, Samples, sample
 from foldyn.dynamics.implicit import convergence
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
 from foldyn.dynamics.implicit.horizon import horizon
@@ -85,7 +74,7 @@ class Implicit:
     def _advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
         if self._newton is None:
             found = self._begin(course, plan, out)
-            if found != DONE:
+            if found != Outcome.DONE:
                 return found, -1
         newton = self._newton
         assert newton is not None
@@ -94,12 +83,12 @@ class Implicit:
         end = min(last, plan.steps) if plan.steps else last
         while course.tally.steps < end and (plan.steps or course.tally.time < plan.end):
             if plan.every and not plan.steps and course.tally.samples == len(out.time):
-                return FULL, -1
+                return Outcome.FULL, -1
             found, hinge = advance(newton, course, plan, out)
             course.tally.evaluations = newton.evaluations
-            if found != DONE:
+            if found != Outcome.DONE:
                 return found, hinge
-        return DONE, -1
+        return Outcome.DONE, -1
 
     def _begin(self, course: Course, plan: Plan, out: Samples) -> int:
         bench = Bench(self._packed, course)
@@ -130,7 +119,7 @@ class Implicit:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = _divide(t, goal, h, jump)
             found, hinge = self._attempt(newton, part, stop, jump)
-            if found == DONE:
+            if found == Outcome.DONE:
                 self._accept(newton, course, part, stop, jump)
                 t = stop
                 continue
@@ -142,7 +131,7 @@ class Implicit:
         course.tally.steps, course.tally.time = step, end
         if step % plan.every == 0:
             return self._note(newton, course, end, out), -1
-        return DONE, -1
+        return Outcome.DONE, -1
 
     def _adaptive(
         self, newton: Newton, course: Course, plan: Plan, out: Samples
@@ -154,12 +143,12 @@ class Implicit:
         while True:
             wanted = min(float(tally.wanted), plan.dt)
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
-                return STUCK, -1
+                return Outcome.STUCK, -1
             near = SAME_TIME * wanted
             goal, jump = self._next_jump(t, _next_stop(plan, t, due, near), near)
             h, end, jump = _divide(t, goal, wanted, jump)
             found, hinge = self._attempt(newton, h, end, jump)
-            if found != DONE:
+            if found != Outcome.DONE:
                 if self._hopeless(h, plan.dt):
                     return found, hinge
                 tally.wanted = 0.5 * h
@@ -179,7 +168,7 @@ class Implicit:
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         if tally.steps % plan.every == 0 if plan.every else waits and end == due:
             return self._note(newton, course, end, out), -1
-        return DONE, -1
+        return Outcome.DONE, -1
 
     def _due(self, plan: Plan, course: Course, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps end, and whether a sample waits there."""
@@ -205,13 +194,15 @@ class Implicit:
         bench.predict(h)
         found = newton.solve(h, end if jump is None else math.nextafter(min(end, jump), -math.inf))
         if self._packed.callbacks.error is not None:
-            return NOT_FINITE, -1
+            return Outcome.NOT_FINITE, -1
         turned = np.abs(bench.work.angle - bench.course.angle)
         if turned.max(initial=0.0) > TURN:
-            return PENETRATION, int(turned.argmax())
+            return Outcome.PENETRATION, int(turned.argmax())
         if found == convergence.SOLVED:
-            return DONE, -1
-        return (NOT_FINITE if found == convergence.NOT_FINITE else NOT_CONVERGED), -1
+            return Outcome.DONE, -1
+        return (
+            Outcome.NOT_FINITE if found == convergence.NOT_FINITE else Outcome.NOT_CONVERGED
+        ), -1
 
     def _hopeless(self, h: float, wanted: float) -> bool:
         """Whether a smaller step would not help either."""
