@@ -53,6 +53,7 @@ _HOME = {
     "save": "results",
     "load": "results",
     "case_of": "results",
+    "Quantity": "results",
     "trace": "statics",
     "switch_branch": "statics",
     "modes": "linear",
@@ -98,7 +99,7 @@ if TYPE_CHECKING:
     from foldyn.linear import frf, mac, modes
     from foldyn.materials import BarLaw, CustomBarLaw, CustomHingeLaw, EnhancedLinear, HingeLaw
     from foldyn.patterns import Pattern
-    from foldyn.results import case_of, load, save
+    from foldyn.results import Quantity, case_of, load, save
     from foldyn.shells import Shell, shell
     from foldyn.statics import landscape, switch_branch, trace
     from foldyn.structures import Sheet, Structure, discretize

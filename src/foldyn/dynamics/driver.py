@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -21,6 +22,7 @@ from foldyn.dynamics.methods import Method, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
+from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
@@ -32,6 +34,7 @@ from foldyn.dynamics.timing import (
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.results import Quantity
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -60,6 +63,7 @@ def simulate(
     start: float = 0.0,
     progress: bool | Reporter | None = None,
     spectral_radius: float | None = None,
+    sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
 
@@ -88,6 +92,10 @@ def simulate(
         when a stored motion is continued.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` several times a second.
+    sample : mapping of str to callable or Quantity, optional
+        Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
+        m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,
+        function)` with its unit, meaning and dimensions. They are evaluated at every sample.
 
     Returns
     -------
@@ -102,6 +110,8 @@ def simulate(
     ------
     InputError
         An argument out of range, a step above the critical one, a free node without mass.
+    ComputationError
+        A function of `sample` failed, or gave another shape or no finite numbers, after the start.
     InstabilityError, PenetrationError
         The motion grew without bound or became NaN; panel passed through panel. What was
         computed until then is in the exception's `partial`.
@@ -118,7 +128,7 @@ def simulate(
     initial displacement.
     """
     motion = prepare(
-        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius
+        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius, sample
     )
     return motion.run(progress)
 
@@ -134,6 +144,7 @@ def prepare(
     tolerance: float | None = None,
     start: float = 0.0,
     spectral_radius: float | None = None,
+    sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
 ) -> Motion:
     """Check everything that `simulate` checks and choose the step, without computing a motion.
 
@@ -197,7 +208,8 @@ def prepare(
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u)
     beginning = partial(begin, case, u, v, plan, packed)
-    return Motion(case, integrator, plan, critical, force, beginning, packed, reason)
+    sampler = Sampler(case, sample or {}, u, v, plan.start)
+    return Motion(case, integrator, plan, critical, force, beginning, packed, sampler, reason)
 
 
 def _with_radius(method: Method, spectral_radius: float | None) -> Method:

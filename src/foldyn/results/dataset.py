@@ -22,6 +22,11 @@ FORMAT = 1
 
 AXIS = np.array(["x", "y", "z"])
 
+TAKEN = frozenset(
+    {*MOTION, "time", "node", "axis", "support", "support_node", "support_axis", "case"}
+    | {"rest_position", "vertices", "faces", "face_offsets", "assignments"}
+)
+"""Names that every motion has."""
 _OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 
 
