@@ -11,9 +11,11 @@ DEMO_CASES ?= case1 case2 case3 case4
 DEMO_OUT   ?= demo-results
 DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
+OLDEST ?= .venv-oldest
+OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results tests/analyses
 WORKERS ?= -n auto --maxprocesses 4
 
-.PHONY: help demo test lint format docs wheel-check clean setup
+.PHONY: help demo test test-oldest lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help
 
 help:  ## list what can be made
@@ -58,6 +60,14 @@ demo: $(STAMP)  ## run the four shipped case studies; pictures in demo-results/
 test: $(STAMP)  ## run the tests
 	@$(BIN)/python -m pytest $(WORKERS) $(PYTEST_FLAGS)
 
+test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with the oldest versions that pyproject.toml allows
+	@rm -rf $(OLDEST) && $(BIN)/python -m venv $(OLDEST)
+	@$(BIN)/python .ci/oldest pyproject.toml > $(OLDEST)/requirements.txt
+	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  -r $(OLDEST)/requirements.txt
+	@NUMBA_CACHE_DIR=$(OLDEST)/kernels PYTHONPATH=src $(OLDEST)/bin/python -m pytest -q \
+	  -p no:cacheprovider --disable-warnings $(WORKERS) $(OLDEST_TESTS)
+
 lint: $(STAMP)  ## ruff, pyright and the layers contract
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -76,5 +86,5 @@ wheel-check: $(STAMP)  ## build the wheel, install it into an empty environment,
 	.ci/wheel-check $(BIN)/python
 
 clean:  ## remove .venv and all that was built
-	rm -rf $(VENV) build dist docs/_build demo-results .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(OLDEST) build dist docs/_build demo-results .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

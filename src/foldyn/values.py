@@ -56,6 +56,13 @@ def _written(value: Any, depth: int) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
+def plain(value: Any) -> Any:
+    """Return a value of plain Python: lists instead of tuples, no numbers of NumPy."""
+    if isinstance(value, tuple):
+        return list(value)
+    return value.item() if isinstance(value, np.generic) else value
+
+
 def shortened(text: str) -> str:
     """Text for a message, in one line, of a long one only the beginning."""
     text = " ".join(text.splitlines())

@@ -86,7 +86,7 @@ BAD = {
     ),
     "gravity with nodes": (
         [("force = [0.01, 0, 0]", "gravity = [0, 0, -9.81]")],
-        "loads[0].gravity: acts on the whole structure; leave out nodes and force",
+        "loads[0].gravity: acts on the whole structure; leave out nodes, or write [[loads]] for",
     ),
     "no gravity": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "gravity = [0, 0, 0]")],

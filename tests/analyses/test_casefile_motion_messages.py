@@ -110,7 +110,7 @@ BAD = {
     ),
     "closed crease": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\nangle = 360")],
-        'loads[0].angle = 360: folds with rest = "stress_free" have an infinite moment there',
+        "loads[0].angle = 360: this fold law, free of stress at rest, has an infinite moment there",
     ),
     "creases without angle": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]")],
@@ -126,7 +126,7 @@ BAD = {
     ),
     "creases with gravity": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\ngravity = [0, 0, -9.81]")],
-        "loads[0].gravity: acts on the whole structure; leave out creases and angle, and give",
+        "loads[0].creases: creases and angle are a load of their own; leave out gravity, or write",
     ),
     "crease actuated twice": (
         [

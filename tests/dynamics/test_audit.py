@@ -51,7 +51,7 @@ def test_a_body_too_heavy_to_move_is_not_silently_fine():
 
 def test_it_does_not_depend_on_the_unit_of_length():
     for size in (1e-6, 1e3):
-        rounding = Rounding(fd.dynamics.system.pack(case_of_size(size), 1.0).model)
+        rounding = Rounding(fd.dynamics.system.pack(case_of_size(size), 1.0).body)
         assert rounding.least_motion(0.01) / size == pytest.approx(LEAST, rel=1e-12)
         energy = np.zeros((1, 6))
         found = rounding.energy(energy, 0.01 * size)
@@ -62,7 +62,7 @@ def case_of_size(size):
     return fd.Case(fold(0.01 * size, 1.0, size), SUPPORTS)
 
 
-AT_ONE = Rounding(fd.dynamics.system.pack(case_of_size(1.0), 1.0).model)
+AT_ONE = Rounding(fd.dynamics.system.pack(case_of_size(1.0), 1.0).body)
 LEAST = AT_ONE.least_motion(0.01)
 
 

@@ -17,8 +17,8 @@ from foldyn.dynamics.implicit.discrete_gradient import (
     mean_moment,
     mean_stress,
 )
-from foldyn.dynamics.implicit.tangent import expected_stress
 from foldyn.mechanics import angles
+from foldyn.mechanics.step_tangent import expected_stress
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 CUBIC = fd.CustomHingeLaw(

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.dynamics import METHODS, numbering
+from foldyn.dynamics import METHODS
+from foldyn.dynamics.numbering import renumbered
 from foldyn.mechanics import renumber
+from foldyn.structures import body
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
 
@@ -44,8 +46,8 @@ def test_a_motion_in_another_order(mass, method, monkeypatch):
     def shuffled(model):
         return np.random.default_rng(2).permutation(len(model.rest))
 
-    monkeypatch.setattr(numbering, "SMALL", 0)
-    monkeypatch.setattr(numbering, "node_order", shuffled)
+    monkeypatch.setattr(body, "SMALL", 0)
+    monkeypatch.setattr(body, "node_order", shuffled)
     two = fd.simulate(case, 0.05, **options)
     assert two.displacement.dtype == np.float64
     for name in one.data_vars:
@@ -65,14 +67,14 @@ def test_hinges_keep_their_numbers():
 
 def test_the_order_of_a_large_sheet_brings_neighbors_together():
     pattern = fd.patterns.miura(cells=(12, 12), a=1.0, b=1.0, panel_angle=60, dihedral=100)
-    model = fd.discretize(pattern, SHEET).model
-    found, by = numbering.renumbered(model)
-    np.testing.assert_array_equal(by.order[by.rank], np.arange(len(model.rest)))
+    plain = fd.discretize(pattern, SHEET).body
+    found, by = renumbered(plain)
+    np.testing.assert_array_equal(by.order[by.rank], np.arange(plain.rows))
 
-    def reach(m):
-        return int(np.abs(np.diff(m.bars.astype(np.int64), axis=1)).max())
+    def reach(of):
+        return int(np.abs(np.diff(of.model.bars.astype(np.int64), axis=1)).max())
 
-    assert reach(found) < 0.3 * reach(model)
+    assert reach(found) < 0.3 * reach(plain)
 
 
 @pytest.mark.filterwarnings("ignore:steps of")

@@ -9,7 +9,6 @@ from scipy import sparse
 import foldyn as fd
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import pack
-from foldyn.statics.body import body_of
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 PATTERNS = {
@@ -36,14 +35,14 @@ def test_it_solves_with_stiffness_mass_and_damping(name, mass):
     u = np.zeros((rows, 3))
     u[:n] = 1e-3 * rng.standard_normal((n, 3))
     rotation = np.zeros(shell.rotations)
-    matrix.blocks.put(packed.model, matrix.pattern, u, u, False, matrix.stiffness)
+    matrix.blocks.put(packed.body, matrix.pattern, u, u, False, matrix.stiffness)
     matrix.factorize(weights)
     force = rng.standard_normal((rows, 3))
     found = matrix.solve(force, np.zeros((rows, 3))).ravel()
 
     none = sparse.csr_array((shell.rotations, shell.rotations))
     inertia = sparse.block_diag([sparse.kron(shell.mass, np.eye(3)), none])
-    body, rest = body_of(shell), np.concatenate([np.zeros(3 * n), rotation])
+    body, rest = shell.body, np.concatenate([np.zeros(3 * n), rotation])
     whole = weights.stiffness * body.tangent(np.concatenate([u[:n].ravel(), rotation]))
     whole = whole + weights.mass * inertia + weights.damping * beta * body.tangent(rest)
     free = np.setdiff1d(np.arange(size), range(6))

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 from jit_lab import ask, copy_package, edit, environment
+from numba import typeof
 
+import foldyn as fd
 from foldyn.jit import sources
+from foldyn.jit.kept import _spelled
 from foldyn.jit.sources import PACKAGE, digest, imports, made_from
 
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -50,12 +53,17 @@ def test_what_a_kernel_is_made_from():
 
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
     assert {law, switch, fields, "jit/compiled.py"} <= names("shells/kernels.py")
-    assert {law, switch, fields, "cases/waveforms.py", "shells/kernels.py"} <= names(
-        "dynamics/rk4.py"
-    )
+    assert {law, switch, fields, "cases/waveforms.py"} <= names("dynamics/rk4.py")
     # and not from what only tells or draws, which would compile all anew with every change
-    assert not {"cases/document.py", "dynamics/driver.py"} & names("dynamics/rk4.py")
+    others = {"cases/document.py", "dynamics/driver.py", "shells/kernels.py"}
+    assert not others & names("dynamics/rk4.py")
     assert "dynamics/rk4.py" not in names("mechanics/force.py")
+
+
+def test_kernels_for_a_model_are_made_from_the_file_of_its_class():
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    model = fd.shell(pattern, fd.Sheet(1e6, 0.25, 0.01), divisions=1).model
+    assert _spelled(typeof((model,))).count(digest(PACKAGE / "shells/kernels.py")) == 1
 
 
 def test_imports_are_read_as_python_reads_them():
@@ -121,12 +129,14 @@ def test_all_that_compiles_is_compiled_in_one_place():
                 assert not whole or path.parent == PACKAGE / "jit", path
 
 
-def test_what_stands_in_for_a_function_is_in_its_file():
-    """Kernels that call it import this file, so that they are made from it."""
+def test_what_stands_in_for_a_function_is_in_its_file_or_that_of_an_argument():
+    """Kernels that call it import the one, and are told apart by the sources of the other."""
     for path in FILES:
-        defined = {node.name for node in tree(path).body if isinstance(node, ast.FunctionDef)}
-        stands_for = re.findall(r"^@overload\w*\((\w+)", path.read_text("utf-8"), re.MULTILINE)
-        assert set(stands_for) <= defined, path
+        text, kinds = path.read_text("utf-8"), (ast.FunctionDef, ast.ClassDef)
+        defined = {node.name for node in tree(path).body if isinstance(node, kinds)}
+        stands_for = set(re.findall(r"^@overload\w*\((\w+)", text, re.MULTILINE))
+        classes = set(re.findall(r"\.instance_class is (?:not )?(\w+)", text))
+        assert stands_for <= defined or (classes and classes <= defined), path
 
 
 THREE = """

@@ -9,7 +9,7 @@ from shell_lab import at_rest, forces, random_state, split, tangent
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.shells import shell
-from foldyn.shells.extrapolated import add_extrapolated_strain
+from foldyn.shells.step_tangent import add_extrapolated_strain
 
 # thick, with stiff creases: the three parts of the energy are of one size at the states below,
 # so that an error in one of them cannot hide behind another

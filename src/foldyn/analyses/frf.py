@@ -17,11 +17,12 @@ from pydantic import Field, PlainValidator, create_model, model_validator
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, driven_nodes, movable
 from foldyn.analyses.frf_page import frf_page
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import AXES, Nodes, Positive, Section, Vector, one_of, refused
+from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
 from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys
 from foldyn.cases.models import SHELL
+from foldyn.cases.part import given_keys
 from foldyn.cases.supports import check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
@@ -115,48 +116,29 @@ def _keys(method: Any) -> list[str]:
     return [item.name for item in fields(method.options)]
 
 
-class DriveSection(Section):
-    """One of [[drive]]: a force on nodes, or a motion of the base."""
-
-    nodes: Nodes = None
-    force: Vector = None
-    base: Annotated[Any, PlainValidator(lambda value: check_axis("", value))] = None
-    displacement: Positive = 1.0
-    history: Annotated[
-        Any,
-        refused(
-            "a drive has an amplitude only, analysis.method says how it goes over time; leave it "
-            "out"
-        ),
-    ] = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = self.model_fields_set
-        if "base" in given and given & {"nodes", "force"}:
+def _drive(table: Any, folder: Path | None) -> Force | BaseMotion:
+    """A force on nodes, or a motion of the base, from its table of [[drive]]."""
+    given = given_keys(table, (Force, BaseMotion))
+    if "base" in given:
+        if given & {"nodes", "force"}:
             raise InputError(
                 ": moves all nodes that supports hold along its axis; leave out nodes and force",
                 ".base",
             )
-        if "base" in given:
-            return self
-        if "displacement" in given:
-            raise InputError(
-                ': is that of a base, as in base = "x"; leave it out, or give base',
-                ".displacement",
-            )
-        if not given:
-            raise InputError(": give nodes and force, or base (the axis of a base that moves)")
-        for key in ("nodes", "force"):
-            if key not in given:
-                raise InputError(": missing; give its value", f".{key}")
-        return self
+        value = number(".displacement", table.get("displacement", 1.0), above=0.0)
+        return BaseMotion(check_axis(".base", table["base"]), value=value)
+    if "displacement" in given:
+        raise InputError(
+            ': is that of a base, as in base = "x"; leave it out, or give base', ".displacement"
+        )
+    if not given:
+        raise InputError(": give nodes and force, or base (the axis of a base that moves)")
+    return Force.of(table)
 
-    def part(self) -> Force | BaseMotion:
-        """What it says, as an object."""
-        if self.base is not None:
-            return BaseMotion(self.base, value=self.displacement)
-        return Force(self.nodes, self.force)
+
+NO_HISTORY = (
+    "a drive has an amplitude only, analysis.method says how it goes over time; leave it out"
+)
 
 
 class FrfOutput(Section):
@@ -171,7 +153,7 @@ class FrfSchema(VibrationSchema):
     """A case file of kind "frf"."""
 
     analysis: FrfSection
-    drive: list[DriveSection] = Field(min_length=1)
+    drive: list[Annotated[Any, part(_drive, history=NO_HISTORY)]] = Field(min_length=1)
     output: FrfOutput = FrfOutput()
 
     @model_validator(mode="after")
@@ -182,7 +164,7 @@ class FrfSchema(VibrationSchema):
 
     @model_validator(mode="after")
     def _drives_alike(self) -> Self:
-        bases = [i for i, item in enumerate(self.drive) if item.base is not None]
+        bases = [i for i, one in enumerate(self.drive) if isinstance(one, BaseMotion)]
         if bases and len(self.drive) > 1:
             raise InputError(
                 ": a base drives alone, along one axis; run a case file for each",
@@ -213,7 +195,7 @@ class FrfAnalysis(Analysis):
             key: getattr(section, key) for key in ("frequencies", "method", "secant", "amplitude")
         }
         given["state"] = None if section.state == "rest" else section.state
-        return cls({**given, **section.options(), "drive": [one.part() for one in schema.drive]})
+        return cls({**given, **section.options(), "drive": schema.drive})
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`; `frf` refuses bad input before it tells of its first progress."""

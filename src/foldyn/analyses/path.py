@@ -19,20 +19,19 @@ from foldyn.analyses.sections import (
     Animation,
     CaseSchema,
     Count,
-    LoadSection,
     ModelSection,
     Nodes,
     Positive,
     Section,
-    SupportSection,
     Whole,
     check_mass,
     one_of,
-    refused,
+    part,
 )
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
-from foldyn.cases.supports import AXES, check_axis
+from foldyn.cases.loads import load_from
+from foldyn.cases.supports import AXES, check_axis, support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.values import indices, number, show
@@ -78,13 +77,13 @@ def _shapes(value: Any) -> int | tuple[int, ...]:
     return chosen
 
 
-Timeless = Annotated[
-    Any,
-    refused(
-        "a path has no time; leave it out: what loads and moves the structure grows with the load "
-        "factor (or is named in analysis.constant)"
-    ),
-]
+TIMELESS = (
+    "a path has no time; leave it out: what loads and moves the structure grows with the load "
+    "factor (or is named in analysis.constant)"
+)
+NO_BASE = (
+    "a base moves over time, and a path has no time; give nodes, axis and displacement instead"
+)
 
 
 class UntilSection(Section):
@@ -157,31 +156,12 @@ class PathModel(ModelSection):
     mass: Annotated[list[str] | None, PlainValidator(_one_mass)] = None
 
 
-class PathSupport(SupportSection):
-    """One of the [[supports]] of a path: nodes held, or moved with the load factor."""
-
-    base: Annotated[
-        Any,
-        refused(
-            "a base moves over time, and a path has no time; give nodes, axis and displacement "
-            "instead"
-        ),
-    ] = None
-    history: Timeless = None
-
-
-class PathLoad(LoadSection):
-    """One of the [[loads]] of a path, which grow with the load factor."""
-
-    history: Timeless = None
-
-
 class PathSchema(CaseSchema):
     """A case file of kind "statics"."""
 
     model: PathModel = PathModel()
-    supports: list[PathSupport] = Field(default_factory=list)
-    loads: list[PathLoad] = Field(default_factory=list)
+    supports: list[Annotated[Any, part(support_from, base=NO_BASE, history=TIMELESS)]] = []
+    loads: list[Annotated[Any, part(load_from, history=TIMELESS)]] = []
     initial: StoredStart | None = None
     analysis: PathSection
     output: PathOutput = PathOutput()

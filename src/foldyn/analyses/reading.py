@@ -15,21 +15,13 @@ from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.limits import check_values
 from foldyn.analyses.messages import describe
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.analyses.sections import LoadSection, SupportSection
 from foldyn.cases import (
-    Actuate,
-    BaseMotion,
     Case,
-    Fix,
-    Force,
-    Gravity,
-    Impose,
     Rayleigh,
     resolve_nodes,
 )
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.cases.supports import Support
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.formats import read_pattern
 from foldyn.input_files import from_toml, read_text
@@ -139,11 +131,6 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping."):
             damping = Rayleigh(**schema.damping.model_dump())
-        supports = []
-        for i, item in enumerate(schema.supports):
-            with within(f"supports[{i}]."):
-                supports.append(_support(item))
-        loads = [_load(item) for item in schema.loads]
 
     def make(mass: str) -> Case:
         """Make the case with one mass rule."""
@@ -152,7 +139,7 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
             if sheet.density is not None:
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):
-            return Case(structure, supports, loads, damping)
+            return Case(structure, schema.supports, schema.loads, damping)
 
     cases[masses[0]] = case = make(masses[0])
     with warnings.catch_warnings():  # the other rules would only repeat them
@@ -201,10 +188,11 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
 
 def _check_vertices(schema: Any, count: int) -> None:
     """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
-    places = {f"supports[{i}].nodes": item.nodes for i, item in enumerate(schema.supports)}
-    places |= {f"loads[{i}].nodes": item.nodes for i, item in enumerate(schema.loads)}
-    drive = getattr(schema, "drive", None) or []
-    places |= {f"drive[{i}].nodes": item.nodes for i, item in enumerate(drive)}
+    places = {
+        f"{name}[{i}].nodes": getattr(part, "nodes", None)
+        for name in ("supports", "loads", "drive")
+        for i, part in enumerate(getattr(schema, name, ()))
+    }
     until = getattr(schema.analysis, "until", None)
     places |= {} if until is None else {"analysis.until.node": (until.node,)}
     places["output.nodes"] = schema.output.nodes
@@ -218,20 +206,3 @@ def _check_vertices(schema: Any, count: int) -> None:
                 "file names nodes of a shell by vertex, whatever its divisions",
                 place,
             )
-
-
-def _support(item: SupportSection) -> Support:
-    if item.base is not None:
-        value = 1.0 if item.displacement is None else item.displacement
-        return BaseMotion(item.base, item.history, value)
-    if item.axis is not None:
-        return Impose(item.nodes, item.axis, item.displacement, item.history)
-    return Fix(item.nodes, item.axes)
-
-
-def _load(item: LoadSection) -> Force | Gravity | Actuate:
-    if item.gravity is not None:
-        return Gravity(item.gravity, item.history)
-    if item.creases is not None:
-        return Actuate(item.creases, item.angle, item.history)
-    return Force(item.nodes, item.force, item.history)

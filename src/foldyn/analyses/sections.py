@@ -8,7 +8,8 @@ sections. Validators raise InputError with a text that continues the key's path 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -20,13 +21,12 @@ from pydantic import (
     model_validator,
 )
 
-from foldyn.cases.actuation import check_angles, check_creases
 from foldyn.cases.damping import STATES
-from foldyn.cases.decode import check_keys, history_from, law_from
-from foldyn.cases.histories import History
+from foldyn.cases.decode import check_keys, law_from
+from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import check_axis, check_per_node
+from foldyn.cases.supports import support_from
 from foldyn.errors import InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
@@ -143,21 +143,27 @@ def _creases(value: Any) -> Any:
     return array
 
 
-def _history(value: Any, info: ValidationInfo) -> History:
-    return history_from(value, (info.context or {}).get("folder"))
+def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
+    """Take the table of a load or support; some keys may be refused, each for a reason."""
+
+    def read_part(value: Any, info: ValidationInfo) -> Any:
+        for key in why:
+            if isinstance(value, Mapping) and key in value:
+                raise InputError(f" = {show(value[key])}: {why[key]}", f".{key}")
+        return read(value, (info.context or {}).get("folder"))
+
+    return PlainValidator(read_part)
 
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, le=MOST)]
 Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
 Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
-Creases = Annotated[Any, PlainValidator(lambda value: check_creases("", value))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_creases)]
 Animation = Annotated[str, one_of(ANIMATIONS)]
-HistorySpec = Annotated[History | None, PlainValidator(_history)]
 
 
 class SheetSection(Section):
@@ -216,97 +222,6 @@ class DampingSection(Section):
     state: Annotated[str, one_of(STATES)] = "rest"
 
 
-class SupportSection(Section):
-    """One of [[supports]]: nodes held, nodes moved as prescribed, or a motion of the base."""
-
-    nodes: Nodes = None
-    axes: str = "xyz"
-    axis: Any = None
-    displacement: Any = None
-    base: Annotated[Any, PlainValidator(lambda value: check_axis("", value))] = None
-    history: HistorySpec = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = self.model_fields_set
-        if "base" in given:
-            self._check_base(given)
-        elif not given:
-            raise InputError(
-                ": give nodes and axes (held), nodes, axis and displacement (moved), or base and "
-                "history (a base that moves)"
-            )
-        elif "nodes" not in given:
-            raise InputError(".nodes: missing; give its value")
-        elif given & {"axis", "displacement", "history"}:
-            self._check_impose(given)
-        return self
-
-    def _check_base(self, given: set[str]) -> None:
-        for key in ("nodes", "axes", "axis"):
-            if key in given:
-                raise InputError(
-                    f".base: moves all nodes that other [[supports]] hold along {self.base}; "
-                    f"leave out {key}, and give nodes their own [[supports]]"
-                )
-        if "history" not in given:
-            raise InputError(".history: missing; give the motion of the base over time")
-        if "displacement" in given:
-            self.displacement = number(".displacement", self.displacement)
-
-    def _check_impose(self, given: set[str]) -> None:
-        if "axes" in given:
-            moved = next(key for key in ("displacement", "history", "axis") if key in given)
-            raise InputError(
-                f".axes: holds nodes at rest, but {moved} moves them; give either axes alone, or "
-                'axis, as in axis = "x", with displacement'
-            )
-        if "axis" not in given:
-            raise InputError('.axis: missing; give the axis of the displacement, as in axis = "x"')
-        if "displacement" not in given:
-            raise InputError(
-                ".displacement: missing; give it (m), or write axes instead of axis to hold nodes"
-            )
-        check_axis(".axis", self.axis)
-        self.displacement = check_per_node(".displacement", self.displacement, self.nodes)
-
-
-class LoadSection(Section):
-    """One of [[loads]]: a force on nodes, gravity, or an actuation of creases."""
-
-    nodes: Nodes = None
-    force: Vector = None
-    gravity: Annotated[Any, PlainValidator(lambda value: vector("", value, nonzero=True))] = None
-    creases: Creases = None
-    angle: Annotated[Any, PlainValidator(lambda value: check_angles("", value))] = None
-    history: HistorySpec = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = self.model_fields_set - {"history"}
-        if not given:
-            raise InputError(": give nodes and force, or gravity, or creases and angle")
-        if "gravity" in given:
-            others = given - {"gravity"}
-            what = "creases and angle" if others & {"creases", "angle"} else "nodes and force"
-            if others:
-                raise InputError(
-                    f".gravity: acts on the whole structure; leave out {what}, and give these "
-                    "their own [[loads]]"
-                )
-            return self
-        actuation = given & {"creases", "angle"}
-        if actuation and given & {"nodes", "force"}:
-            raise InputError(
-                f".{max(actuation)}: creases and angle are a load of their own; leave out nodes "
-                "and force, and give these their own [[loads]]"
-            )
-        for key in ("creases", "angle") if actuation else ("nodes", "force"):
-            if key not in given:
-                raise InputError(f".{key}: missing; give its value")
-        return self
-
-
 class CaseSchema(Section):
     """The sections that every case file may have."""
 
@@ -315,5 +230,5 @@ class CaseSchema(Section):
     sheet: SheetSection
     model: ModelSection = ModelSection()
     damping: DampingSection = DampingSection()
-    supports: list[SupportSection] = []
-    loads: list[LoadSection] = []
+    supports: list[Annotated[Any, part(support_from)]] = []
+    loads: list[Annotated[Any, part(load_from)]] = []

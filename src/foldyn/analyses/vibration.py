@@ -9,51 +9,36 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from foldyn.analyses.casefile import CaseFile
-from foldyn.analyses.sections import CaseSchema, LoadSection, SupportSection, one_of, refused
+from foldyn.analyses.sections import CaseSchema, one_of, part
 from foldyn.analyses.start import StoredStart
+from foldyn.cases import Impose
+from foldyn.cases.loads import load_from
 from foldyn.cases.models import SHELL
+from foldyn.cases.supports import support_from
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.values import show
 
 STATES = ("rest", "equilibrium")
 """States about which a case file may have its structure vibrate, beside a stored one."""
 About = Annotated[str, one_of(STATES)]
-Timeless = Annotated[
-    Any,
-    refused(
-        "small vibrations are about one state, in which loads and displacements act in full; leave "
-        "it out"
-    ),
-]
-
-
-class VibrationSupport(SupportSection):
-    """One of the [[supports]] of small vibrations: nodes held, at rest or where they were moved."""
-
-    base: Annotated[
-        Any,
-        refused(
-            "a base moves over time, and small vibrations are about one state; leave it out (what "
-            'a moving base does: analysis.kind = "frf" with [[drive]] and base)'
-        ),
-    ] = None
-    history: Timeless = None
-
-
-class VibrationLoad(LoadSection):
-    """One of the [[loads]] of small vibrations, which act in full in their state."""
-
-    history: Timeless = None
+TIMELESS = (
+    "small vibrations are about one state, in which loads and displacements act in full; leave it "
+    "out"
+)
+NO_BASE = (
+    "a base moves over time, and small vibrations are about one state; leave it out (what a moving "
+    'base does: analysis.kind = "frf" with [[drive]] and base)'
+)
 
 
 class VibrationSchema(CaseSchema):
     """What case files of small vibrations share."""
 
-    supports: list[VibrationSupport] = Field(default_factory=list)
-    loads: list[VibrationLoad] = Field(default_factory=list)
+    supports: list[Annotated[Any, part(support_from, base=NO_BASE, history=TIMELESS)]] = []
+    loads: list[Annotated[Any, part(load_from, history=TIMELESS)]] = []
     initial: StoredStart | None = None
     analysis: Any
 
@@ -82,7 +67,7 @@ class VibrationSchema(CaseSchema):
         if self.loads:
             raise InputError(f": does not act in the state of rest; {remedy}", "loads[0]")
         for i, support in enumerate(self.supports):
-            if support.axis is not None:
+            if isinstance(support, Impose):
                 raise InputError(
                     f": moves nothing in the state of rest; {remedy}, or hold its nodes by axes",
                     f"supports[{i}]",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
+from foldyn.cases.part import Load
 from foldyn.errors import InputError
 from foldyn.values import indices, number_or_list, show, suggest
 
@@ -19,7 +20,7 @@ SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
 
 
 @dataclass(frozen=True)
-class Actuate:
+class Actuate(Load):
     """Creases that fold or unfold by themselves.
 
     The rest dihedral of each crease moves from its rest value (`Structure.fold_rest`) to `angle`
@@ -40,11 +41,37 @@ class Actuate:
     angle: float | Sequence[float]
     history: History | Callable[[Any], Any] | None = None
 
+    keys = {"creases": "creases", "angle": "angle"}
+    missing = dict.fromkeys(keys, "give its value")
+    apart = "creases and angle are a load of their own"
+    moves = True
+
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "creases", check_creases("creases", self.creases))
         object.__setattr__(self, "angle", check_angles("angle", self.angle))
         object.__setattr__(self, "history", as_history(self.history))
+
+    def rest_changes(
+        self, structure: Any, place: str
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """See `Load`; refuses angles that the fold law cannot be free of stress at."""
+        creases = resolve_creases(structure, self.creases, f"{place}.creases")
+        angles = np.array(self.angle)
+        if angles.ndim and len(angles) != len(creases):
+            raise InputError(
+                f" = {show(self.angle)}: {len(angles)} angles for {len(creases)} creases; give "
+                "one, or one for each",
+                f"{place}.angle",
+            )
+        closed = angles[(angles == 0.0) | (angles == 360.0)]
+        if closed.size and not structure.fold_law.closed_at_rest:
+            raise InputError(
+                f"{place}.angle = {closed[0]:g}: this fold law, free of stress at rest, has an "
+                "infinite moment there; give an angle between 0 and 360 degrees (flat: 180), or "
+                "another fold_law"
+            )
+        return creases, np.radians(angles) - structure.fold_rest[creases]
 
 
 def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
@@ -53,8 +80,9 @@ def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
         if creases not in SELECTIONS:
             words = ", ".join(f'"{word}"' for word in SELECTIONS)
             raise InputError(
-                f"{name} = {show(creases)}: {suggest(creases, SELECTIONS)}give crease numbers, as "
-                f"in [0, 1], or one of {words}"
+                f" = {show(creases)}: {suggest(creases, SELECTIONS)}give crease numbers, as in "
+                f"[0, 1], or one of {words}",
+                name,
             )
         return creases
     return indices(name, creases, "crease", "or one of " + ", ".join(map(show, SELECTIONS)))
@@ -67,7 +95,7 @@ def check_angles(name: str, angle: Any) -> float | tuple[float, ...]:
     for i, value in enumerate(checked if listed else (checked,)):
         if not 0.0 <= value <= 360.0:
             place = f"{name}[{i}]" if listed else name
-            raise InputError(f"{place} = {value:g}: must lie between 0 and 360 degrees (flat: 180)")
+            raise InputError(f" = {value:g}: must lie between 0 and 360 degrees (flat: 180)", place)
     return checked
 
 
@@ -104,46 +132,6 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
             f"creases 0 to {count - 1}"
         )
     return chosen
-
-
-def rest_changes(
-    structure: Any, load: Actuate, place: str
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Creases that a load actuates, and the change (rad) of their rest angles at factor 1.
-
-    Parameters
-    ----------
-    structure : Structure
-    load : Actuate
-    place : str
-        What the load is called in messages.
-
-    Returns
-    -------
-    creases : ndarray of int, shape (k,)
-    change : ndarray, shape (k,)
-
-    Raises
-    ------
-    InputError
-        As `resolve_creases`; as many angles as creases are needed; or an angle that the fold law
-        cannot be stress-free at.
-    """
-    creases = resolve_creases(structure, load.creases, f"{place}.creases")
-    angles = np.array(load.angle)
-    if angles.ndim and len(angles) != len(creases):
-        raise InputError(
-            f"{place}.angle = {show(load.angle)}: {len(angles)} angles for {len(creases)} creases; "
-            "give one, or one for each"
-        )
-    closed = angles[(angles == 0.0) | (angles == 360.0)]
-    if closed.size and not structure.fold_law.closed_at_rest:
-        raise InputError(
-            f"{place}.angle = {closed[0]:g}: this fold law, free of stress at rest, has an "
-            "infinite moment there; give an angle between 0 and 360 degrees (flat: 180), or "
-            "another fold_law"
-        )
-    return creases, np.radians(angles) - structure.fold_rest[creases]
 
 
 def _assigned(pattern: Any, word: str, name: str) -> NDArray[np.int64]:

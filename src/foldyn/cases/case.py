@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.actuation import Actuate, resolve_creases, rest_changes
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
-from foldyn.cases.loads import Force, Gravity
+from foldyn.cases.loads import LOADS, Gravity
+from foldyn.cases.part import Load
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import AXES, BaseMotion, Fix, Impose, Support
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
+from foldyn.errors import InputError
 from foldyn.values import show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
@@ -80,24 +79,20 @@ class Case:
 
     structure: Any
     supports: Sequence[Support] = ()
-    loads: Sequence[Force | Gravity | Actuate] = ()
+    loads: Sequence[Load] = ()
     damping: Rayleigh = field(default_factory=Rayleigh)
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        kinds_of = {"supports": (Fix, Impose, BaseMotion), "loads": (Force, Gravity, Actuate)}
-        for name, kinds in kinds_of.items():
+        for name, kinds in (("supports", SUPPORTS), ("loads", LOADS)):
             object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
         if not isinstance(self.damping, Rayleigh):
             raise InputError(
                 f"damping = {show(self.damping)}: must be Rayleigh(alpha=..., beta=...)"
             )
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
-        for i, load in enumerate(self.loads):
-            if isinstance(load, Gravity):
-                self._check_gravity(f"loads[{i}]")
-            elif isinstance(load, Force):
-                self._check_force(f"loads[{i}]", load)
+        for place, load in self._loads():
+            load.check(self.structure, self.fixed, place)
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
@@ -186,9 +181,10 @@ class Case:
         terms: list[tuple[NDArray[np.float64], History]] = []
         first: dict[int, int] = {}  # the load that actuates a crease
         for i, load in enumerate(self.loads):
-            if not isinstance(load, Actuate):
+            actuated = load.rest_changes(self.structure, f"loads[{i}]")
+            if actuated is None:
                 continue
-            creases, change = rest_changes(self.structure, load, f"loads[{i}]")
+            creases, change = actuated
             for crease in creases.tolist():
                 if crease in first:
                     raise InputError(
@@ -204,19 +200,19 @@ class Case:
     @cached_property
     def load_terms(self) -> Terms:
         """Forces (N) on all nodes, shape (n, 3), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for i, load in enumerate(self.loads):
-            if not isinstance(load, Actuate):
-                _add(terms, as_history(load.history), self._forces_of(i, load))
-        return _frozen(terms)
+        return self._force_terms(lambda load: True)
 
     @cached_property
     def force_terms(self) -> Terms:
         """The terms of `load_terms` without gravity."""
+        return self._force_terms(lambda load: load.arrows)
+
+    def _force_terms(self, counts: Callable[[Load], bool]) -> Terms:
         terms: list[tuple[NDArray[np.float64], History]] = []
-        for i, load in enumerate(self.loads):
-            if isinstance(load, Force):
-                _add(terms, as_history(load.history), self._forces_of(i, load))
+        for place, load in self._loads():
+            forces = load.forces(self.structure, place) if counts(load) else None
+            if forces is not None:
+                _add(terms, as_history(load.history), forces)
         return _frozen(terms)
 
     @cached_property
@@ -231,61 +227,21 @@ class Case:
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:
         """Nodes on which a force acts, increasing; gravity, which acts on all, does not count."""
-        chosen = [
-            resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")
-            for i, load in enumerate(self.loads)
-            if isinstance(load, Force)
-        ]
-        return np.unique(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=np.int64)
+        return _union([load.loaded(self.structure, place) for place, load in self._loads()])
 
     @cached_property
     def actuated_creases(self) -> NDArray[np.int64]:
         """Creases that a load actuates, increasing."""
-        chosen = [
-            resolve_creases(self.structure, load.creases, f"loads[{i}].creases")
-            for i, load in enumerate(self.loads)
-            if isinstance(load, Actuate)
-        ]
-        return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, dtype=np.int64)
+        pairs = [load.rest_changes(self.structure, place) for place, load in self._loads()]
+        return _union([pair[0] for pair in pairs if pair is not None])
 
-    def _forces_of(self, i: int, load: Force | Gravity) -> NDArray[np.float64]:
-        """Forces (n, 3), N, of one load at factor 1."""
-        if isinstance(load, Gravity):
-            mass = np.asarray(self.structure.mass.sum(axis=1)).ravel()
-            return mass[:, None] * np.array(load.acceleration)
-        forces = np.zeros((len(self.structure.nodes), 3))
-        forces[resolve_nodes(self.structure, load.nodes, f"loads[{i}].nodes")] = load.vector
-        return forces
+    def _loads(self) -> Iterator[tuple[str, Load]]:
+        """Loads with their places for messages."""
+        return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))
 
-    def _check_gravity(self, place: str) -> None:
-        try:
-            _ = self.structure.mass
-        except InputError as error:
-            raise InputError(f"{place}: gravity needs the mass of the structure: {error}") from None
 
-    def _check_force(self, place: str, load: Force) -> None:
-        nodes = resolve_nodes(self.structure, load.nodes, f"{place}.nodes")
-        acts = np.flatnonzero(load.vector)
-        held = self.fixed[np.ix_(nodes, acts)]
-        if not held.any():
-            return
-        what = ", ".join(
-            f"{node} ({''.join(AXES[a] for a in acts[row])})"
-            for node, row in zip(nodes, held, strict=True)
-            if row.any()
-        )
-        what = what if len(what) < 80 else what[:76] + " ..."
-        if held.all():
-            raise InputError(
-                f"{place}: the force {show(load.vector)} acts only where supports hold its nodes: "
-                f"{what}; load other nodes or axes, or free these"
-            )
-        warnings.warn(
-            f"{place}: the force {show(load.vector)} acts in part where supports hold its nodes: "
-            f"{what}; that part goes into the reactions only",
-            FoldynWarning,
-            stacklevel=4,
-        )
+def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
 
 
 def _add(

@@ -17,20 +17,21 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.actuation import Actuate
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
-from foldyn.cases.decode import history_from, law_from
+from foldyn.cases.decode import law_from
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
-from foldyn.cases.loads import Force, Gravity
+from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
-from foldyn.cases.supports import BaseMotion, Fix, Impose, Support
+from foldyn.cases.part import Load
+from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell
 from foldyn.structures import Sheet, Structure, discretize
+from foldyn.values import plain
 
 LAWS: Mapping[str, Mapping[str, type]] = {
     "bar_law": BAR_LAWS,
@@ -114,8 +115,8 @@ class _Writer:
             },
             "model": self._model(structure.options) | _kind(structure),
             "damping": dataclasses.asdict(case.damping),
-            "supports": [self._support(support) for support in case.supports],
-            "loads": [self._load(load) for load in case.loads],
+            "supports": [self._part(support) for support in case.supports],
+            "loads": [self._part(load) for load in case.loads],
         }
         if not self.obstacles and not structure.as_made:
             self.obstacles.append(
@@ -172,32 +173,13 @@ class _Writer:
             for f in dataclasses.fields(law)
             if f.init and f.name != "name"
         }
-        return {"kind": kind, **{key: _plain(value) for key, value in arguments.items()}}
+        return {"kind": kind, **{key: plain(value) for key, value in arguments.items()}}
 
-    def _support(self, support: Support) -> dict[str, Any]:
-        section: dict[str, Any]
-        if isinstance(support, Fix):
-            return {"nodes": _plain(support.nodes), "axes": support.axes}
-        if isinstance(support, Impose):
-            section = {"nodes": _plain(support.nodes), "axis": support.axis}
-        else:
-            section = {"base": support.axis}
-        section["displacement"] = _plain(support.value)
-        return self._with_history(section, support.history, moves=True)
-
-    def _load(self, load: Force | Gravity | Actuate) -> dict[str, Any]:
-        section: dict[str, Any]
-        if isinstance(load, Gravity):
-            section = {"gravity": list(load.acceleration)}
-        elif isinstance(load, Actuate):
-            section = {"creases": _plain(load.creases), "angle": _plain(load.angle)}
-        else:
-            section = {"nodes": _plain(load.nodes), "force": list(load.vector)}
-        return self._with_history(section, load.history, moves=isinstance(load, Actuate))
-
-    def _with_history(self, section: dict[str, Any], given: Any, moves: bool) -> dict[str, Any]:
-        history = as_history(given)
-        if history != Constant():
+    def _part(self, part: Any) -> dict[str, Any]:
+        section = part.table()
+        history = as_history(getattr(part, "history", None))
+        if history != Constant() or "history" in part.missing:
+            moves = not isinstance(part, Load) or part.moves
             section["history"] = self._history(history, moves)
         return section
 
@@ -227,35 +209,17 @@ class _Writer:
             value = getattr(history, item.name)
             if isinstance(value, np.ndarray):
                 value = self._store(f"tables_{len(self.histories)}_{item.name}", value)
-            table[item.name] = _plain(value)
+            table[item.name] = plain(value)
         return table
 
 
 def _read(sections: Mapping[str, Any]) -> Case:
-    supports = [_support(item) for item in sections["supports"]]
-    loads = [_load(item) for item in sections["loads"]]
+    supports = [support_from(item) for item in sections["supports"]]
+    loads = [load_from(item) for item in sections["loads"]]
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were given when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
-
-
-def _support(item: Mapping[str, Any]) -> Support:
-    history = history_from(item["history"]) if "history" in item else None
-    if "base" in item:
-        return BaseMotion(item["base"], history, item["displacement"])
-    if "axis" in item:
-        return Impose(item["nodes"], item["axis"], item["displacement"], history)
-    return Fix(item["nodes"], item["axes"])
-
-
-def _load(item: Mapping[str, Any]) -> Force | Gravity | Actuate:
-    history = history_from(item["history"]) if "history" in item else None
-    if "gravity" in item:
-        return Gravity(item["gravity"], history)
-    if "creases" in item:
-        return Actuate(item["creases"], item["angle"], history)
-    return Force(item["nodes"], item["force"], history)
 
 
 def _kind(structure: Any) -> dict[str, str]:
@@ -308,9 +272,3 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
     if isinstance(value, list):
         return [_resolve(item, arrays) for item in value]
     return value
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return list(value)
-    return value.item() if isinstance(value, np.generic) else value

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases.expressions import parse, written
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.values import indices, shortened, show
 
 TOLERANCE = 1e-9
@@ -91,17 +91,16 @@ def resolve_nodes(
     """
     if isinstance(nodes, str):
         pattern = structure.pattern  # None for a structure made by hand: all nodes are vertices
-        try:
+        with within(f"{field} = "):
             return select(structure.nodes if pattern is None else pattern, nodes)
-        except InputError as error:
-            raise InputError(f"{field} = {error}") from None
     chosen = np.array(check_nodes(nodes, field), dtype=np.int64)
     count = len(structure.nodes)
     bad = chosen[(chosen < 0) | (chosen >= count)]
     if bad.size:
         raise InputError(
-            f"{field} = {show(nodes)}: node {bad[0]} is out of range; this structure has nodes 0 "
-            f"to {count - 1}"
+            f" = {show(nodes)}: node {bad[0]} is out of range; this structure has nodes 0 to "
+            f"{count - 1}",
+            field,
         )
     return chosen
 
@@ -110,7 +109,9 @@ def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
     """Return a node selection as text or as a tuple of numbers, checked but for its range."""
     if isinstance(nodes, str):
         if not nodes.strip():
-            raise InputError(f'{field} = "{nodes}": selects nothing; {_REMEDY}')
+            raise InputError(f' = "{nodes}": selects nothing; {_REMEDY}', field)
+        with within(f"{field} = "):  # names and numbers, whatever the points
+            _Selector(nodes, np.zeros((1, 3)), 0.0).mask()
         return nodes
     return indices(field, nodes, "node", 'or a selection such as "xmin"')
 

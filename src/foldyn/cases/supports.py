@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import History
+from foldyn.cases.part import Part, given_keys
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
 from foldyn.values import number, number_or_list, show
@@ -16,7 +18,7 @@ AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class Fix:
+class Fix(Part):
     """Nodes held along some axes.
 
     Parameters
@@ -30,18 +32,21 @@ class Fix:
     nodes: int | str | Sequence[int]
     axes: str = "xyz"
 
+    keys = {"nodes": "nodes", "axes": "axes"}
+    missing = {"nodes": "give its value"}
+
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
         axes = self.axes
         if not isinstance(axes, str) or not axes or set(axes) - set(AXES):
-            raise InputError(f'axes = {show(axes)}: must be letters of "xyz", as in "xz"')
+            raise InputError(f' = {show(axes)}: must be letters of "xyz", as in "xz"', "axes")
         if len(set(axes)) < len(axes):
-            raise InputError(f"axes = {show(axes)}: an axis is listed twice")
+            raise InputError(f" = {show(axes)}: an axis is listed twice", "axes")
 
 
 @dataclass(frozen=True)
-class Impose:
+class Impose(Part):
     """Nodes moved along one axis as prescribed, whatever force that takes.
 
     The displacement from the rest position is the value times the factor of the history.
@@ -64,6 +69,13 @@ class Impose:
     value: float | Sequence[float]
     history: History | Callable[[Any], Any] | None = None
 
+    keys = {"nodes": "nodes", "axis": "axis", "displacement": "value"}
+    missing = {
+        "nodes": "give its value",
+        "axis": 'give the axis of the displacement, as in axis = "x"',
+        "displacement": "give it (m), or write axes instead of axis to hold nodes",
+    }
+
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
@@ -73,7 +85,7 @@ class Impose:
 
 
 @dataclass(frozen=True)
-class BaseMotion:
+class BaseMotion(Part):
     """The base moves along one axis: all that `Fix` holds along it moves together.
 
     Each of these nodes moves by the value times the factor of the history from where it stands at
@@ -94,6 +106,9 @@ class BaseMotion:
     history: History | Callable[[Any], Any] | None = None
     value: float = 1.0
 
+    keys = {"base": "axis", "displacement": "value"}
+    missing = {"history": "give the motion of the base over time"}
+
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "axis", check_axis("axis", self.axis))
@@ -102,12 +117,41 @@ class BaseMotion:
 
 
 Support = Fix | Impose | BaseMotion
+SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion)
+
+
+def support_from(table: Any, folder: Path | None = None) -> Support:
+    """Support from its table in a case file; see `Part.of`."""
+    given = given_keys(table, SUPPORTS)
+    if not given:
+        raise InputError(
+            ": give nodes and axes (held), nodes, axis and displacement (moved), or base and "
+            "history (a base that moves)"
+        )
+    if "base" in given:
+        strange = [key for key in ("nodes", "axes", "axis") if key in given]
+        check_axis(".base", table["base"])
+        if strange:
+            raise InputError(
+                f": moves all nodes that other [[supports]] hold along {table['base']}; leave out "
+                f"{strange[0]}, and give nodes their own [[supports]]",
+                ".base",
+            )
+        return BaseMotion.of(table, folder)
+    moved = [key for key in ("displacement", "history", "axis") if key in given]
+    if moved and "axes" in given and "nodes" in given:
+        raise InputError(
+            f": holds nodes at rest, but {moved[0]} moves them; give either axes alone, or axis, "
+            'as in axis = "x", with displacement',
+            ".axes",
+        )
+    return (Impose if moved else Fix).of(table, folder)
 
 
 def check_axis(name: str, axis: Any) -> str:
     """Return the name of one axis."""
     if not isinstance(axis, str) or axis not in tuple(AXES):
-        raise InputError(f'{name} = {show(axis)}: must be one of "x", "y" and "z"')
+        raise InputError(f' = {show(axis)}: must be one of "x", "y" and "z"', name)
     return axis
 
 
@@ -118,12 +162,14 @@ def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ..
         return checked
     if isinstance(nodes, str):
         raise InputError(
-            f"{name} = {show(value)}: one displacement per node needs node numbers, but nodes is "
-            f'the selection "{nodes}"; give one number, or the nodes by number'
+            f" = {show(value)}: one displacement per node needs node numbers, but nodes is the "
+            f'selection "{nodes}"; give one number, or the nodes by number',
+            name,
         )
     if len(checked) != len(nodes):
         raise InputError(
-            f"{name} = {show(value)}: {len(checked)} values for {len(nodes)} nodes; give one, or "
-            "one for each"
+            f" = {show(value)}: {len(checked)} values for {len(nodes)} nodes; give one, or one for "
+            "each",
+            name,
         )
     return checked

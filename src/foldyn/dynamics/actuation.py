@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.kinds import folds_of
-from foldyn.dynamics.numbering import Numbering
 from foldyn.jit.compiled import kernel
+from foldyn.materials import HingeLaw
 from foldyn.materials.switch import hinge_rest_slope, move_rest
-from foldyn.shells.kernels import ShellModel
+from foldyn.mechanics.body import Body
+from foldyn.mechanics.kernels import folds_of
 
 
 class Actuators(NamedTuple):
@@ -29,11 +29,8 @@ class Actuators(NamedTuple):
     address: int  # of its energy, if it is the user's own
 
 
-def actuators(
-    structure: Any, model: Any, by: Numbering, terms: Any, histories: list
-) -> tuple[Any, Actuators]:
-    """Model with rest angles of its own, and the folds that turn."""
-    law = structure.fold_law
+def actuators(body: Body, law: HingeLaw, terms: Any, histories: list) -> tuple[Body, Actuators]:
+    """The body with rest angles of its own, and its folds, of one law, that turn."""
     numbers, spans, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
     for span, history in terms:
         turned = np.flatnonzero(span)
@@ -41,32 +38,18 @@ def actuators(
         spans.append(np.asarray(span)[turned])
         rows.append(np.full(len(turned), histories.index(history)))
     folds = np.concatenate(numbers)
-    span, row = np.concatenate(spans), np.concatenate(rows).astype(np.int64)
-    start = np.asarray(structure.fold_rest, float)[folds]
-    if isinstance(model, ShellModel):
-        pieces = [np.flatnonzero(structure.sides.piece_crease == fold) for fold in folds]
-        hinge = np.concatenate([np.zeros(0, np.int64), *pieces])
-        times = [len(each) for each in pieces]
-        span, row, start = np.repeat(span, times), np.repeat(row, times), model.piece_rest[hinge]
-        if len(folds):
-            model = model._replace(
-                piece_rest=model.piece_rest.copy(), piece_parameters=model.piece_parameters.copy()
-            )
-    else:
-        hinge = by.hinge[structure.hinge_of_fold[folds]]
-        if len(folds):
-            model = model._replace(
-                hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
-            )
+    hinge, place = np.zeros(0, np.int64), np.zeros(0, np.int64)
+    if len(folds):
+        body, hinge, place = body.actuated(folds)
     found = Actuators(
         hinge=hinge,
-        start=start,
-        span=span,
-        row=row,
+        start=body.turned()[0][hinge],
+        span=np.concatenate(spans)[place],
+        row=np.concatenate(rows).astype(np.int64)[place],
         code=int(law.code),
         address=int(law.addresses[0]) if law.addresses else 0,
     )
-    return model, found
+    return body, found
 
 
 @kernel

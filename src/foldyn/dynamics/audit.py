@@ -8,51 +8,50 @@ these are measured by what the motion holds, none by a fixed number.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.kinds import longest, stretching_forces, turning_moments
+from foldyn.mechanics.body import Body
 
 EPS = float(np.finfo(float).eps)
 MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
 BEGUN = 1e-6  # of the longest bar: displacements below that have not grown without bound
 
-# columns of the energy table that the compiled loops fill
-AUDITED = ("strain_bars", "strain_folds", "strain_bends", "kinetic", "dissipated", "work")
+AUDITED = ("kinetic", "dissipated", "work")
 
 
-def audited(groups: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the columns for a structure with these groups of strain energy."""
-    return (*groups, *AUDITED[3:])
+def audited(groups: Iterable[str]) -> tuple[str, ...]:
+    """Columns of the energy table that the compiled loops fill, for groups of strain energy."""
+    return (*groups, *AUDITED)
 
 
 def energy_error(energy: NDArray) -> NDArray:
     """Kinetic + strain + dissipated - work minus its first value (J), per sample."""
-    balance = energy[:, :5].sum(axis=1) - energy[:, 5]
+    balance = energy[:, :-1].sum(axis=1) - energy[:, -1]
     return balance - balance[0]
 
 
 def energy_scale(energy: NDArray) -> float:
     """Largest energy at play (J): kinetic, change of strain, dissipated or work."""
-    strain = energy[:, :3].sum(axis=1)
-    moving = np.column_stack([strain - strain[0], energy[:, 3:]])
+    strain = energy[:, :-3].sum(axis=1)
+    moving = np.column_stack([strain - strain[0], energy[:, -3:]])
     return float(np.nanmax(np.abs(moving)))
 
 
 class Rounding:
-    """What rounding hides in the motions of a model."""
+    """What rounding hides in the motions of a body."""
 
-    def __init__(self, model: Any) -> None:
-        self.length = longest(model)
-        self._force, self._moment = stretching_forces(model), turning_moments(model)
+    def __init__(self, body: Body) -> None:
+        self.length = body.longest()
+        self._force, self._moment = float(np.linalg.norm(body.scale())), body.turning_moments()
 
     def energy(self, energy: NDArray, moved: float) -> float:
         """Energy (J) that rounding makes in a motion with displacements up to `moved` (m).
 
-        energy : (samples, 6), as audited.
+        energy : (samples, columns), as audited.
         """
         strain = moved / self.length
         bars = self._force * moved * min(strain, 1.0)

@@ -17,7 +17,6 @@ from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.timescale import frequency, vibrating_share
 from foldyn.dynamics.timing import DEFAULT_FRACTION
-from foldyn.shells import Shell
 
 AUTO = "auto"
 LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
@@ -43,8 +42,8 @@ def choose(
     """
     conserved = case.damping.alpha == case.damping.beta == 0.0 and _steady(case)
     implicit = "energy_momentum" if conserved else "generalized_alpha"
-    if isinstance(case.structure, Shell):
-        return Choice("generalized_alpha", "implicit: the rotations of a shell have no mass")
+    if massless := case.structure.massless:
+        return Choice("generalized_alpha", f"implicit: {massless} have no mass")
     if (case.structure.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
         return Choice(implicit, "implicit: nodes without mass have no acceleration")
     omega = frequency(case, u, v, duration)

@@ -72,7 +72,7 @@ class Samples(NamedTuple):
     displacement: NDArray  # (k, n, 3)
     velocity: NDArray  # (k, n, 3)
     reaction: NDArray  # (k, s)
-    energy: NDArray  # (k, 6) as in `audit.AUDITED`
+    energy: NDArray  # (k, columns) as `audit.audited` names them
 
 
 def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:

@@ -16,7 +16,6 @@ from foldyn.dynamics.choice import AUTO, choose
 from foldyn.dynamics.course import Plan
 from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import check_mass, is_lumped
-from foldyn.dynamics.kinds import longest
 from foldyn.dynamics.methods import Method, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
@@ -231,7 +230,7 @@ def _plan(
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
-        tolerance, floor = tolerance or default, FLOOR * longest(case.structure.model)
+        tolerance, floor = tolerance or default, FLOOR * case.structure.body.longest()
         return variable_steps(duration, dt, every, largest, start, tolerance, floor, knots(case))
     return fixed_steps(duration, dt, every, critical, start)
 

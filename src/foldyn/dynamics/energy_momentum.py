@@ -28,14 +28,13 @@ from foldyn.dynamics.implicit.discrete_gradient import (
 )
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
-from foldyn.dynamics.implicit.tangent import expected_stress
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
 from foldyn.dynamics.system import moving_energy
 from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
 from foldyn.mechanics import strain_energies
-from foldyn.statics.body import FLOOR
+from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
 ORDER = 2
 TOLERANCE = 1e-11  # of the residual: what is left of it is energy

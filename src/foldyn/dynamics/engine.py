@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import Course, Plan, Samples
 from foldyn.dynamics.system import Packed, scratches
-from foldyn.mechanics import run_together, threads_for, workspaces
+from foldyn.mechanics import run_together
 
 
 class Engine(Protocol):
@@ -48,7 +48,7 @@ class Compiled:
         self, advance: Callable[..., tuple[int, int]], packed: Packed, threads: int
     ) -> None:
         self._loop, self._packed = advance, packed
-        self._works = workspaces(packed.model, threads)
+        self._works = packed.body.workspaces(threads)
         self._memories = scratches(packed.system, self._works)
         self.threads = len(self._works)
 
@@ -75,4 +75,4 @@ def threads_of(packed: Packed) -> int:
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
     alone = system.moves or system.turns or called or not packed.mass.lumped
-    return 1 if alone else threads_for(packed.model)
+    return 1 if alone else packed.body.threads

@@ -21,7 +21,6 @@ from foldyn.dynamics.stability import Growth
 from foldyn.dynamics.system import Packed
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
-from foldyn.shells import Shell
 
 
 class Method(NamedTuple):
@@ -43,7 +42,9 @@ class Method(NamedTuple):
     scheme : callable, optional
         Of an implicit method: its steps from a `Bench`.
     massless : bool
-        Whether it takes dofs without mass beside the displacements, those of a shell.
+        Whether it takes dofs without mass beside the displacements, as those of a shell.
+    conserving : bool
+        Whether it needs forces with a discrete gradient, which not every model has.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
     """
@@ -55,6 +56,7 @@ class Method(NamedTuple):
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
     massless: bool = False
+    conserving: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
@@ -105,6 +107,7 @@ METHODS: Mapping[str, Method] = {
             energy_momentum.ORDER,
             energy_momentum.residual,
             scheme=energy_momentum.EnergyMomentum,
+            conserving=True,
         ),
     )
 }
@@ -120,14 +123,22 @@ def method_of(name: str) -> Method:
 def suited(name: str, structure: Any) -> Method:
     """Integrator by its name, for a structure."""
     method = method_of(name)
-    if isinstance(structure, Shell) and not method.massless:
-        fit = ", ".join(other.name for other in METHODS.values() if other.massless)
+    found = _lacking(method, structure)
+    if found:
+        fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, structure))
         raise InputError(
-            f" = {name!r}: the rotations of a shell have no mass, which this method needs; "
-            f"choose one of {fit}",
-            "method",
+            f" = {name!r}: {found}, which this method needs; choose one of {fit}", "method"
         )
     return method
+
+
+def _lacking(method: Method, structure: Any) -> str:
+    """What a method needs and a structure lacks, in words; empty where nothing."""
+    if structure.massless and not method.massless:
+        return f"{structure.massless} have no mass"
+    if method.conserving and not structure.body.has_discrete_gradient:
+        return "the forces of this structure have no discrete gradient"
+    return ""
 
 
 def compiled(name: str) -> bool:

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.audit import AUDITED, Rounding, audited, energy_error, energy_scale
+from foldyn.dynamics.audit import Rounding, audited, energy_error, energy_scale
 from foldyn.dynamics.course import Course, Outcome, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
-from foldyn.dynamics.kinds import fold_rest
 from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.stability import is_stable, stability_limit
@@ -47,7 +46,7 @@ class Motion:
         self._course, self._out = begin(), self._room(0)
         self.at_rest = not (self._course.u.any() or self._course.v.any())
         self.seconds = 0.0
-        self._rounding = Rounding(packed.model)
+        self._rounding = Rounding(packed.body)
         self._engine: Engine | None = None
 
     @property
@@ -74,8 +73,9 @@ class Motion:
         return self._written()
 
     def _room(self, count: int) -> Samples:
-        nodes = len(self.case.structure.nodes)
-        return samples(count, nodes, len(self.case.supported_dofs), len(AUDITED))
+        structure = self.case.structure
+        energies = len(audited(structure.energy_groups))
+        return samples(count, len(structure.nodes), len(self.case.supported_dofs), energies)
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
         """Advance in stretches, between which progress is told and the motion is audited."""
@@ -176,7 +176,7 @@ class Motion:
         plan, tally, order = self.plan, self._course.tally, self._packed.numbering.order
         model = self._packed.model
         moment = f"t = {tally.time:.6g} s (step {tally.steps})"
-        rest, rows = fold_rest(model)
+        rest, rows = self._packed.body.turned()
         turned = rows[np.isnan(rest)]
         if len(turned):
             j, k = order[model.hinges[turned[0], :2]].tolist()

@@ -7,28 +7,24 @@ the case's own numbers.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.dynamics.kinds import rows_of
-from foldyn.mechanics import node_order, renumber
-from foldyn.shells.kernels import ShellModel
-
-SMALL = 300  # nodes below which all values are in the cache anyway
+from foldyn.mechanics.body import Body
+from foldyn.mechanics.renumber import ranks
 
 
 class Numbering(NamedTuple):
     """Place k in memory holds node order[k]; node i stands at place rank[i].
 
-    After the nodes come the rows of the dofs that a shell has beside displacements.
+    After the nodes come the rows of the dofs beside displacements, which keep their order.
     """
 
     order: NDArray  # (n,)
     rank: NDArray  # (n,)
-    hinge: NDArray  # (nh,) row of each hinge of the case's model in the renumbered one
     rows: int  # of arrays in memory, n or more
 
     def inward(self, values: NDArray) -> NDArray:
@@ -64,18 +60,7 @@ class Numbering(NamedTuple):
         return found
 
 
-def renumbered(model: Any) -> tuple[Any, Numbering]:
-    """Model with its nodes along the sheet, if it is one that gains from it."""
-    if isinstance(model, ShellModel) or len(model.rest) < SMALL:
-        count = model.nodes if isinstance(model, ShellModel) else len(model.rest)
-        nodes = np.arange(count)
-        return model, Numbering(nodes, nodes, np.arange(len(model.hinges)), rows_of(model))
-    order = node_order(model)
-    model, rows = renumber(model, order)
-    return model, Numbering(order, _inverse(order), _inverse(rows), len(order))
-
-
-def _inverse(order: NDArray) -> NDArray:
-    places = np.empty(len(order), np.int64)
-    places[order] = np.arange(len(order))
-    return places
+def renumbered(body: Body) -> tuple[Body, Numbering]:
+    """The body as it stands in memory while a motion is computed."""
+    body, order = body.renumbered()
+    return body, Numbering(order, ranks(order), body.rows)

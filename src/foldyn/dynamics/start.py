@@ -11,10 +11,8 @@ from scipy import sparse
 from foldyn.cases import Case, State
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, Plan
-from foldyn.dynamics.kinds import angles_of
 from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.body import ShellBody
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 AXES = "xyz"
@@ -66,7 +64,8 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
     if case.damping.beta == 0.0 or case.damping.state != "start":
         return
     free = np.asarray(case.free_dofs)
-    matrix = sparse.csc_array(case.structure.tangent(u)[free][:, free])
+    body = case.structure.body
+    matrix = sparse.csc_array(body.tangent(body.dofs(u))[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
     try:
         factors = SuperLU(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
@@ -86,7 +85,7 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
 
 def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Course:
     """State of the integrators at the start of a motion with displacement u and velocity v."""
-    model, system, mass, callbacks, by = packed
+    body, system, mass, callbacks, by = packed
     s = scratch(system)
     place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
     if callbacks.error is not None:
@@ -108,15 +107,14 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: Plan, packed: Packed) -> Cou
     first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
     tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
     inward = by.inward(q)
-    if by.rows > len(u):  # the dofs beside the displacements stand where they are in balance
+    if len(body.hidden):  # they stand where they are in balance
         if system.turns:
-            turn(model, system.actuators, s.factor)
-        hidden = ShellBody(case.structure, model).dofs(u)[u.size :]
-        inward.ravel()[u.size : u.size + len(hidden)] = hidden
+            turn(body.model, system.actuators, s.factor)
+        inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)])[body.hidden]
     return Course(
         u=inward,
         v=by.inward(w),
         carry=np.zeros_like(inward),
         tally=tally,
-        angle=angles_of(model, by.inward(u)),
+        angle=body.angles(by.inward(u)),
     )

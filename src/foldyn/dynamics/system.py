@@ -28,12 +28,12 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
-from foldyn.dynamics.kinds import energies_of, fold_angles, force_of
 from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.flat import flat
-from foldyn.mechanics import Workspace, wait
-from foldyn.statics.body import body_of
+from foldyn.mechanics import wait
+from foldyn.mechanics.body import Body
+from foldyn.mechanics.kernels import energies_of, force_of
 
 
 class Entries(NamedTuple):
@@ -50,7 +50,8 @@ class System(NamedTuple):
     varies: bool  # whether there are histories,
     moves: bool  # supports that move,
     turns: bool  # folds that are actuated
-    rows: int  # of arrays: n, and those of the dofs that a shell has beside displacements
+    rows: int  # of arrays: n, and those of the dofs beside displacements
+    energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
     supported: NDArray  # (s,) dofs 3 place + axis, in the order of the case's
     alpha: float
@@ -73,7 +74,7 @@ class Scratch(NamedTuple):
     force: NDArray  # (n, 3) F_int + beta K0 v - p
     product: NDArray  # (n, 3) the mass matrix times a vector
     line: NDArray  # (n,)
-    energy: NDArray  # (3,)
+    energy: NDArray  # (groups,) strain energies, J
     time: NDArray  # (1,) when the histories were evaluated last, s
     factor: NDArray  # (h, 3) factors of the histories and their two derivatives
     displacement: NDArray  # (n, 3) u, where supports move at every evaluation
@@ -87,11 +88,16 @@ class Scratch(NamedTuple):
 class Packed(NamedTuple):
     """A case for compiled integrators; `callbacks` must live as long as the others serve."""
 
-    model: Any  # BarsHinges or ShellModel
+    body: Body
     system: System
     mass: Inertia
     callbacks: Callbacks
     numbering: Numbering
+
+    @property
+    def model(self) -> Any:
+        """The arrays of the body's kernels."""
+        return self.body.model
 
 
 def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
@@ -100,7 +106,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
     """
     structure = case.structure
-    model, by = renumbered(structure.model)
+    body, by = renumbered(structure.body)
     nodal = by.matrix(structure.mass)
     mass = inertia(nodal, by.held(case.fixed))
     histories: list[History] = []
@@ -115,16 +121,17 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     if case.damping.beta > 0.0:
         state = start if case.damping.state == "start" else None
         state = np.zeros_like(structure.nodes) if state is None else state
-        body = body_of(structure)
-        k0 = by.matrix(body.tangent(body.dofs(state))) * case.damping.beta
+        k0 = structure.body.tangent(structure.body.dofs(state))
+        k0 = by.matrix(k0) * case.damping.beta
     else:
         k0 = sparse.csr_array((0, 0))
-    model, turned = actuators(structure, model, by, case.actuation_terms, histories)
+    body, turned = actuators(body, structure.fold_law, case.actuation_terms, histories)
     system = System(
         varies=bool(histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
         rows=by.rows,
+        energies=len(body.energy_groups),
         order=by.order,
         supported=by.dofs(case.supported_dofs),
         alpha=float(case.damping.alpha),
@@ -137,7 +144,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         moved_mass=_moved_mass(nodal, moves, histories),
         actuators=turned,
     )
-    return Packed(model, system, mass, callbacks, by)
+    return Packed(body, system, mass, callbacks, by)
 
 
 def _entries(terms, histories) -> Entries:
@@ -178,7 +185,7 @@ def scratch(system: System) -> Scratch:
     """Memory for one thread that has all nodes."""
     nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
-    line, energy, factor = np.zeros(nodes), np.zeros(3), np.zeros((histories, 3))
+    line, energy, factor = np.zeros(nodes), np.zeros(system.energies), np.zeros((histories, 3))
     never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
     stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
     return Scratch(
@@ -187,7 +194,7 @@ def scratch(system: System) -> Scratch:
     )  # fmt: skip
 
 
-def scratches(system: System, works: Sequence[Workspace]) -> list[Scratch]:
+def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
     """Memory of each thread of a team."""
     whole = scratch(system)
     return [
@@ -294,7 +301,7 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     if system.moves:
         power_in += _moving_power(system.moved, system.moved_mass, alpha, s.force, s.factor)
     if system.turns:
-        power_in += actuator_power(model, system.actuators, s.factor, fold_angles(work))
+        power_in += actuator_power(model, system.actuators, s.factor, work.fold_angle)
     return power_in, power_out
 
 
@@ -323,13 +330,14 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     times_mass(mass, s.moving, s.product)
     for k in range(system.supported.size):
         reaction[k] = product[system.supported[k]] + force[system.supported[k]]
-    energy[3] = kinetic_energy(mass, s.velocity, s.product)
+    groups = s.energy.size
+    energy[groups] = kinetic_energy(mass, s.velocity, s.product)
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
         reaction[k] += system.alpha * product[system.supported[k]]
     energies_of(model, s.displacement, work, s.energy)
-    for k in range(3):
+    for k in range(groups):
         energy[k] = s.energy[k]
-    energy[4] = tally.dissipated
+    energy[groups + 1] = tally.dissipated
     # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[5] = tally.work + moving_energy(system.moved_mass, s.factor)
+    energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
-from foldyn.mechanics import angles, internal_force, workspace
 from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 MOST_TIMES = 4000  # at which loads are looked at
@@ -25,7 +24,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     the angular velocity of its rigid part. Hinges count with at least their nominal stiffness.
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
-    stiffness = sparse.csr_array(structure.tangent(u, floor=1.0))
+    stiffness = structure.body.tangent(u, 1.0)
     force = _applied(case, u) - stiffness @ _imposed(case)
     k = stiffness[free][:, free]
     m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
@@ -73,22 +72,17 @@ def vibrating_share(
 
 def _applied(case: Case, u: NDArray) -> NDArray:
     """Forces (3n,) at u that loads and actuated folds exert beside the internal ones, N."""
-    force = -case.structure.internal_force(u)
+    body = case.structure.body
+    force = -body.internal(u)
     for load, _ in case.load_terms:
-        force += load
+        force += load.ravel()
     change = np.zeros(len(case.structure.folds))
     for turn, _ in case.actuation_terms:
         change += turn
     if change.any():
-        model = case.structure.model
-        rest, runs = angles(model.rest + u, model.hinges), model.hinge_runs.copy()
-        rest[case.structure.hinge_of_fold] += change
-        runs[:, 2] = 0  # linear about the angles as they are
-        linear = model._replace(hinge_rest=rest, hinge_runs=runs, bar_runs=model.bar_runs[:0])
-        pushed = np.empty_like(force)
-        internal_force(linear, np.ascontiguousarray(u), pushed, workspace(linear))
-        force -= pushed
-    return force.ravel()
+        linear = body.nominal(u)
+        force -= linear.folded(linear.fold_rest + change).internal(u) - linear.internal(u)
+    return force
 
 
 def _imposed(case: Case) -> NDArray:
@@ -101,7 +95,7 @@ def _imposed(case: Case) -> NDArray:
 
 def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
     """Whether forces at the start set the structure in motion at once."""
-    internal = case.structure.internal_force(u)
+    internal = case.structure.body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
     for load, history in case.load_terms:
         force = force + history(start) * load

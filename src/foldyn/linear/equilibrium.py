@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.body import Body
 from foldyn.statics import OrigamiProblem, trace
-from foldyn.statics.body import Body
 from foldyn.statics.origami import drives, is_actuated
 from foldyn.statics.rigid import free_rigid_motions
 

@@ -19,11 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn import mechanics
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.jit.compiled import kernel
 from foldyn.linear.answer import Answer
 from foldyn.linear.direct import dynamic_stiffness, solve, warn_of_resonances
 from foldyn.linear.excitation import Drive
@@ -31,8 +29,6 @@ from foldyn.linear.linearized import Linearized
 from foldyn.linear.secant import equivalent_slope
 from foldyn.linear.transmissibility import drive_factor, drive_shape
 from foldyn.materials import Superlinear
-from foldyn.mechanics.energy import hinge_dihedral
-from foldyn.structures import Structure
 from foldyn.values import number, whole
 
 REFERENCE = 1.0  # degrees: the swing for which the slopes stand in the system that is given
@@ -141,23 +137,10 @@ class _Hinges:
     """The superlinear hinges of a system: gradients, offsets from rest, stiffness and slopes."""
 
     def __init__(self, system: Linearized) -> None:
-        structure, u = system.case.structure, np.ascontiguousarray(system.displacement)
-        self.gradient = sparse.csr_array((0, len(system.free)))
-        self.offset = self.stiffness = np.zeros(0)
-        if isinstance(structure, Structure):  # shells have none
-            model = structure.model
-            codes = np.repeat(model.hinge_runs[:, 2], np.diff(model.hinge_runs[:, :2]).ravel())
-            rows = np.flatnonzero(codes == Superlinear.code)
-            count = len(rows)
-            columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
-            entries = _gradients(model, u)[rows].ravel()
-            whole = sparse.csr_array(
-                (entries, columns.ravel(), 12 * np.arange(count + 1)), shape=(count, u.size)
-            )
-            self.gradient = sparse.csr_array(whole[:, system.free])
-            angle = mechanics.angles(model.rest + u, model.hinges)
-            self.offset = (angle - model.hinge_rest)[rows]
-            self.stiffness = model.hinge_stiffness[rows]
+        body = system.case.structure.body
+        found = body.soft_hinges(body.dofs(system.displacement))
+        self.gradient = sparse.csr_array(found.gradient[:, system.free])
+        self.offset, self.stiffness = found.offset, found.stiffness
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 
     def slope(self, motion: NDArray) -> NDArray[np.float64]:
@@ -169,17 +152,6 @@ class _Hinges:
         """What slopes add to the stiffness with those of reference."""
         weight = sparse.diags_array(self.stiffness * (slope - self.reference))
         return self.gradient.T @ weight @ self.gradient
-
-
-@kernel
-def _gradients(model, u):
-    """Gradients (nh, 12) of all dihedrals with respect to their nodes j, k, i, l."""
-    out = np.empty((model.hinges.shape[0], 12))
-    for e in range(out.shape[0]):
-        gradient = hinge_dihedral(model, u, e)
-        for c in range(12):
-            out[e, c] = gradient[c + 1]
-    return out
 
 
 class _Balance:

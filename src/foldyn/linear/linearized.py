@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn import mechanics
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import FoldynWarning
 from foldyn.linear.equilibrium import Station, station
 from foldyn.linear.secant import equivalent_slope
 from foldyn.materials import Superlinear
-from foldyn.mechanics import BarsHinges
-from foldyn.statics.body import BarsHingesBody, Body, body_of
+from foldyn.mechanics.body import Body
 from foldyn.statics.fill import check_fill
 from foldyn.values import number
 
@@ -105,7 +103,7 @@ def linearize(
     body = where.body
     free = np.concatenate([case.free_dofs, body.hidden])
     exact = body.tangent(where.dofs)
-    change, soft = _slope_change(case, body, where.displacement, amplitude)
+    change, soft = _slope_change(body, where.dofs, amplitude)
     if soft:
         _warn_of(soft)
     stiffness = exact if change is None else sparse.csr_array(exact + change)
@@ -131,48 +129,17 @@ def _amplitude(secant: float | None) -> float | None:
 
 
 def _slope_change(
-    case: Case, body: Body, displacement: NDArray, amplitude: float | None
+    body: Body, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) for other slopes, and how many hinges are soft."""
-    if not isinstance(body, BarsHingesBody):
-        if isinstance(case.structure.fold_law, Superlinear):
-            raise InputError(
-                ' = "superlinear": the folds of a shell have no slope at rest; modes and '
-                'frequency responses of shells take "linear" or "enhanced"',
-                "fold_law",
-            )
-        return None, 0
-    model = body.model
-    theta = mechanics.angles(model.rest + displacement, model.hinges)
-    change, soft = np.zeros(len(theta)), 0
-    for start, end, code, _ in model.hinge_runs:
-        if code != Superlinear.code:
-            continue
-        rows = slice(start, end)
-        offset = theta[rows] - model.hinge_rest[rows]
-        slope = Superlinear().slope(theta[rows], model.hinge_rest[rows])
-        if amplitude is not None:
-            change[rows] = equivalent_slope(offset, amplitude) - slope
-        else:
-            at_rest = (slope < SOFT) & (model.hinge_stiffness[rows] > 0.0)
-            soft += int(at_rest.sum())
-            change[rows] = np.where(at_rest, -slope, 0.0)
-    if not change.any():
-        return None, soft
-    alone = _only_slopes(model, theta, change)
-    return mechanics.tangent(alone, case.structure.sparsity, displacement).tocsr(), soft
-
-
-def _only_slopes(model: BarsHinges, theta: NDArray, slope: NDArray) -> BarsHinges:
-    """The model of hinges alone, without moment at angles (nh,) and with given slopes / k there."""
-    runs = model.hinge_runs.copy()
-    runs[:, 2] = 0  # the linear law
-    return model._replace(
-        bar_runs=model.bar_runs[:0],
-        hinge_runs=runs,
-        hinge_stiffness=model.hinge_stiffness * slope,
-        hinge_rest=theta,
-    )
+    hinges = body.soft_hinges(q)
+    slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
+    if amplitude is not None:
+        change, soft = equivalent_slope(hinges.offset, amplitude) - slope, 0
+    else:
+        at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
+        change, soft = np.where(at_rest, -slope, 0.0), int(at_rest.sum())
+    return (body.soft_tangent(q, change) if change.any() else None), soft
 
 
 def _all_mass(case: Case, hidden: int) -> sparse.csr_array:
@@ -193,7 +160,7 @@ def _damping(
         return matrix
     reference = exact
     if damping.state == "rest":
-        body = body_of(case.structure)
+        body = case.structure.body
         reference = body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
     return sparse.csc_array(matrix + damping.beta * _block(reference, free))
 

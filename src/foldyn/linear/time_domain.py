@@ -27,7 +27,6 @@ from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.equilibrium import Station
 from foldyn.linear.excitation import Drive
-from foldyn.shells import Shell
 from foldyn.values import choice, number
 
 
@@ -69,7 +68,7 @@ class Rig:
     def __init__(self, station: Station, drive: Drive, integration: Integration) -> None:
         self.case, self.state = station.problem.case, station.displacement
         self.drive, self.integration = drive, integration
-        massless = isinstance(self.case.structure, Shell)
+        massless = self.case.structure.massless
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
         folded = [load for load in self.case.loads if isinstance(load, Actuate)]
         history = Table([0.0, 1.0], [station.factor, station.factor])

@@ -50,6 +50,17 @@ def angles(x, hinges):
 
 
 @kernel
+def gradients(model, u):
+    """Gradients (nh, 12) of all dihedrals with respect to their nodes j, k, i, l."""
+    out = np.empty((model.hinges.shape[0], 12))
+    for e in range(out.shape[0]):
+        gradient = hinge_dihedral(model, u, e)
+        for c in range(12):
+            out[e, c] = gradient[c + 1]
+    return out
+
+
+@kernel
 def strain_energies(model, u, out):
     """Energy (J): out[0] the bars, out[1 + g] the hinges of group g."""
     out[:] = 0.0

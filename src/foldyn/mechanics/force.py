@@ -42,6 +42,7 @@ class Workspace(NamedTuple):
     displacement: NDArray  # (r, 4)
     sums: NDArray  # (r, 4) forces
     angle: NDArray  # (nh,) the dihedrals of the last evaluation, rad; all threads write to one
+    fold_angle: NDArray  # (nh,) the same: what actuators may turn
     strips: Strips
     team: Team
 
@@ -56,7 +57,7 @@ def workspaces(model: BarsHinges, threads: int) -> list[Workspace]:
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
     return [
-        Workspace(**_scratch(part.rows), angle=angle, strips=part, team=member)
+        Workspace(**_scratch(part.rows), angle=angle, fold_angle=angle, strips=part, team=member)
         for part, member in zip(parts, team(len(parts)), strict=True)
     ]
 

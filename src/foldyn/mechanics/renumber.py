@@ -22,7 +22,7 @@ def node_order(model: BarsHinges) -> NDArray:
     n, (a, b) = len(model.rest), model.bars.astype(np.int64).T
     graph = sparse.csr_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n))
     order = reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
-    number = _numbers(order)
+    number = ranks(order)
     better = np.abs(number[a] - number[b]).max(initial=0) < np.abs(a - b).max(initial=0)
     return order if better else np.arange(n)
 
@@ -32,7 +32,7 @@ def renumber(model: BarsHinges, order: NDArray) -> tuple[BarsHinges, NDArray]:
 
     Laws, groups and parameters stay; elements are sorted anew within their runs.
     """
-    number = _numbers(order).astype(np.uint32)
+    number = ranks(order).astype(np.uint32)
     bars, hinges = number[model.bars], number[model.hinges]
     bar, hinge = _rows(bars, model.bar_runs), _rows(hinges, model.hinge_runs)
     moved = model._replace(
@@ -50,8 +50,8 @@ def renumber(model: BarsHinges, order: NDArray) -> tuple[BarsHinges, NDArray]:
     return moved, hinge
 
 
-def _numbers(order: NDArray) -> NDArray:
-    """New number (n,) of each old node."""
+def ranks(order: NDArray) -> NDArray:
+    """Place (n,) of each number in an order."""
     number = np.empty(len(order), np.int64)
     number[order] = np.arange(len(order))
     return number

@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
-from foldyn.materials import bar_law, hinge_law
 from foldyn.plots import style
-from foldyn.shells import Shell
 
 if TYPE_CHECKING:
+    from foldyn.shells import Shell
     from foldyn.structures import Structure
 
 MOST_CURVES = 4
@@ -53,34 +52,19 @@ def plot_laws(
     low, high = stretch
     if not (0.0 < low < high < np.inf):
         raise InputError(f"stretch: {stretch!r}; give two positive, increasing stretches")
-    kinds = _hinges(structure)
-    bars = not isinstance(structure, Shell)
-    if not kinds and not bars:
+    kinds = [kind for kind in structure.hinge_kinds if len(kind.nodes)]
+    bars = structure.bar_law
+    if not kinds and bars is None:
         raise InputError("structure: is a shell without folds, which has no laws to draw")
-    columns = len(kinds) + bars
+    columns = len(kinds) + (bars is not None)
     figure = style.new_figure(3.5 * columns, 3.9)
     style.title_above(figure, title)
     frames = figure.subplots(1, columns, squeeze=False)[0]
-    for axes, (kind, spec, hinges, stiffness, rest) in zip(frames, kinds, strict=False):
-        _draw_hinges(axes, kind, hinge_law(spec), hinges, stiffness, rest)
-    if bars:
-        law = bar_law(structure.options.bar_law)
-        _draw_bar(frames[-1], law, structure.sheet.youngs_modulus, low, high)
+    for axes, kind in zip(frames, kinds, strict=False):
+        _draw_hinges(axes, *kind)
+    if bars is not None:
+        _draw_bar(frames[-1], bars, structure.sheet.youngs_modulus, low, high)
     return style.finish(figure)
-
-
-def _hinges(structure: Structure | Shell) -> list[tuple[str, Any, Any, Any, Any]]:
-    """Kinds of hinges that a structure has: name, law, ends (k, 2), stiffness and rest angle."""
-    options, of_folds = structure.options, (structure.fold_stiffness, structure.fold_rest)
-    if isinstance(structure, Shell):  # whose hinges are pieces of creases
-        kinds: list[Any] = [("fold", options.fold_law, structure.pattern.creases, *of_folds)]
-    else:
-        of_bends = structure.bend_stiffness, structure.bend_rest
-        kinds = [
-            ("fold", options.fold_law, structure.folds, *of_folds),
-            ("bend", structure.options.bend_law, structure.bends, *of_bends),
-        ]
-    return [kind for kind in kinds if len(kind[2])]
 
 
 def _draw_hinges(

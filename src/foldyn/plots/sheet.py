@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from foldyn.plots import scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.visibility import hidden_points, split_edges
-from foldyn.shells import Shell
 
 _HIDDEN = 0.3  # opacity of what lies behind a panel
 
@@ -46,8 +45,8 @@ def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[Ed
     if actuated and len(sheet.actuated):
         kinds.append(EdgeKind("actuated crease", sheet.actuated, style.ACTUATED, 6.0, "solid"))
     if elements and len(sheet.inner_bars):
-        inner = isinstance(sheet.structure, Shell)
-        name, width = ("side of a triangle", 0.35) if inner else ("bar inside a panel", 0.7)
+        bars = sheet.structure is not None and sheet.structure.bar_law is not None
+        name, width = ("bar inside a panel", 0.7) if bars else ("side of a triangle", 0.35)
         kinds.append(EdgeKind(name, sheet.inner_bars, style.GRAY, width, "solid"))
     kinds.append(EdgeKind("boundary", sheet.boundary, style.BLACK, 1.1, "solid"))
     for kind, edges in sheet.creases().items():

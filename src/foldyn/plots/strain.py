@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from foldyn.plots import style
-from foldyn.shells.shell import GROUPS as OF_SHELLS
-from foldyn.structures.structure import GROUPS as OF_BARS_AND_HINGES
+from foldyn.shells.body import GROUPS as OF_SHELLS
+from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +24,7 @@ PARTS: Mapping[str, tuple[str, str]] = {
 
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
     """Parts of the strain energy of a result, in the order of its structure."""
-    return OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
+    return tuple(OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES)
 
 
 def stacked(result: xr.Dataset) -> list[str]:

@@ -43,7 +43,7 @@ class Album:
             Heading("The structure"),
             self.figure("structure", caption, lambda: plots.draw_structure(case)),
         ]
-        of_shell = isinstance(case.structure, Shell)
+        of_shell = case.structure.bar_law is None
         laws = (
             "Constitutive curves: moment of a fold, over the whole crease, against the dihedral."
             if of_shell

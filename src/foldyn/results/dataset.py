@@ -23,11 +23,6 @@ AXIS = np.array(["x", "y", "z"])
 
 ENERGIES: Mapping[str, str] = {
     "kinetic": "kinetic energy",
-    "strain_bars": "strain energy of the bars",
-    "strain_folds": "strain energy of the folds",
-    "strain_bends": "strain energy of the bends",
-    "strain_membrane": "strain energy of stretching",
-    "strain_bending": "strain energy of bending",
     "dissipated": "energy dissipated by damping since the start",
     "work": "work of the loads since the start",
 }
@@ -74,8 +69,9 @@ def trajectory_dataset(
     time = np.array(time, dtype=np.float64)
     data = motion_variables("time", displacement, reaction)
     data["velocity"] = variable(("time", "node", "axis"), velocity, "m/s", "velocity")
+    texts = {**ENERGIES, **case.structure.energy_groups}
     for name, values in energies.items():
-        data[name] = variable(("time",), values, "J", ENERGIES[name])
+        data[name] = variable(("time",), values, "J", texts[name])
     varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
     sampled = any(type(part.history) not in HISTORIES.values() for part in varying)
     times = stage_times(statistics) if sampled else None

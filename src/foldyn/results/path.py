@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
-from foldyn.results.dataset import ENERGIES, motion_variables, result_dataset, variable
+from foldyn.results.dataset import motion_variables, result_dataset, variable
 
 WORK = "work of loads, supports and actuators since the first point"
 _KINDS = ("regular", "limit", "bifurcation")
@@ -55,9 +55,9 @@ def path_dataset(
     """
     factor = np.array(load_factor, dtype=np.float64)
     data = motion_variables("step", displacement, reaction)
+    texts = {"work": WORK, **case.structure.energy_groups}
     for name, values in energies.items():
-        text = WORK if name == "work" else ENERGIES[name]
-        data[name] = variable(("step",), values, "J", text)
+        data[name] = variable(("step",), values, "J", texts[name])
     kinds = np.array(solution["point"], dtype=f"<U{max(map(len, _KINDS))}")
     texts = {
         "negative_eigenvalues": "negative eigenvalues of the tangent (unstable if any)",

@@ -10,11 +10,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
+from foldyn.jit.flat import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.threads import Team, team
 
 
@@ -44,11 +47,10 @@ class ShellModel(NamedTuple):
     code: int  # of the creases' law
     addresses: NDArray  # (3,) of a law of the user's
 
-
-class Whole(NamedTuple):
-    """What a thread that is alone computes: all of it."""
-
-    own: NDArray  # (2,) first and last + 1 of the nodes
+    @property
+    def rows(self) -> int:
+        """Rows of three that hold displacements and then rotations, the last one filled up."""
+        return self.nodes + -(-self.rotations // 3)
 
 
 class ShellWork(NamedTuple):
@@ -57,7 +59,7 @@ class ShellWork(NamedTuple):
     turn: NDArray  # (nh,) change of the dihedrals, rad
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
-    piece_turn: NDArray  # (c,) dihedral of each piece of a crease, rad
+    fold_angle: NDArray  # (c,) dihedral of each piece of a crease, rad
     angle: NDArray  # (nh,) dihedrals, rad
     strips: Whole
     team: Team
@@ -68,7 +70,7 @@ def shell_work(model: ShellModel) -> ShellWork:
     nh = len(model.hinges)
     return ShellWork(
         np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh), np.zeros(len(model.piece_hinge)),
-        np.zeros(nh), Whole(np.array([0, model.nodes + -(-model.rotations // 3)])), team(1)[0],
+        np.zeros(nh), Whole(np.array([0, model.rows])), team(1)[0],
     )  # fmt: skip
 
 
@@ -92,7 +94,7 @@ def fold(model, u, x, work):
     for k in range(model.piece_hinge.size):
         e = model.piece_hinge[k]
         both = x[model.piece_rotations[k, 0]] + x[model.piece_rotations[k, 1]]
-        work.piece_turn[k] = model.hinge_rest[e] + work.turn[e] - model.per_reach * both
+        work.fold_angle[k] = model.hinge_rest[e] + work.turn[e] - model.per_reach * both
 
 
 @kernel
@@ -134,7 +136,7 @@ def shell_energy(model, u, x, work, out):
     p = model.piece_parameters
     for k in range(model.piece_hinge.size):
         w = hinge_energy(
-            model.code, work.piece_turn[k], model.piece_rest[k],
+            model.code, work.fold_angle[k], model.piece_rest[k],
             p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[0],
         )  # fmt: skip
         out[2] += model.piece_stiffness[k] * w
@@ -170,7 +172,7 @@ def shell_force(model, u, x, force, couple, work):
     p = model.piece_parameters
     for k in range(model.piece_hinge.size):
         moment = model.piece_stiffness[k] * hinge_moment(
-            model.code, work.piece_turn[k], model.piece_rest[k],
+            model.code, work.fold_angle[k], model.piece_rest[k],
             p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1],
         )  # fmt: skip
         work.moment[model.piece_hinge[k]] += moment
@@ -182,3 +184,36 @@ def shell_force(model, u, x, force, couple, work):
             if node < n:
                 for c in range(3):
                     force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+
+
+@overload(force_of, inline="always")
+def _force(model, u, force, work):
+    if model.instance_class is not ShellModel:
+        return None
+
+    def shell(model, u, force, work):
+        n, r = model.nodes, model.rotations
+        moved, out = flat(u), flat(force)
+        out[3 * n + r :] = 0.0
+        shell_force(model, u[:n], moved[3 * n : 3 * n + r], force[:n], out[3 * n : 3 * n + r], work)
+
+    return shell
+
+
+@overload(energies_of, inline="always")
+def _energies(model, u, work, out):
+    if model.instance_class is not ShellModel:
+        return None
+
+    def shell(model, u, work, out):
+        n, r = model.nodes, model.rotations
+        shell_energy(model, u[:n], flat(u)[3 * n : 3 * n + r], work, out)
+
+    return shell
+
+
+@overload(folds_of, inline="always")
+def _folds(model):
+    if model.instance_class is not ShellModel:
+        return None
+    return lambda model: (model.piece_rest, model.piece_parameters, model.piece_stiffness)

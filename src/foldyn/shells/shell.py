@@ -6,6 +6,7 @@ import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,26 +15,28 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
+from foldyn.mechanics.body import Fill
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
-from foldyn.shells.balance import balanced_rotations
+from foldyn.shells.body import GROUPS, ShellBody
 from foldyn.shells.element import side_stiffness, without_free_sides
-from foldyn.shells.kernels import ShellModel, shell_energy, shell_force, shell_work
+from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import Edge, shell_mesh
 from foldyn.shells.sides import Sides, sides
-from foldyn.shells.sparsity import ShellPattern, shell_pattern
-from foldyn.shells.tangent import shell_tangent
+from foldyn.shells.sparsity import ShellPattern
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_scale, fold_stiffness
 from foldyn.structures.discretize import edge_lengths, per_crease
 from foldyn.structures.discretize import fold_rest as rest_of
 from foldyn.structures.mass import MASS_RULES, Surface
+from foldyn.structures.structure import HingeKind
 from foldyn.values import show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 PER_NODE = 16_000.0
 """Bytes a node with its tangent: 14,200 and 16,000 measured with 3,721 and 14,641 nodes."""
-GROUPS = ("strain_membrane", "strain_bending", "strain_folds")
+PER_DOUBLING, LEAST = 5900.0, 1450
+"""Memory of its factors, see `Fill`: 23 and 35 kB a dof with 21,963 and 87,123 dofs."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,25 @@ class Shell:
             f"{len(self.fold_stiffness)} folds, mass {self.options.mass}>"
         )
 
+    energy_groups: ClassVar[Mapping[str, str]] = GROUPS
+    massless: ClassVar[str] = "the rotations of a shell"
+    bar_law: ClassVar[None] = None
+
     @property
-    def energy_groups(self) -> tuple[str, ...]:
-        """Names of the parts of the strain energy."""
-        return GROUPS
+    def fill(self) -> Fill:
+        """Memory of the factors of its tangent."""
+        return Fill(PER_DOUBLING, LEAST, f"divisions = {self.options.divisions}", "take fewer")
+
+    @property
+    def hinge_kinds(self) -> tuple[HingeKind, ...]:
+        """Its folds, with their law."""
+        ends = self.pattern.creases  # its hinges are pieces of creases
+        return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
+
+    @cached_property
+    def body(self) -> ShellBody:
+        """What solvers take."""
+        return ShellBody(self.model, self.sides.piece_crease, self.fold_law)
 
     @property
     def rotations(self) -> int:
@@ -153,8 +171,7 @@ class Shell:
     @cached_property
     def fold_rest(self) -> NDArray:
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
-        crease, count = self.sides.piece_crease, len(self.fold_stiffness)
-        rest = np.bincount(crease, self.piece_rest, count) / np.bincount(crease, minlength=count)
+        rest = self.body.fold_rest
         rest.setflags(write=False)
         return rest
 
@@ -200,10 +217,10 @@ class Shell:
             addresses=np.array(law.addresses or (0, 0, 0), np.int64),
         )
 
-    @cached_property
+    @property
     def sparsity(self) -> ShellPattern:
         """Pattern of the tangent."""
-        return shell_pattern(self.model)
+        return self.body.sparsity
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -234,9 +251,8 @@ class Shell:
         rotation : (r,), rad; without it the one in balance.
         """
         u, x = self._state(u, rotation)
-        out = np.empty(3)
-        shell_energy(self.model, u, x * self._reach, shell_work(self.model), out)
-        return dict(zip(GROUPS, out.tolist(), strict=True))
+        energies = self.body.energies(np.append(u, x * self._reach))
+        return dict(zip(GROUPS, energies.tolist(), strict=True))
 
     def energy(self, u: ArrayLike, rotation: ArrayLike | None = None) -> float:
         """Strain energy (J)."""
@@ -245,9 +261,8 @@ class Shell:
     def forces(self, u: ArrayLike, rotation: ArrayLike) -> tuple[NDArray, NDArray]:
         """Derivatives of the energy: forces (n, 3), N, and moments about the rotations, N m."""
         u, x = self._state(u, rotation)
-        force, couple = np.empty_like(u), np.empty_like(x)
-        shell_force(self.model, u, x * self._reach, force, couple, shell_work(self.model))
-        return force, couple * self._reach
+        force = self.body.internal(np.append(u, x * self._reach))
+        return force[: u.size].reshape(-1, 3), force[u.size :] * self._reach
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m, with rotations in balance."""
@@ -259,8 +274,7 @@ class Shell:
     ) -> sparse.csr_array:
         """Second derivative (3n + r, 3n + r) of the energy: 3 node + axis, then the rotations."""
         u, x = self._state(u, rotation)
-        x, work = x * self._reach, shell_work(self.model)
-        matrix = shell_tangent(self.model, self.sparsity, u, x, work, floor)
+        matrix = self.body.tangent(np.append(u, x * self._reach), floor)
         units = np.repeat([1.0, self._reach], [u.size, x.size])
         matrix.data *= np.repeat(units, np.diff(matrix.indptr)) * units[matrix.indices]
         return matrix
@@ -268,7 +282,7 @@ class Shell:
     def balanced(self, u: ArrayLike) -> NDArray:
         """Rotations (r,) about which there is no moment at displacement u (n, 3)."""
         u, _ = self._state(u, np.zeros(self.rotations))
-        return balanced_rotations(self.model, self.sparsity, u) / self._reach
+        return self.body.dofs(u)[u.size :] / self._reach
 
     def _state(self, u: ArrayLike, rotation: ArrayLike | None) -> tuple[NDArray, NDArray]:
         array = np.ascontiguousarray(u, float)

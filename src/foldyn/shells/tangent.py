@@ -134,7 +134,7 @@ def _add_creases(model, pattern, u, work, floor, data):
     flat = turned.reshape(12, 12)
     p = model.piece_parameters
     for k in range(model.piece_hinge.size):
-        h, turn, rest = model.piece_hinge[k], work.piece_turn[k], model.piece_rest[k]
+        h, turn, rest = model.piece_hinge[k], work.fold_angle[k], model.piece_rest[k]
         work.moment[h] = model.piece_stiffness[k] * hinge_moment(
             model.code, turn, rest, p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1]
         )

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.statics.body import Body
+from foldyn.mechanics.body import Body
 
 
 class Actuation:
@@ -24,7 +24,7 @@ class Actuation:
 
     def rest(self, factor: float) -> NDArray:
         """Rest angles (nf,), rad."""
-        angle = self._body.rest_angles() + self._constant + factor * self._change
+        angle = self._body.fold_rest + self._constant + factor * self._change
         return np.where((angle >= 0.0) & (angle <= 2.0 * math.pi), angle, np.nan)
 
     def _folded(self, factor: float) -> Body:

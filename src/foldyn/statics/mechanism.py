@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from foldyn import mechanics
 from foldyn.errors import InputError
-from foldyn.mechanics import BarsHinges
+from foldyn.mechanics.body import Unstrained
 from foldyn.statics.linear_solver import SuperLU
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
-from foldyn.structures import Structure
 
 SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
 SUSPICIOUS = (
@@ -62,13 +60,12 @@ def mechanisms(problem: OrigamiProblem) -> list[str]:
     held[problem.held] = True
     x = structure.nodes + problem.displacement(problem.start())
     found = name_rigid_motions(x, held)
-    if found or not isinstance(structure, Structure):
-        return found  # a shell resists every other motion
-    return _internal(problem)
+    unstrained = None if found else structure.body.unstrained(problem.start())
+    return found if unstrained is None else _internal(problem, unstrained)
 
 
-def _internal(problem: OrigamiProblem) -> list[str]:
-    modes = free_modes(problem)
+def _internal(problem: OrigamiProblem, unstrained: Unstrained) -> list[str]:
+    modes = free_modes(problem, unstrained)
     if not modes.shape[1]:
         return []
     size = np.linalg.norm(modes.reshape(-1, 3, modes.shape[1]), axis=1)  # (n, modes)
@@ -87,13 +84,10 @@ def _name(mode: NDArray, size: NDArray) -> str:
     return f"internal mechanism that moves node{plural} {nodes}{more}{along}"
 
 
-def free_modes(problem: OrigamiProblem) -> NDArray:
+def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     """Motions (m, k) of the free dofs that strain nothing, orthonormal."""
-    model = _unstrained(problem)
-    pattern, rest = problem.structure.sparsity, np.zeros(problem.structure.nodes.shape)
-    hinges = mechanics.tangent(model._replace(bar_runs=model.bar_runs[:0]), pattern, rest).tocsr()
     free = problem.free
-    matrix = mechanics.tangent(model, pattern, rest).tocsr()[free][:, free].tocsc()
+    matrix = unstrained.tangent[free][:, free].tocsc()
     diagonal = matrix.diagonal()
     if not (diagonal > 0.0).all():
         return _unresisted(problem, diagonal)
@@ -114,8 +108,8 @@ def free_modes(problem: OrigamiProblem) -> NDArray:
         vectors = vectors[:, np.argsort(values)]
     shapes = np.zeros((size + len(problem.held), vectors.shape[1]))
     shapes[free] = vectors * scale[:, None]
-    unstrained = [k for k, mode in enumerate(shapes.T) if _strains_nothing(problem, hinges, mode)]
-    return np.linalg.qr(shapes[:, unstrained])[0] if unstrained else shapes[:, :0]
+    kept = [k for k, mode in enumerate(shapes.T) if _strains_nothing(unstrained, mode)]
+    return np.linalg.qr(shapes[:, kept])[0] if kept else shapes[:, :0]
 
 
 def _softest(factors: SuperLU, guess: NDArray) -> float:
@@ -137,42 +131,9 @@ def _unresisted(problem: OrigamiProblem, diagonal: NDArray) -> NDArray:
     return modes
 
 
-def _unstrained(problem: OrigamiProblem) -> BarsHinges:
-    """The model with linear laws and without strain where the path is to start."""
-    model = problem.structure.model
-    x = model.rest + problem.start().reshape(model.rest.shape)
-    vector = x[model.bars[:, 1]] - x[model.bars[:, 0]]
-    bar_runs, hinge_runs = model.bar_runs.copy(), model.hinge_runs.copy()
-    bar_runs[:, 2] = hinge_runs[:, 2] = 0
-    return model._replace(
-        rest=x,
-        bar_vector=vector,
-        bar_per_length2=1.0 / np.einsum("ij,ij->i", vector, vector),
-        bar_runs=bar_runs,
-        hinge_rest=mechanics.angles(x, model.hinges),
-        hinge_runs=hinge_runs,
-    )
-
-
-def _directions(problem: OrigamiProblem) -> NDArray:
-    structure = problem.structure
-    x = structure.nodes + problem.start().reshape(structure.nodes.shape)
-    along = x[structure.bars[:, 1]] - x[structure.bars[:, 0]]
-    return along / np.linalg.norm(along, axis=1)[:, None]
-
-
-def _strains_nothing(problem: OrigamiProblem, hinges: sparse.csr_array, mode: NDArray) -> bool:
+def _strains_nothing(unstrained: Unstrained, mode: NDArray) -> bool:
     """Whether the strain that a mode causes is rounding."""
-    structure = problem.structure
-    motion = mode.reshape(-1, 3)
-    ends = motion[structure.bars]
-    apart = ends[:, 1] - ends[:, 0]
-    stiff = structure.bar_area > 0.0
-    elongation = np.einsum("ij,ij->i", apart, _directions(problem))[stiff]
-    most = np.linalg.norm(ends, axis=2).sum(axis=1)[stiff]
-    weight = (structure.bar_area / structure.bar_length)[stiff]
-    bars = float((weight * elongation**2).sum())
-    if bars > BAR_STRAIN**2 * float((weight * most**2).sum()):
+    if unstrained.stretch(mode) > BAR_STRAIN:
         return False
-    turned = float(mode @ (hinges @ mode))
-    return turned <= HINGE_STRAIN**2 * float(hinges.diagonal() @ mode**2)
+    turned = float(mode @ (unstrained.hinges @ mode))
+    return turned <= HINGE_STRAIN**2 * float(unstrained.hinges.diagonal() @ mode**2)

@@ -14,7 +14,6 @@ from scipy import sparse
 from foldyn.cases import Actuate, Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.statics.actuation import Actuation
-from foldyn.statics.body import body_of
 from foldyn.statics.relief import Relief
 from foldyn.statics.tolerance import EPS
 
@@ -24,7 +23,7 @@ AdaptiveLoad = Callable[[NDArray, float], NDArray]
 
 
 class OrigamiProblem:
-    """Equilibrium of a case along the load factor; dof = 3 node + axis, then those of `Body`.
+    """Equilibrium of a case along the load factor; dofs as in `mechanics.body`.
 
     Parameters
     ----------
@@ -59,8 +58,9 @@ class OrigamiProblem:
     ) -> None:  # fmt: skip
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
-        body = body_of(structure)
-        self.groups, self._hidden = body.groups, len(body.hidden)
+        body = structure.body
+        self.groups, self._hidden = body.energy_groups, len(body.hidden)
+        self._work = body.workspaces(1)[0]
         self._shape = structure.nodes.shape
         self._rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
         self.constant = self._extended(_forces(_selected(case, constant, True)))
@@ -119,7 +119,7 @@ class OrigamiProblem:
 
     def internal(self, u: NDArray, factor: float) -> NDArray:
         """Internal forces (m,), N."""
-        return self.actuation.body(factor).internal(u)
+        return self.actuation.body(factor).internal(u, self._work)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
@@ -138,7 +138,7 @@ class OrigamiProblem:
 
     def reference(self, u: NDArray, factor: float) -> float:
         """Largest of the norms of the external forces and of the hinges' forces alone, N."""
-        hinges = self.actuation.body(factor).hinge_forces(u)
+        hinges = self.actuation.body(factor).hinge_forces(u, self._work)
         external = self.external(u, factor)
         return max(float(np.linalg.norm(hinges)), float(np.linalg.norm(external)))
 

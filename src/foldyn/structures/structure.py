@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,12 +14,26 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
+from foldyn.mechanics.body import Fill
 from foldyn.patterns import Pattern
+from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.mass import MASS_RULES, Surface
 from foldyn.structures.options import ModelOptions
 from foldyn.structures.sheet import Sheet
 
-GROUPS = ("strain_bars", "strain_folds", "strain_bends")
+FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
+"""Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
+26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
+
+
+class HingeKind(NamedTuple):
+    """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle."""
+
+    name: str
+    law: HingeLaw
+    nodes: NDArray
+    stiffness: NDArray
+    rest: NDArray
 
 
 def _none(width: int, kind: type = np.int64) -> NDArray:
@@ -83,10 +98,9 @@ class Structure:
             f"{len(self.folds)} folds, {len(self.bends)} bends, mass {self.options.mass}>"
         )
 
-    @property
-    def energy_groups(self) -> tuple[str, ...]:
-        """Names of the parts of the strain energy."""
-        return GROUPS
+    energy_groups: ClassVar[Mapping[str, str]] = GROUPS
+    fill: ClassVar[Fill] = FILL
+    massless: ClassVar[str] = ""  # every dof has its mass
 
     @cached_property
     def bar_length(self) -> NDArray:
@@ -124,6 +138,11 @@ class Structure:
         )
 
     @cached_property
+    def body(self) -> BarsHingesBody:
+        """What solvers take."""
+        return BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+
+    @cached_property
     def hinge_of_fold(self) -> NDArray:
         """Row of each fold (nf,) in `model.hinges`, where folds and bends may be mixed."""
         there = np.flatnonzero(self.model.hinge_group == 0)
@@ -134,10 +153,18 @@ class Structure:
         rows.setflags(write=False)
         return rows
 
-    @cached_property
+    @property
     def sparsity(self) -> mechanics.Sparsity:
         """Pattern of the tangent."""
-        return mechanics.sparsity(self.model)
+        return self.body.sparsity
+
+    @property
+    def hinge_kinds(self) -> tuple[HingeKind, ...]:
+        """Its folds and bends, with their laws."""
+        return (
+            HingeKind("fold", self.fold_law, self.folds, self.fold_stiffness, self.fold_rest),
+            HingeKind("bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest),
+        )
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -175,9 +202,8 @@ class Structure:
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
-        out = np.empty(len(GROUPS))
-        mechanics.strain_energies(self.model, self._displacement(u), out)
-        return dict(zip(GROUPS, out.tolist(), strict=True))
+        energies = self.body.energies(self._displacement(u))
+        return dict(zip(GROUPS, energies.tolist(), strict=True))
 
     def energy(self, u: ArrayLike) -> float:
         """Strain energy (J) at displacement u (n, 3), m."""
@@ -185,10 +211,7 @@ class Structure:
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m: the gradient of the energy."""
-        force = np.empty((len(self.nodes), 3))
-        displacement = self._displacement(u)
-        mechanics.internal_force(self.model, displacement, force, mechanics.workspace(self.model))
-        return force
+        return self.body.internal(self._displacement(u)).reshape(-1, 3)
 
     def tangent(self, u: ArrayLike, floor: float = -np.inf) -> sparse.csr_array:
         """Tangent stiffness (3n, 3n), N/m, at displacement u (n, 3), m; dof = 3 node + axis.
@@ -202,7 +225,7 @@ class Structure:
             the tangent is the exact second derivative of the energy: singular at rest where
             superlinear bends have no slope.
         """
-        return mechanics.tangent(self.model, self.sparsity, self._displacement(u), floor).tocsr()
+        return self.body.tangent(self._displacement(u), floor)
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""

@@ -26,7 +26,6 @@ from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, jud
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import kinetic_energy, times_mass
-from foldyn.dynamics.kinds import fold_angles
 from foldyn.dynamics.system import acceleration, moving_energy
 from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
@@ -93,15 +92,14 @@ class Alpha:
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
         b = self.bench
-        model = b.packed.model
-        matrix.blocks.put(model, matrix.pattern, b.moved(), before, again, matrix.stiffness)
+        matrix.blocks.put(b.packed.body, matrix.pattern, b.moved(), before, again, matrix.stiffness)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         b, packed = self.bench, self.bench.packed
         done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
         if packed.system.turns:
-            angle = fold_angles(b.work)
+            angle = b.work.fold_angle
             done += _actuation(packed.model, packed.system, b.old, b.new, b.folds, angle)
         return done, lost
 

@@ -9,7 +9,6 @@ import numpy as np
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.kinds import hinges_linear
 from foldyn.statics.linear_solver import SingularTangentError
 
 
@@ -21,8 +20,8 @@ def horizon(bench: Bench, matrix: StepMatrix, duration: float) -> float:
     """
     packed, u = bench.packed, bench.displacement()
     force = bench.push(bench.old, np.ones(len(bench.old.factor)))
-    model, pattern = hinges_linear(packed.model, u), matrix.pattern
-    matrix.blocks.put(model, pattern, u, u, False, matrix.stiffness)
+    body, pattern = packed.body.nominal(u), matrix.pattern
+    matrix.blocks.put(body, pattern, u, u, False, matrix.stiffness)
     slow = (2.0 * math.pi / duration) ** 2
     try:
         matrix.factorize(Weights(stiffness=1.0, mass=slow, damping=0.0))

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.implicit.banded import BandLU, Cholesky
-from foldyn.dynamics.implicit.blocks import blocks_of
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
@@ -65,8 +64,8 @@ class StepMatrix:
     """
 
     def __init__(self, packed: Packed, symmetric: bool) -> None:
-        model, mass, system = packed.model, packed.mass, packed.system
-        self.blocks = blocks_of(model)
+        mass, system = packed.mass, packed.system
+        self.blocks = packed.body.blocks()
         nodes = system.rows
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
         self.pattern, where = _with_mass(self.blocks.pattern, nodal)

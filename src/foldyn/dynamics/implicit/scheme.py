@@ -12,13 +12,6 @@ from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.kinds import (
-    fold_angles,
-    hinges_alone,
-    put_force,
-    stretching_forces,
-    workspace_of,
-)
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
@@ -79,7 +72,7 @@ class Scheme(Protocol):
         ...
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
-        """Fill the stiffness blocks at new.q; see `put_tangent` for `before` and `again`."""
+        """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
         ...
 
     def works(self, h: float) -> tuple[float, float]:
@@ -108,7 +101,7 @@ class Bench:
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
-        self.work: Any = workspace_of(packed.model)
+        self.work: Any = packed.body.workspaces(1)[0]
         self.scratch: Scratch = scratch(packed.system)
         shape, histories = course.u.shape, self.scratch.factor.shape
         self.out, self.step = np.zeros(shape), np.zeros(shape)
@@ -121,10 +114,8 @@ class Bench:
         # mean velocity of the last step, and its change per time from the middle of one to another
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
-        model = packed.model
-        self._hinges = hinges_alone(model)
-        self.rounding = EPS * stretching_forces(model)
-        self.folds = np.zeros_like(fold_angles(self.work))  # at old.q, rad
+        self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
+        self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
 
     def begin(self, t: float) -> None:
         """Make forces and accelerations of `old` those at the time t (s)."""
@@ -135,12 +126,12 @@ class Bench:
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
         old.force[:], old.factor[:] = s.force, s.factor
-        self.folds[:] = fold_angles(self.work)
+        self.folds[:] = self.work.fold_angle
 
     def hinge_forces(self) -> float:
         """Norm of the hinges' forces at old.q, N: forces at play even where all is at rest."""
-        put_force(self._hinges, self.displacement(), self.out, self.work)
-        return float(np.linalg.norm(self.out))
+        forces = self.packed.body.hinge_forces(self.displacement(), self.work)
+        return float(np.linalg.norm(forces))
 
     def displacement(self) -> NDArray:
         """Displacement (n, 3) of old.q with that of the supports."""
@@ -199,7 +190,7 @@ class Bench:
         self._speed[:], self._last = speed, h
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
-        self.folds[:] = fold_angles(self.work)
+        self.folds[:] = self.work.fold_angle
 
 
 @kernel

@@ -1,9 +1,17 @@
-"""Tangent stiffness of an iteration: floored slopes, and bar stresses that Newton's method can use.
+"""Tangent for steps of Newton's method: floored slopes, and bar stresses that it can use.
 
-Newton's method moves nodes along straight lines, which stretches turning bars to second order; the
-huge spurious stresses must not enter the next matrix. The stresses of the start of the step, and
-after the first iteration those extrapolated from the last one (see `statics.mixed`), take their
-place there. The residual never sees any of this.
+As a sheet bends, panels turn far while their bars hardly stretch. A step of Newton's method moves
+nodes along straight lines, which stretches turning bars to second order, and the huge spurious
+stresses would sit in the geometric stiffness of the next step: convergence would be slow, worse so
+the more slender the sheet. If the bars' stresses are unknowns of their own, Newton's method for
+both gives, after these are eliminated, the same equations for the displacements but with a
+geometric stiffness from
+
+    S = S(u0) + S'(u0) (D0 . d) / L^2,    d the step from u0 to u of a bar with vector D0,
+
+which knows nothing of the second order (Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech.
+Eng. 313, 2017). The residual is that of the displacements and never sees any of this, so the
+solution is the same, and convergence is quadratic as before.
 """
 
 from __future__ import annotations
@@ -13,9 +21,11 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress
-from foldyn.mechanics import BarsHinges, Sparsity, add_tangent
 from foldyn.mechanics.energy import bar_extension
-from foldyn.statics.body import FLOOR
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.tangent import Sparsity, add_tangent
+
+FLOOR = 1e-3  # of a hinge's stiffness: its least slope in steps, as in MERLIN2
 
 
 def put_tangent(

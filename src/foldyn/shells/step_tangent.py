@@ -1,4 +1,4 @@
-"""Side strains extrapolated along the last step: what `statics.mixed` is for bars.
+"""Tangent of a shell for steps of Newton's method: what `mechanics.step_tangent` is for bars.
 
 The strains that panels get from being moved along straight lines, of second order in their turn,
 are kept out of the geometric stiffness of the next step; the residual sees the true ones.
@@ -8,9 +8,24 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.shells.kernels import ShellModel
+from foldyn.mechanics.step_tangent import FLOOR
+from foldyn.shells.kernels import ShellModel, ShellWork
 from foldyn.shells.sparsity import ShellPattern
+from foldyn.shells.tangent import shell_tangent
+
+
+def shell_step_tangent(
+    model: ShellModel, pattern: ShellPattern, u: NDArray, x: NDArray, work: ShellWork,
+    before: NDArray | None,
+) -> sparse.csr_array:  # fmt: skip
+    """Tangent at displacements u (n, 3) and rotations x (r,), after a step from `before` (n, 3)."""
+    own = model.code < 0  # slopes of a user's law may fall on purpose
+    matrix = shell_tangent(model, pattern, u, x, work, -np.inf if own else FLOOR)
+    if before is not None:
+        add_extrapolated_strain(model, pattern, u, before, matrix.data)
+    return matrix
 
 
 def add_extrapolated_strain(

@@ -1,0 +1,216 @@
+"""What solvers take of a structure: energies, forces and tangents on a flat vector of dofs.
+
+The m dofs are 3 node + axis, then the hidden ones: those without mass that a model may have beside
+the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
+(rows, 3); hidden dofs follow in further rows, the last one filled up. Either form is taken.
+
+A model is a named tuple of arrays, its kernels (`mechanics.kernels`), a `Body` and a structure that
+gives it. A body changes nothing in place; what makes another one of it (`folded`, `nominal`, ...)
+leaves it as it was.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.tangent import Sparsity
+
+
+class Fill(NamedTuple):
+    """Memory that the factors of a tangent take, by experience, and what makes it less."""
+
+    per_doubling: float  # bytes a dof for each doubling of the number of dofs,
+    least: int  # from so many dofs on
+    field: str
+    remedy: str
+
+
+class SoftHinges(NamedTuple):
+    """Hinges of a law that has no slope at rest, h of them, in a state."""
+
+    offset: NDArray  # (h,) angle from rest, rad
+    stiffness: NDArray  # (h,) N m/rad
+    gradient: sparse.csr_array  # (h, m) of their angles, 1/m
+
+
+class Unstrained(NamedTuple):
+    """A body with linear laws and without strain, whose soft motions are mechanisms."""
+
+    tangent: sparse.csr_array  # (m, m)
+    hinges: sparse.csr_array  # (m, m) of the hinges alone
+    stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
+
+
+class Blocks(Protocol):
+    """A body's tangent as 3x3 blocks, for the matrix of an implicit step.
+
+    Attributes
+    ----------
+    pattern : Sparsity
+        Where they stand.
+    order : ndarray of int
+        All dofs, 3 row + axis, in an order that keeps a factorization narrow.
+    unused : ndarray of int
+        Dofs that only fill up the last row.
+    """
+
+    pattern: Sparsity
+    order: NDArray
+    unused: NDArray
+
+    def put(
+        self, body: Any, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+    ) -> None:
+        """Fill `out` (nnz, 3, 3) of a pattern that contains this one with a body's tangent at u.
+
+        before : the start of the step or, `again`, the last iterate, from which stresses are
+        extrapolated to u; all (rows, 3).
+        """
+        ...
+
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """Which entries (nnz, 3, 3) of a pattern that contains this one `put` may fill."""
+        ...
+
+
+class Body(ABC):
+    """A structure with its rest angles, m dofs, nf folds.
+
+    What has a default here is that of a body without hinges and hidden dofs.
+
+    Attributes
+    ----------
+    model : named tuple
+        The arrays of its kernels.
+    size, rows : int
+        Number m of the dofs, and rows of the arrays that hold them.
+    hidden : ndarray of int
+        Dofs beside the displacements of the nodes: they have no mass.
+    energy_groups : tuple of str
+        Names of the parts of the energy.
+    has_discrete_gradient : bool
+        Whether the kernels of `dynamics.energy_momentum` take its model.
+    """
+
+    model: Any
+    size: int
+    rows: int
+    hidden: NDArray = np.zeros(0, np.int64)
+    energy_groups: ClassVar[tuple[str, ...]]
+    has_discrete_gradient: ClassVar[bool] = False
+
+    # ------------------------------------------------------------------ mechanics
+    def dofs(self, displacement: NDArray) -> NDArray:
+        """Vector (m,) of displacements (n, 3), the hidden dofs in balance."""
+        return np.asarray(displacement, float).ravel()
+
+    @abstractmethod
+    def energies(self, q: NDArray) -> NDArray:
+        """Strain energies (J) by group."""
+
+    @abstractmethod
+    def internal(self, q: NDArray, work: Any = None) -> NDArray:
+        """Internal forces (m,), N, the gradient of the energy; `work` from `workspaces`."""
+
+    def hinge_forces(self, q: NDArray, work: Any = None) -> NDArray:
+        """Those of hinges (bending and folds) alone: forces at play even where all is at rest."""
+        return np.zeros(self.size)
+
+    @abstractmethod
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """Their derivative (m, m); slopes per unit stiffness below `floor` are raised to it."""
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """The matrix that a step of Newton's method takes at q, after one from `before`."""
+        return self.tangent(q)
+
+    @abstractmethod
+    def blocks(self) -> Blocks:
+        """The same for implicit integrators; see `mechanics.blocks`."""
+
+    @abstractmethod
+    def workspaces(self, threads: int) -> Sequence[Any]:
+        """Memory of the kernels on each thread, on fewer than asked for if need be."""
+
+    @property
+    def threads(self) -> int:
+        """Threads on which a motion runs fastest."""
+        return 1
+
+    # ------------------------------------------------------------------ measures
+    def angles(self, q: NDArray) -> NDArray:
+        """Dihedrals (nh,), rad, of all hinges of the model."""
+        return np.zeros(0)
+
+    @abstractmethod
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """Largest turn (rad) of a part between two states; inf if parts collide."""
+
+    @abstractmethod
+    def scale(self) -> NDArray:
+        """Forces (m,), N, at the dofs under a strain of one, whose rounding errors stay."""
+
+    @abstractmethod
+    def longest(self) -> float:
+        """Length (m) of the longest bar or side; the extent of the nodes where there is none."""
+
+    def turning_moments(self) -> float:
+        """Sum of the hinges' moments (N m) for a turn of one."""
+        return 0.0
+
+    def soft_hinges(self, q: NDArray) -> SoftHinges:
+        """Hinges of the superlinear law; InputError where the model cannot do without slopes."""
+        return SoftHinges(np.zeros(0), np.zeros(0), sparse.csr_array((0, self.size)))
+
+    def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
+        """Tangent (m, m) of these hinges alone, without moment and with given slopes / k (h,)."""
+        return sparse.csr_array((self.size, self.size))
+
+    # ------------------------------------------------------------------ folds
+    @property
+    def fold_rest(self) -> NDArray:
+        """Rest angles of the folds (nf,), rad."""
+        return np.zeros(0)
+
+    def folded(self, rest: NDArray) -> Body:
+        """The body with other rest angles of its folds (nf,), rad."""
+        return self
+
+    def actuated(self, folds: NDArray) -> tuple[Body, NDArray, NDArray]:
+        """A body whose rest angles may be changed in place, and what turns with folds (a,).
+
+        Rows (k,) of `kernels.folds_of`, and of each the place (k,) in `folds`.
+        """
+        return self, np.zeros(0, np.int64), np.zeros(0, np.int64)
+
+    def turned(self) -> tuple[NDArray, NDArray]:
+        """Rest angles (rad) of what actuators turn, and the rows of `model.hinges` there."""
+        return np.zeros(0), np.zeros(0, np.int64)
+
+    # ------------------------------------------------------------------ other bodies
+    def renumbered(self) -> tuple[Body, NDArray]:
+        """The body for long motions, and the nodes (n,) in the order in which it has them."""
+        return self, np.arange((self.size - len(self.hidden)) // 3)
+
+    def nominal(self, q: NDArray) -> Body:
+        """The body with hinges as stiff as they are meant to be, about their angles at q."""
+        return self
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """The body as if it had no strain at q; None where only rigid motions could keep it so."""
+        return None
+
+
+def largest_turn(largest: float, before: NDArray, after: NDArray) -> float:
+    """The largest of a turn and those of hinges (rad); inf where one passes through another."""
+    hinges = float(np.abs(after - before).max(initial=0.0))
+    if hinges > math.pi or not np.isfinite(hinges + largest):
+        return math.inf
+    return max(largest, hinges)

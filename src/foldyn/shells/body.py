@@ -1,0 +1,192 @@
+"""Shells as solvers take them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn import mechanics
+from foldyn.errors import InputError
+from foldyn.materials import HingeLaw, Superlinear
+from foldyn.mechanics.blocks import SparseBlocks
+from foldyn.mechanics.body import Body, SoftHinges, largest_turn
+from foldyn.shells.balance import balanced_rotations
+from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
+from foldyn.shells.sparsity import ShellPattern, shell_pattern
+from foldyn.shells.step_tangent import shell_step_tangent
+from foldyn.shells.tangent import shell_tangent
+
+GROUPS: Mapping[str, str] = {
+    "strain_membrane": "strain energy of stretching",
+    "strain_bending": "strain energy of bending",
+    "strain_folds": "strain energy of the folds",
+}
+
+
+class ShellBody(Body):
+    """A shell of triangles; see `mechanics.body.Body`.
+
+    Parameters
+    ----------
+    model : ShellModel
+    crease : ndarray, shape (c,)
+        The fold that each piece of a crease belongs to.
+    law : HingeLaw
+        Law of the folds.
+    like : ShellBody, optional
+        One with the same mesh.
+    """
+
+    energy_groups = tuple(GROUPS)
+
+    def __init__(
+        self, model: ShellModel, crease: NDArray, law: HingeLaw, like: ShellBody | None = None
+    ) -> None:
+        self.model, self._crease, self._law, self._like = model, crease, law, like
+        self._nodal = 3 * model.nodes
+        self.size, self.rows = self._nodal + model.rotations, model.rows
+        self.hidden = np.arange(self._nodal, self.size)
+
+    def _with(self, model: ShellModel) -> ShellBody:
+        """Another body of the same mesh."""
+        return ShellBody(model, self._crease, self._law, self)
+
+    def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacements (n, 3) and rotations (r,)."""
+        flat = np.ascontiguousarray(q, float).reshape(-1)
+        return flat[: self._nodal].reshape(-1, 3), flat[self._nodal : self.size]
+
+    @cached_property
+    def sparsity(self) -> ShellPattern:
+        """Pattern of the tangent."""
+        return self._like.sparsity if self._like else shell_pattern(self.model)
+
+    def dofs(self, displacement: NDArray) -> NDArray:
+        """See `Body`."""
+        u = np.ascontiguousarray(displacement, float).reshape(-1, 3)
+        return np.concatenate([u.ravel(), balanced_rotations(self.model, self.sparsity, u)])
+
+    def energies(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        out = np.empty(len(GROUPS))
+        shell_energy(self.model, *self._split(q), shell_work(self.model), out)
+        return out
+
+    def internal(self, q: NDArray, work: ShellWork | None = None) -> NDArray:
+        """See `Body`."""
+        out = np.empty(self.size)
+        work = shell_work(self.model) if work is None else work
+        shell_force(self.model, *self._split(q), *self._split(out), work)
+        return out
+
+    def hinge_forces(self, q: NDArray, work: ShellWork | None = None) -> NDArray:
+        """See `Body`."""
+        loose = self.model._replace(membrane=np.zeros_like(self.model.membrane))
+        return self._with(loose).internal(q, work)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Body`."""
+        work = shell_work(self.model)
+        return shell_tangent(self.model, self.sparsity, *self._split(q), work, floor)
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `Body`."""
+        old = None if before is None else self._split(before)[0]
+        work = shell_work(self.model)
+        return shell_step_tangent(self.model, self.sparsity, *self._split(q), work, old)
+
+    def blocks(self) -> SparseBlocks:
+        """See `Body`."""
+        entries = (
+            np.zeros(len(self.sparsity.indices)),
+            self.sparsity.indices,
+            self.sparsity.indptr,
+        )
+        return SparseBlocks(
+            sparse.csr_array(entries, (self.size, self.size)), self.rows, positions(self.model)
+        )
+
+    def workspaces(self, threads: int) -> list[ShellWork]:
+        """See `Body`."""
+        return [shell_work(self.model)]
+
+    def angles(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        x = self.model.rest.copy()
+        x[: self.model.nodes] += self._split(q)[0]
+        return mechanics.angles(x, self.model.hinges.astype(np.uint32))
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """Largest turn of a triangle's side, of a hinge or of a fold; inf on penetration."""
+        shift, tri = self._split(other - q)[0], self.model.triangles
+        apart = np.linalg.norm(shift[np.roll(tri, -1, axis=1)] - shift[tri], axis=2)
+        sides = float((apart * np.sqrt(self.model.per_length2)).max(initial=0.0))
+        return largest_turn(sides, self.angles(q), self.angles(other))
+
+    def scale(self) -> NDArray:
+        """Stiffness of the triangles' sides in the plane times their lengths, summed at nodes."""
+        model = self.model
+        stiff = np.abs(model.membrane).sum(axis=2) * np.sqrt(model.per_length2)
+        nodal = np.zeros(model.nodes)
+        for end in (0, -1):
+            np.add.at(nodal, np.roll(model.triangles, end, axis=1), stiff)
+        bending = model.per_reach * np.abs(model.bending).sum(axis=(1, 2)).max(initial=0.0)
+        return np.concatenate([np.repeat(nodal, 3), np.full(len(self.hidden), bending)])
+
+    def turning_moments(self) -> float:
+        """See `Body`."""
+        return float(np.abs(self.model.bending).sum() + self.model.piece_stiffness.sum())
+
+    def longest(self) -> float:
+        """See `Body`."""
+        return float(1.0 / np.sqrt(self.model.per_length2.min()))
+
+    def soft_hinges(self, q: NDArray) -> SoftHinges:
+        """See `Body`: none."""
+        if self.model.code == Superlinear.code:
+            raise InputError(
+                ' = "superlinear": the folds of a shell have no slope at rest; modes and '
+                'frequency responses of shells take "linear" or "enhanced"',
+                "fold_law",
+            )
+        return super().soft_hinges(q)
+
+    @property
+    def fold_rest(self) -> NDArray:
+        """See `Body`: the mean along each crease."""
+        return np.bincount(self._crease, self.model.piece_rest) / np.bincount(self._crease)
+
+    def folded(self, rest: NDArray) -> ShellBody:
+        """See `Body`."""
+        angle = self.model.piece_rest + (rest - self.fold_rest)[self._crease]
+        parameters = self._law.parameters(angle).reshape(-1, 4)
+        return self._with(self.model._replace(piece_rest=angle, piece_parameters=parameters))
+
+    def actuated(self, folds: NDArray) -> tuple[ShellBody, NDArray, NDArray]:
+        """See `Body`."""
+        model = self.model
+        own = model._replace(
+            piece_rest=model.piece_rest.copy(), piece_parameters=model.piece_parameters.copy()
+        )
+        pieces = [np.flatnonzero(self._crease == fold) for fold in folds]
+        place = np.repeat(np.arange(len(folds)), [len(each) for each in pieces])
+        return self._with(own), np.concatenate([np.zeros(0, np.int64), *pieces]), place
+
+    def turned(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.model.piece_rest, self.model.piece_hinge
+
+
+def positions(model: ShellModel) -> NDArray:
+    """Where in the shell its dofs are (3 rows, 3): rotations in the middle of their sides."""
+    found = np.zeros((3 * model.rows, 3))
+    n, tri = model.nodes, model.triangles
+    found[: 3 * n] = np.repeat(model.rest[:n], 3, axis=0)
+    middle = 0.5 * (model.rest[tri] + model.rest[np.roll(tri, -1, axis=1)])
+    has = model.rotation >= 0
+    found[3 * n + model.rotation[has]] = middle[has]
+    return found

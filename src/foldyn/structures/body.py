@@ -1,0 +1,226 @@
+"""Bars and hinges as solvers take them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn import mechanics
+from foldyn.materials import HingeLaw, Superlinear
+from foldyn.mechanics.blocks import BarsHingesBlocks
+from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
+from foldyn.mechanics.energy import gradients
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.renumber import node_order, ranks, renumber
+from foldyn.mechanics.step_tangent import put_tangent
+
+GROUPS: Mapping[str, str] = {
+    "strain_bars": "strain energy of the bars",
+    "strain_folds": "strain energy of the folds",
+    "strain_bends": "strain energy of the bends",
+}
+SMALL = 300  # nodes below which all values are in the cache anyway, whatever their order
+
+
+class BarsHingesBody(Body):
+    """A model of bars and hinges; see `mechanics.body.Body`.
+
+    Parameters
+    ----------
+    model : BarsHinges
+    folds : ndarray, shape (nf,)
+        Rows of the folds in `model.hinges`.
+    law : HingeLaw
+        Law of the folds.
+    like : BarsHingesBody, optional
+        One with the same nodes of all elements.
+    """
+
+    energy_groups = tuple(GROUPS)
+    has_discrete_gradient = True
+
+    def __init__(
+        self, model: BarsHinges, folds: NDArray, law: HingeLaw, like: BarsHingesBody | None = None
+    ) -> None:
+        self.model, self._folds, self._law, self._like = model, folds, law, like
+        self.size, self.rows = model.rest.size, len(model.rest)
+
+    def _with(self, model: BarsHinges) -> BarsHingesBody:
+        """Another body whose elements have the same nodes."""
+        return BarsHingesBody(model, self._folds, self._law, self)
+
+    def _nodal(self, q: NDArray) -> NDArray:
+        return np.ascontiguousarray(q, float).reshape(self.model.rest.shape)
+
+    @cached_property
+    def sparsity(self) -> mechanics.Sparsity:
+        """Pattern of the tangent."""
+        return self._like.sparsity if self._like else mechanics.sparsity(self.model)
+
+    @property
+    def threads(self) -> int:
+        """See `Body`."""
+        return mechanics.threads_for(self.model)
+
+    def energies(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        out = np.empty(len(GROUPS))
+        mechanics.strain_energies(self.model, self._nodal(q), out)
+        return out
+
+    def internal(self, q: NDArray, work: mechanics.Workspace | None = None) -> NDArray:
+        """See `Body`."""
+        force = np.empty(self.model.rest.shape)
+        work = mechanics.workspace(self.model) if work is None else work
+        mechanics.internal_force(self.model, self._nodal(q), force, work, False)
+        return force.ravel()
+
+    def hinge_forces(self, q: NDArray, work: mechanics.Workspace | None = None) -> NDArray:
+        """See `Body`."""
+        return self._hinges_alone().internal(q, work)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Body`."""
+        return mechanics.tangent(self.model, self.sparsity, self._nodal(q), floor).tocsr()
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `Body` and `mechanics.step_tangent`."""
+        pattern, again = self.sparsity, before is not None
+        data, old = np.empty((len(pattern.indices), 3, 3)), q if before is None else before
+        put_tangent(self.model, pattern, self._nodal(q), self._nodal(old), again, data)
+        shape = (self.size, self.size)
+        return sparse.bsr_array((data, pattern.indices, pattern.indptr), shape=shape).tocsr()
+
+    def blocks(self) -> BarsHingesBlocks:
+        """See `Body`."""
+        return BarsHingesBlocks(self.model)
+
+    def workspaces(self, threads: int) -> list[mechanics.Workspace]:
+        """See `Body`."""
+        return mechanics.workspaces(self.model, threads)
+
+    def angles(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        return mechanics.angles(self.model.rest + self._nodal(q), self.model.hinges)
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """Largest turn of a hinge, or of a bar with the rest of it; inf on penetration."""
+        shift, (a, b) = self._nodal(other - q), self.model.bars.T
+        apart = np.linalg.norm(shift[b] - shift[a], axis=1)
+        length = np.linalg.norm(self.model.bar_vector, axis=1)
+        bars = float((apart / length).max(initial=0.0))
+        return largest_turn(bars, self.angles(q), self.angles(other))
+
+    def scale(self) -> NDArray:
+        """EA of the bars, summed at the nodes."""
+        nodal = np.zeros(self.rows)
+        stiff = self.model.bar_stiffness / np.sqrt(self.model.bar_per_length2)
+        np.add.at(nodal, self.model.bars, stiff[:, None])
+        return np.repeat(nodal, 3)
+
+    def turning_moments(self) -> float:
+        """See `Body`."""
+        return float(self.model.hinge_stiffness.sum())
+
+    def longest(self) -> float:
+        """See `Body`."""
+        per_length2 = self.model.bar_per_length2
+        if not per_length2.size:
+            return float(np.ptp(self.model.rest, axis=0).max())
+        return float(1.0 / np.sqrt(per_length2.min()))
+
+    @cached_property
+    def _soft(self) -> NDArray:
+        """Rows (h,) of the hinges of the superlinear law."""
+        runs = self.model.hinge_runs
+        return np.flatnonzero(np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0]) == Superlinear.code)
+
+    def soft_hinges(self, q: NDArray) -> SoftHinges:
+        """See `Body`."""
+        model, rows = self.model, self._soft
+        columns = 3 * model.hinges[rows].astype(np.int64)[:, :, None] + np.arange(3)
+        entries = gradients(model, self._nodal(q))[rows].ravel()
+        start = 12 * np.arange(len(rows) + 1)
+        gradient = sparse.csr_array((entries, columns.ravel(), start), (len(rows), self.size))
+        offset = (self.angles(q) - model.hinge_rest)[rows]
+        return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
+
+    def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
+        """See `Body`."""
+        alone = self.nominal(q)._hinges_alone().model
+        stiffness = np.zeros(len(alone.hinges))
+        stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
+        return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
+
+    @property
+    def fold_rest(self) -> NDArray:
+        """See `Body`."""
+        return self.model.hinge_rest[self._folds]
+
+    def folded(self, rest: NDArray) -> BarsHingesBody:
+        """See `Body`."""
+        angle, parameters = self.model.hinge_rest.copy(), self.model.hinge_parameters.copy()
+        angle[self._folds], parameters[self._folds] = rest, self._law.parameters(rest)
+        return self._with(self.model._replace(hinge_rest=angle, hinge_parameters=parameters))
+
+    def actuated(self, folds: NDArray) -> tuple[BarsHingesBody, NDArray, NDArray]:
+        """See `Body`."""
+        model = self.model
+        own = model._replace(
+            hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
+        )
+        return self._with(own), self._folds[folds], np.arange(len(folds))
+
+    def turned(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.model.hinge_rest, np.arange(len(self.model.hinge_rest))
+
+    def renumbered(self) -> tuple[BarsHingesBody, NDArray]:
+        """See `Body`: along the sheet, unless it is small."""
+        if self.rows < SMALL:
+            return self, np.arange(self.rows)
+        order = node_order(self.model)
+        model, rows = renumber(self.model, order)
+        return BarsHingesBody(model, ranks(rows)[self._folds], self._law), order
+
+    def _hinges_alone(self) -> BarsHingesBody:
+        """The body without its bars."""
+        return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
+
+    def nominal(self, q: NDArray) -> BarsHingesBody:
+        """See `Body`."""
+        runs = self.model.hinge_runs.copy()
+        runs[:, 2] = 0  # the linear law
+        return self._with(self.model._replace(hinge_rest=self.angles(q), hinge_runs=runs))
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Body`."""
+        linear = self.nominal(q).model
+        x, runs = linear.rest + self._nodal(q), linear.bar_runs.copy()
+        vector = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
+        per_length2 = 1.0 / np.einsum("ij,ij->i", vector, vector)
+        runs[:, 2] = 0
+        body = self._with(
+            linear._replace(rest=x, bar_vector=vector, bar_per_length2=per_length2, bar_runs=runs)
+        )
+        rest = np.zeros(self.size)
+        return Unstrained(
+            body.tangent(rest), body._hinges_alone().tangent(rest), partial(stretch, body.model)
+        )
+
+
+def stretch(model: BarsHinges, motion: NDArray) -> float:
+    """Elongations of the bars in a small motion (m,), over what the motion of their ends could do.
+
+    Both are weighted by the bars' stiffness; 0 without bars.
+    """
+    ends = motion.reshape(-1, 3)[model.bars]
+    along = model.bar_vector * np.sqrt(model.bar_per_length2)[:, None]
+    elongation = np.einsum("ij,ij->i", ends[:, 1] - ends[:, 0], along)
+    most = np.linalg.norm(ends, axis=2).sum(axis=1)
+    whole = float((model.bar_stiffness * most**2).sum())
+    return np.sqrt(float((model.bar_stiffness * elongation**2).sum()) / whole) if whole else 0.0

@@ -1,0 +1,170 @@
+"""A third model, as anyone may add one: points joined by linear springs.
+
+It needs what is here and nothing in the package: a named tuple of arrays, kernels that stand for
+`force_of`, `energies_of` and `folds_of`, a `Body`, and a structure that gives it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+from scipy import sparse
+
+import foldyn as fd
+from foldyn.jit.compiled import kernel
+from foldyn.materials import hinge_law
+from foldyn.mechanics.blocks import SparseBlocks
+from foldyn.mechanics.body import Body, Fill
+from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
+from foldyn.mechanics.threads import Team, team
+
+
+class Springs(NamedTuple):
+    """Arrays of n points and s springs of energy k (l - L)^2 / 2."""
+
+    rest: NDArray  # (n, 3) m
+    ends: NDArray  # (s, 2)
+    stiffness: NDArray  # (s,) k, N/m
+    length: NDArray  # (s,) L, m
+
+
+class SpringsWork(NamedTuple):
+    """Memory of the kernels: none."""
+
+    angle: NDArray  # (0,)
+    fold_angle: NDArray  # (0,)
+    strips: Whole
+    team: Team
+
+
+@kernel
+def spring_force(model, u, force):
+    """Force (n, 3), N, and the energy (J) at displacement u (n, 3), m."""
+    energy, d = 0.0, np.empty(3)
+    force[:] = 0.0
+    for s in range(model.stiffness.size):
+        a, b = model.ends[s]
+        d[:] = model.rest[b] + u[b] - model.rest[a] - u[a]
+        length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        pull = model.stiffness[s] * (length - model.length[s])
+        energy += 0.5 * pull * (length - model.length[s])
+        for c in range(3):
+            force[b, c] += pull / length * d[c]
+            force[a, c] -= pull / length * d[c]
+    return energy
+
+
+@overload(force_of)
+def _force(model, u, force, work):
+    if model.instance_class is Springs:
+        return lambda model, u, force, work: spring_force(model, u, force)
+    return None
+
+
+@overload(energies_of)
+def _energies(model, u, work, out):
+    if model.instance_class is not Springs:
+        return None
+
+    def energies(model, u, work, out):
+        out[0] = spring_force(model, u, np.empty_like(u))
+
+    return energies
+
+
+@overload(folds_of)
+def _folds(model):
+    if model.instance_class is Springs:
+        return lambda model: (np.empty(0), np.empty((0, 4)), np.empty(0))
+    return None
+
+
+class SpringsBody(Body):
+    """Points and springs as solvers take them."""
+
+    energy_groups = ("strain_springs",)
+
+    def __init__(self, model: Springs) -> None:
+        self.model, self.size, self.rows = model, model.rest.size, len(model.rest)
+
+    def energies(self, q: NDArray) -> NDArray:
+        return np.array([spring_force(self.model, q.reshape(-1, 3), np.empty((self.rows, 3)))])
+
+    def internal(self, q: NDArray, work=None) -> NDArray:
+        force = np.empty((self.rows, 3))
+        spring_force(self.model, q.reshape(-1, 3), force)
+        return force.ravel()
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        x, matrix = self.model.rest + q.reshape(-1, 3), np.zeros((self.rows, 3, self.rows, 3))
+        for (a, b), k, rest in zip(*self.model[1:], strict=True):
+            length = np.linalg.norm(x[b] - x[a])
+            n = (x[b] - x[a]) / length
+            block = k * np.outer(n, n) + k * (1.0 - rest / length) * (np.eye(3) - np.outer(n, n))
+            for i, j, sign in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
+                matrix[i, :, j] += sign * block
+        row, column = np.indices((self.size, self.size)).reshape(2, -1)  # entries at fixed places
+        data = matrix.reshape(-1)
+        return sparse.csr_array((data, (row, column)), (self.size, self.size))
+
+    def blocks(self) -> SparseBlocks:
+        where = np.repeat(self.model.rest, 3, axis=0)
+        return SparseBlocks(self.tangent(np.zeros(self.size)), self.rows, where)
+
+    def workspaces(self, threads: int) -> list[SpringsWork]:
+        own = Whole(np.array([0, self.rows]))
+        return [SpringsWork(np.zeros(0), np.zeros(0), own, team(1)[0])]
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        a, b = self.model.ends.T
+        shift = (other - q).reshape(-1, 3)
+        apart = np.linalg.norm(shift[b] - shift[a], axis=1)
+        return float((apart / self.model.length).max())
+
+    def scale(self) -> NDArray:
+        return np.full(self.size, float((self.model.stiffness * self.model.length).sum()))
+
+    def longest(self) -> float:
+        return float(self.model.length.max())
+
+
+@dataclass(frozen=True)
+class NoOptions:
+    """Choices by which the structure was made: none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A structure of points and springs: what a case holds."""
+
+    nodes: NDArray
+    bars: NDArray
+    stiffness: NDArray
+    node_mass: NDArray
+    sheet = fd.Sheet(1.0, 0.0, 1.0)
+    options = NoOptions()
+    pattern = None
+    folds = np.zeros((0, 4), np.int64)
+    fold_rest = np.zeros(0)
+    fold_law = hinge_law("linear")
+    energy_groups = {"strain_springs": "strain energy of the springs"}  # noqa: RUF012
+    fill = Fill(1000.0, 100, "net", "take fewer springs")
+    massless = ""
+
+    @cached_property
+    def bar_length(self) -> NDArray:
+        return np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
+
+    @cached_property
+    def mass(self) -> sparse.csr_array:
+        return sparse.csr_array(sparse.diags_array(self.node_mass))
+
+    @cached_property
+    def body(self) -> SpringsBody:
+        model = Springs(self.nodes, self.bars, self.stiffness, self.bar_length)
+        return SpringsBody(model)
