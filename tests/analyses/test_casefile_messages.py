@@ -362,7 +362,7 @@ def test_all_faults_are_told_at_once(read, short) -> None:
     with pytest.raises(InputError) as caught:
         read(text)
     kind, key, nodes = str(caught.value).split("\n  also ")
-    assert 'pattern.kind = "mura": did you mean \'miura\'?' in kind
+    assert "pattern.kind = \"mura\": did you mean 'miura'?" in kind
     assert key.startswith("pattern.cell: unknown key; did you mean 'cells'?")
     assert nodes.startswith('supports[0].nodes = "xmn": xmn is not known; use xmin')
     text = short.replace('nodes = "xmin"', "nodes = [99]").replace("[7, 6]", "[77]")

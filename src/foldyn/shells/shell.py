@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
+from foldyn.algebra.fill import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
-from foldyn.mechanics.body import Fill
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.shells.body import GROUPS, ShellBody
