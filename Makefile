@@ -66,7 +66,7 @@ test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with
 	@$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check \
 	  -r $(OLDEST)/requirements.txt
 	@NUMBA_CACHE_DIR=$(OLDEST)/kernels PYTHONPATH=src $(OLDEST)/bin/python -m pytest -q \
-	  -p no:cacheprovider $(WORKERS) $(OLDEST_TESTS)
+	  -p no:cacheprovider --disable-warnings $(WORKERS) $(OLDEST_TESTS)
 
 lint: $(STAMP)  ## ruff, pyright and the layers contract
 	$(BIN)/ruff check .

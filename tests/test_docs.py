@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
-from foldyn.cases import Table
+from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -121,7 +121,9 @@ def test_the_histories_page_shows_a_table_that_can_be_read(tmp_path):
 
 def sections() -> list[tuple[str, str]]:
     """(section, key) of the case file."""
-    found = []
+    parts = {"supports": SUPPORTS, "loads": LOADS, "drive": (Force, BaseMotion)}
+    found = [(name, key) for name in parts for kind in parts[name] for key in kind.keys]
+    found += [(name, "history") for name in ("supports", "loads")]
     for schema in (kind.schema for kind in ANALYSES.values()):
         for name, field in schema.model_fields.items():
             types = [field.annotation, *getattr(field.annotation, "__args__", ())]

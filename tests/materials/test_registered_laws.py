@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -116,18 +115,3 @@ def test_a_law_that_the_kernels_do_not_know_is_refused(field, law):
     if field == "fold_law":
         with pytest.raises(InputError, match="is not a law that the kernels know"):
             fd.shell(pattern, sheet, divisions=2, fold_law=law)
-
-
-def test_files_of_a_law():
-    """CONTRIBUTING lists the files that a new law touches: those that mention an old one."""
-    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    steps = text.split("### A law\n")[1].split("\n### ")[0]
-    listed = {name for name in re.findall(r"`(src/\S+\.py)`", steps)}
-    mention = re.compile(r"\bLinearBar\b|\blinear\.(bar_|CODE)")
-    found = {
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "src").rglob("*.py")
-        if mention.search(path.read_text("utf-8"))
-    }
-    assert {name.replace("cubic", "linear") for name in listed} == found
-    assert len(listed) <= 3

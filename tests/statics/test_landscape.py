@@ -87,7 +87,7 @@ def test_states_stay_when_let_go(kresling):
     s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear")
     case = fd.Case(s, [fd.Fix(list(range(6)), "xyz")])
     for state in kresling[0].stable:
-        path = trace(case, load_factors=[0.0], start=fd.State(state.displacement))
+        path = trace(case, load_factors=[0.0], initial=fd.State(state.displacement))
         moved = np.abs(path.displacement.values[0] - state.displacement).max()
         assert moved < 1e-7
         assert path.negative_eigenvalues.values.tolist() == [0]

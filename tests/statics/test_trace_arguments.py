@@ -40,8 +40,8 @@ def case():
         ({"constant": [0.5]}, "whole numbers"),
         ({"constant": 0}, "numbers of loads"),
         ({"constant": [0]}, "nothing grows along the path"),
-        ({"start": np.zeros((3, 3))}, "give a State"),
-        ({"start": fd.State(np.zeros((4, 3)))}, r"shape \(4, 3\): the case has \(3, 3\)"),
+        ({"initial": np.zeros((3, 3))}, "give a State"),
+        ({"initial": fd.State(np.zeros((4, 3)))}, r"shape \(4, 3\): the case has \(3, 3\)"),
         ({"settings": {"tolerance": 1e-6}}, "give statics.Settings"),
         ({"inertia_relief": 1}, "True or False"),
         ({"inertia_relief": True}, "needs the mass"),
@@ -120,8 +120,8 @@ def test_start_with_nodes_on_top_of_each_other():
     case = compression()
     u = np.zeros_like(case.structure.nodes)
     u[30] = case.structure.nodes[31] - case.structure.nodes[30]
-    with pytest.raises(InputError, match="start: the neighboring nodes 30 and 31 fall"):
-        trace(case, load_factors=[0.0], start=fd.State(u))
+    with pytest.raises(InputError, match="initial: the neighboring nodes 30 and 31 fall"):
+        trace(case, load_factors=[0.0], initial=fd.State(u))
 
 
 def test_base_motion_and_histories_play_no_part():

@@ -144,7 +144,7 @@ def test_the_popped_vertex_stays(traced):
     # let go in that state, without any load, it is in equilibrium
     supports = case.supports
     free = fd.Case(case.structure, supports, [fd.Force([24], (0, 0, -1.0))])
-    again = fd.trace(free, load_factors=[0.0], start=fd.State(popped.displacement))
+    again = fd.trace(free, load_factors=[0.0], initial=fd.State(popped.displacement))
     np.testing.assert_allclose(again.displacement[0], popped.displacement, atol=1e-6)
 
 

@@ -191,7 +191,7 @@ class PathAnalysis(Analysis):
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`; bad input is refused before the first point, a mechanism for example."""
-        given = {"start": case_file.start(mass).state, **self.arguments, **changes}
+        given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:

@@ -1,48 +1,27 @@
 """Cases: supports, loads, histories, damping, states."""
 
-from foldyn.cases.actuation import Actuate
+from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.function import Function, as_history
-from foldyn.cases.histories import (
-    HISTORIES,
-    Chirp,
-    Constant,
-    HalfSine,
-    Harmonic,
-    History,
-    Pulse,
-    Ramp,
-    Step,
-    Table,
-)
-from foldyn.cases.loads import Force, Gravity
+from foldyn.cases.histories import *  # noqa: F403 - what it lists
+from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
-from foldyn.cases.supports import BaseMotion, Fix, Impose
+from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose
 
 __all__ = [
-    "HISTORIES",
-    "Actuate",
+    "SUPPORTS",
     "BaseMotion",
     "Case",
-    "Chirp",
-    "Constant",
     "Fix",
-    "Force",
     "Function",
-    "Gravity",
-    "HalfSine",
-    "Harmonic",
-    "History",
     "Impose",
-    "Pulse",
-    "Ramp",
     "Rayleigh",
     "State",
-    "Step",
-    "Table",
     "as_history",
     "resolve_nodes",
     "select",
 ]
+__all__ += histories.__all__
+__all__ += loads.__all__

@@ -17,6 +17,11 @@ from foldyn.cases.table import Table
 from foldyn.errors import InputError
 from foldyn.values import number
 
+__all__ = [
+    "HISTORIES", "Chirp", "Constant", "HalfSine", "Harmonic", "History", "Pulse", "Ramp", "Step",
+    "Table",
+]  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Constant(Formula):

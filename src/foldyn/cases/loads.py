@@ -19,6 +19,8 @@ from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.values import show, vector
 
+__all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
+
 
 @dataclass(frozen=True)
 class Force(Load):

@@ -19,6 +19,7 @@ def info() -> str:
     from foldyn.dynamics import METHODS, compiled
     from foldyn.formats import FORMATS
     from foldyn.linear.frf import METHODS as FRF_METHODS
+    from foldyn.mechanics.threads import MOST
     from foldyn.patterns import GENERATORS
     from foldyn.statics import METHODS as PATH_METHODS
 
@@ -26,7 +27,7 @@ def info() -> str:
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
         *(f"{name} {_version(name)}" for name in REQUIRED),
-        f"processors: {os.cpu_count()}; a motion runs on one thread",
+        f"processors: {os.cpu_count()}; the motion of a large sheet runs on up to {MOST}",
     ]
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import is_lumped
+from foldyn.dynamics.methods import METHODS
 from foldyn.dynamics.timescale import frequency, vibrating_share
 from foldyn.dynamics.timing import DEFAULT_FRACTION
 
@@ -22,7 +23,6 @@ AUTO = "auto"
 LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
 CONTENT = 2.0  # times the steps of the vibration itself: faster ones ride on it
 FEWEST = 50.0  # steps of an implicit run
-EVALUATIONS = {"rk4": 4.0, "central_difference": 1.0, "dormand_prince": 6.0}
 
 
 class Choice(NamedTuple):
@@ -61,7 +61,10 @@ def choose(
     share = vibrating_share(case, u, v, start, duration, omega)
     few = CONTENT * duration * omega * (share / (12.0 * (tolerance or default))) ** (1.0 / 3.0)
     few = max(few, FEWEST, duration / every if isinstance(every, float) else 0.0)
-    costs = many * _explicit_cost(case, explicit), few * _implicit_cost(case, conserved)
+    costs = (
+        many * _explicit_cost(case, METHODS[explicit].evaluations),
+        few * _implicit_cost(case, conserved),
+    )
     estimate = (
         f"about {_round(many)} explicit steps (critical step {critical:.2g} s) take "
         f"{_seconds(costs[0])}, {_round(few)} implicit ones {_seconds(costs[1])}, by estimate"
@@ -77,10 +80,10 @@ def _steady(case: Case) -> bool:
     return all(history.kind == "constant" for _, history in terms)
 
 
-def _explicit_cost(case: Case, method: str) -> float:
+def _explicit_cost(case: Case, evaluations: int) -> float:
     """Seconds of a step, as measured from 39 to 22,000 dofs."""
     substitution = 1.0 if is_lumped(case.structure.mass) else 2.0
-    return EVALUATIONS[method] * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
+    return evaluations * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
 
 
 def _implicit_cost(case: Case, conserved: bool) -> float:

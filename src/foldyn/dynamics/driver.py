@@ -72,11 +72,13 @@ def simulate(
     case : Case
     duration : float
         Simulated time (s). The last step is the last that does not go beyond it.
-    method : {"rk4", "central_difference", "dormand_prince"}
-        Integrator. The last one chooses its steps by their error.
+    method : str, default "rk4"
+        Integrator, a name of `foldyn.dynamics.METHODS`, or "auto" for the one that should be
+        quickest: the documentation has a page on them.
     dt : float, optional
-        Time step (s). Without it, half the critical step, shortened to divide `every`. With
-        `dormand_prince` the largest step; without it the critical one.
+        Time step (s). Explicit methods: without it half the critical step, shortened to divide
+        `every`. Implicit methods and `dormand_prince`, which choose their steps by their error:
+        with `tolerance` the largest step; `dt` alone fixes the step of an implicit method.
     every : int or float, default 1
         Sampling interval: an int counts steps, a float is seconds.
     initial : State, optional
@@ -85,13 +87,17 @@ def simulate(
     force : bool, default False
         Integrate even with a step above the critical one.
     tolerance : float, optional
-        Relative error of a step with `dormand_prince`, 1e-6 by default: that of the worst node's
-        displacement and velocity, relative to the largest ones that the motion has had so far.
+        Relative error of a step that is chosen by it, by default 1e-6 with `dormand_prince`, 1e-5
+        with implicit methods: that of the worst node's displacement and velocity, relative to the
+        largest ones that the motion has had so far.
     start : float, default 0.0
         Time (s) at which the motion starts, that of the first sample: histories go on from there
         when a stored motion is continued.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress` several times a second.
+    spectral_radius : float, optional
+        Of `generalized_alpha`: what a step leaves of the fastest vibrations, from 0 (nothing) to 1
+        (all); 0.8 by default.
     sample : mapping of str to callable or Quantity, optional
         Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
         m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,

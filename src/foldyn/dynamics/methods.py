@@ -37,6 +37,8 @@ class Method(NamedTuple):
     growth : callable, optional
         Of an explicit method: the largest factor by which a step multiplies a free vibration, as
         a function of omega, damping and dt.
+    evaluations : int
+        Of an explicit method: how often a step evaluates the forces.
     adaptive : bool
         Whether it always chooses its steps by their error.
     scheme : callable, optional
@@ -53,6 +55,7 @@ class Method(NamedTuple):
     order: int
     loop: Callable[..., Any]
     growth: Growth | None = None
+    evaluations: int = 0
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
     massless: bool = False
@@ -74,18 +77,20 @@ class Method(NamedTuple):
 METHODS: Mapping[str, Method] = {
     method.name: method
     for method in (
-        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth, looks=(0.0, 0.5, 1.0)),
+        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth, 4, looks=(0.0, 0.5, 1.0)),
         Method(
             "central_difference",
             central_difference.ORDER,
             central_difference.advance,
             central_difference.growth,
+            1,
         ),
         Method(
             "dormand_prince",
             dormand_prince.ORDER,
             dormand_prince.advance,
             dormand_prince.growth,
+            6,
             adaptive=True,
         ),
         Method(

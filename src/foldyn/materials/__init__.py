@@ -43,7 +43,7 @@ def bar_law(spec: str | BarLaw) -> BarLaw:
         spec = BAR_LAWS[spec]()
     if not isinstance(spec, BarLaw):
         raise InputError(
-            f"bar_law = {spec!r}: choose one of {', '.join(BAR_LAWS)} or give a BarLaw object"
+            f" = {spec!r}: choose one of {', '.join(BAR_LAWS)} or give a BarLaw object", "bar_law"
         )
     spec.check("bar_law")
     return spec
@@ -55,7 +55,7 @@ def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
         spec = HINGE_LAWS[spec]()
     if not isinstance(spec, HingeLaw):
         raise InputError(
-            f"{field} = {spec!r}: choose one of {', '.join(HINGE_LAWS)} or give a HingeLaw object"
+            f" = {spec!r}: choose one of {', '.join(HINGE_LAWS)} or give a HingeLaw object", field
         )
     spec.check(field)
     return spec

@@ -8,30 +8,44 @@ be run again from its file alone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 from numba.core.errors import NumbaError
 
 from foldyn.errors import InputError
 from foldyn.jit.compiled import callback
-from foldyn.materials.law import BarLaw, HingeLaw
+from foldyn.materials.law import BarLaw, HingeLaw, Law
 
 
-def _compile(law: str, function: str, signature: str, source: Callable[..., float]) -> Any:
-    try:
-        return callback(signature, source)
-    except (NumbaError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"law {law!r}: {function} cannot be compiled by Numba; write it as a Python function "
-            f"{signature.replace('float64', 'float')} with plain arithmetic and the math module. "
-            f"Numba says: {str(error).strip().splitlines()[-1]}"
-        ) from error
+class _Called(Law):
+    """A law whose first three fields are its functions, of the numbers of a state."""
+
+    @cached_property
+    def _functions(self) -> list[Any]:
+        return [self._compiled(item.name) for item in fields(cast(Any, self))[:3]]
+
+    def _compiled(self, function: str) -> Any:
+        signature = f"float64({', '.join(['float64'] * len(self.rest_state))})"
+        try:
+            return callback(signature, getattr(self, function))
+        except (NumbaError, TypeError, AttributeError) as error:
+            raise InputError(
+                f"law {self.name!r}: {function} cannot be compiled by Numba; write it as a Python "
+                f"function {signature.replace('float64', 'float')} with plain arithmetic and the "
+                f"math module. Numba says: {str(error).strip().splitlines()[-1]}"
+            ) from error
+
+    @property
+    def addresses(self) -> tuple[int, int, int]:
+        """Addresses of the compiled functions; valid as long as this object lives."""
+        energy, response, slope = self._functions
+        return energy.address, response.address, slope.address
 
 
 @dataclass(frozen=True, eq=False)
-class CustomBarLaw(BarLaw):
+class CustomBarLaw(_Called, BarLaw):
     """A user's bar law.
 
     Parameters
@@ -48,24 +62,9 @@ class CustomBarLaw(BarLaw):
     slope_of: Callable[[float], float]
     name: str = "custom"
 
-    @cached_property
-    def _functions(self) -> tuple[Any, Any, Any]:
-        signature = "float64(float64)"
-        return (
-            _compile(self.name, "energy_of", signature, self.energy_of),
-            _compile(self.name, "stress_of", signature, self.stress_of),
-            _compile(self.name, "slope_of", signature, self.slope_of),
-        )
-
-    @property
-    def addresses(self) -> tuple[int, int, int]:
-        """Addresses of the compiled functions; valid as long as this object lives."""
-        energy, stress, slope = self._functions
-        return energy.address, stress.address, slope.address
-
 
 @dataclass(frozen=True, eq=False)
-class CustomHingeLaw(HingeLaw):
+class CustomHingeLaw(_Called, HingeLaw):
     """A user's moment law.
 
     Parameters
@@ -92,18 +91,3 @@ class CustomHingeLaw(HingeLaw):
     moment_of: Callable[[float, float], float]
     slope_of: Callable[[float, float], float]
     name: str = "custom"
-
-    @cached_property
-    def _functions(self) -> tuple[Any, Any, Any]:
-        signature = "float64(float64, float64)"
-        return (
-            _compile(self.name, "energy_of", signature, self.energy_of),
-            _compile(self.name, "moment_of", signature, self.moment_of),
-            _compile(self.name, "slope_of", signature, self.slope_of),
-        )
-
-    @property
-    def addresses(self) -> tuple[int, int, int]:
-        """Addresses of the compiled functions; valid as long as this object lives."""
-        energy, moment, slope = self._functions
-        return energy.address, moment.address, slope.address

@@ -25,6 +25,7 @@ class Law(ABC):
 
     name: str
     code: int = CALLED
+    rest_state: tuple[float, ...]
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:
@@ -34,20 +35,23 @@ class Law(ABC):
     def check(self, field: str) -> None:
         """Refuse a built-in law that the compiled switch lacks: it gives nan for what it lacks."""
         own = type(self).addresses is not Law.addresses  # asking for them would compile them
-        if not own and np.isnan(self._at_rest()).any():
+        if not own and np.isnan(self._table(*self.rest_state)).any():
             raise InputError(
-                f"{field}: {self.name!r}, code {self.code}, is not a law that the kernels know; "
-                "give a CustomBarLaw or CustomHingeLaw (a new built-in law needs its line in "
-                "every function of materials/switch.py)"
+                f": {self.name!r}, code {self.code}, is not a law that the kernels know; give a "
+                "CustomBarLaw or CustomHingeLaw (a new built-in law needs its line in every "
+                "function of materials/switch.py)",
+                field,
             )
 
     @abstractmethod
-    def _at_rest(self) -> NDArray:
-        """All functions of the law at rest."""
+    def _table(self, *state: ArrayLike) -> NDArray:
+        """All functions of the law, one a row, at states (stretch, or dihedral and rest)."""
 
 
 class BarLaw(Law):
     """Axial law of a bar in terms of the stretch lambda = l / L, per unit Young's modulus."""
+
+    rest_state = (1.0,)
 
     def energy(self, stretch: ArrayLike) -> NDArray:
         """Energy density W / E_y at each stretch."""
@@ -61,9 +65,6 @@ class BarLaw(Law):
         """Slope dS/dE / E_y, E = (lambda^2 - 1)/2 the Green strain, at each stretch."""
         return self._table(stretch)[2]
 
-    def _at_rest(self) -> NDArray:
-        return self._table(1.0)
-
     def _table(self, stretch: ArrayLike) -> NDArray:
         from foldyn.materials import switch  # it imports the laws that subclass this
 
@@ -75,6 +76,7 @@ class BarLaw(Law):
 class HingeLaw(Law):
     """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
 
+    rest_state = (math.pi, math.pi)
     linear_between: tuple[float, float] | None = None
     """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
     closed_at_rest: bool = True
@@ -99,9 +101,6 @@ class HingeLaw(Law):
     def rest_slope(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         """Derivative of energy / k (rad) with respect to the rest dihedral."""
         return self._table(theta, rest)[3]
-
-    def _at_rest(self) -> NDArray:
-        return self._table(math.pi, math.pi)
 
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
         from foldyn.materials import switch

@@ -43,12 +43,6 @@ def hinge_moment(theta, rest):
 
 
 @scalar
-def hinge_slope():
-    """Slope / k."""
-    return 1.0
-
-
-@scalar
 def hinge_rest_slope(theta, rest):
     """Derivative of energy / k with respect to rest."""
     return rest - theta

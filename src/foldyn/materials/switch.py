@@ -77,7 +77,7 @@ def hinge_moment(code, theta, rest, a, b, c, d, address):
 def hinge_slope(code, theta, rest, a, b, address):
     """Slope of the moment / k at dihedral theta."""
     if code == linear.CODE:
-        return linear.hinge_slope()
+        return 1.0
     if code == superlinear.CODE:
         return superlinear.slope(theta, rest)
     if (code == AS_PUBLISHED) | (code == STRESS_FREE):

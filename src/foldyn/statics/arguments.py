@@ -118,20 +118,21 @@ def constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
     return tuple(sorted({int(which) for which in constant}))
 
 
-def start_state(case: Case, start: Any) -> NDArray | None:
+def initial_state(case: Case, initial: Any) -> NDArray | None:
     """Displacements (n, 3) to start from, or None."""
-    if start is None:
+    if initial is None:
         return None
-    if not isinstance(start, State):
+    if not isinstance(initial, State):
         raise InputError(
-            f": got {type(start).__name__}; give a State, as fd.initial_state(path, at=-1)", "start"
+            f": got {type(initial).__name__}; give a State, as fd.initial_state(path, at=-1)",
+            "initial",
         )
     shape = case.structure.nodes.shape
-    if start.displacement is None:
+    if initial.displacement is None:
         return np.zeros(shape)
-    array = np.array(start.displacement, float)
+    array = np.array(initial.displacement, float)
     if array.shape != shape:
-        raise InputError(f": displacement of shape {array.shape}: the case has {shape}", "start")
+        raise InputError(f": displacement of shape {array.shape}: the case has {shape}", "initial")
     return array
 
 
@@ -167,7 +168,7 @@ def check_start(problem: OrigamiProblem) -> None:
     short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
     if short.size:
         one, other = structure.bars[short[0]]
-        raise InputError(f": the neighboring nodes {one} and {other} fall together", "start")
+        raise InputError(f": the neighboring nodes {one} and {other} fall together", "initial")
 
 
 def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:

@@ -23,8 +23,8 @@ from foldyn.statics.arguments import (
     check_start,
     check_steps,
     constant_loads,
+    initial_state,
     plan,
-    start_state,
 )
 from foldyn.statics.course import Until, driven, free
 from foldyn.statics.mechanism import refuse_mechanisms
@@ -50,7 +50,7 @@ def trace(
     steps: int | None = None,
     *,
     constant: str | Sequence[int] = (),
-    start: State | None = None,
+    initial: State | None = None,
     first_step: float | None = None,
     until: Callable[[NDArray, float], bool] | None = None,
     adaptive_load: AdaptiveLoad | None = None,
@@ -79,7 +79,7 @@ def trace(
         "arc_length": steps after which the path ends (default 100).
     constant : "gravity" or sequence of int
         Loads, by their numbers in `case.loads`, that act in full at every factor.
-    start : State, optional
+    initial : State, optional
         Displacements near which the first point is sought; fixed supports hold their nodes where
         it puts them. Without it the path is sought from rest at the factor 0.
     first_step : float, optional
@@ -138,7 +138,7 @@ def trace(
         check_steps(steps, case.structure.nodes.size)
     goes = plan(how, load_factors, steps, first_step)
     held = constant_loads(case, constant)
-    state = start_state(case, start)
+    state = initial_state(case, initial)
     check_case(case, how, held, goes, adaptive_load is not None)
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -15,11 +14,14 @@ from numpy.typing import NDArray
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.fit_problem import Problem
+from foldyn.store import Store, name_of
 from foldyn.workers import Workers
 from foldyn.writing import remove_leftovers, whole
 
 Outcome = NDArray[np.float64] | str
 """All predictions in a row, or why there are none."""
+Values = tuple[float, ...]
+"""Of the parameters."""
 
 
 class Evaluations:
@@ -47,7 +49,7 @@ class Evaluations:
     ) -> None:
         self.problem, self.folder, self.tell = problem, folder, tell
         self.computed = self.found = 0
-        self._known: dict[str, Outcome] = {}
+        self._known: dict[Values, Outcome] = {}
         self._lock = Lock()
         self._digest = problem.digest()
         self._pool = None
@@ -71,20 +73,20 @@ class Evaluations:
 
     def at(self, points: Sequence[NDArray]) -> list[Outcome]:
         """Predictions at several points, at the same time where there are processes."""
-        wanted = {self._key(point): tuple(map(float, point)) for point in points}
-        new = {key: values for key, values in wanted.items() if not self._look(key)}
+        wanted = [tuple(map(float, point)) for point in points]
+        new = [values for values in dict.fromkeys(wanted) if not self._look(values)]
         if self._pool is None:
-            for key, values in new.items():
-                self._keep(key, _evaluate(self.problem, values))
+            for values in new:
+                self._keep(values, _evaluate(self.problem, values))
         else:
             self._at_a_time(self._pool, new)
-        return [self._known[self._key(point)] for point in points]
+        return [self._known[values] for values in wanted]
 
-    def _at_a_time(self, pool: Workers, new: Mapping[str, tuple[float, ...]]) -> None:
+    def _at_a_time(self, pool: Workers, new: Sequence[Values]) -> None:
         """Compute in processes; each evaluation is kept as soon as it is there."""
-        waiting: dict[Future[Outcome], str] = {}
+        waiting: dict[Future[Outcome], Values] = {}
         try:
-            waiting = {pool.submit(_evaluate_own, values): key for key, values in new.items()}
+            waiting = {pool.submit(_evaluate_own, values): values for values in new}
             for future in as_completed(list(waiting)):
                 self._keep(waiting.pop(future), future.result())
         except BrokenProcessPool:
@@ -93,46 +95,55 @@ class Evaluations:
                 'below if __name__ == "__main__": (or use processes=1)'
             ) from None
         except KeyboardInterrupt:
-            for future, key in waiting.items():
+            for future, values in waiting.items():
                 if future.done() and not future.cancelled() and future.exception() is None:
-                    self._keep(key, future.result())
+                    self._keep(values, future.result())
             raise
 
-    def _key(self, point: NDArray) -> str:
-        values = np.asarray(point, dtype=np.float64).tobytes()
-        return hashlib.sha256(self._digest.encode() + values).hexdigest()[:32]
+    def _file(self, values: Values) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{name_of([self._digest, values])}.npz"
 
-    def _look(self, key: str) -> bool:
+    def _look(self, values: Values) -> bool:
         """Whether a point is known, or kept in the folder."""
-        if key in self._known:
-            return True
-        file = None if self.folder is None else self.folder / f"{key}.npz"
-        if file is None or not file.is_file():
+        if values in self._known or self.folder is None:
+            return values in self._known
+        file = self._file(values)
+        outcome = KEPT.find(file, file.stem)
+        if outcome is None:
             return False
-        try:
-            with np.load(file) as kept:
-                failure = str(kept["failure"])
-                values = kept["values"]
-            if values.dtype != np.float64 or values.ndim != 1:
-                return False
-        except Exception:  # what NumPy and zipfile raise on damaged files is of any kind
-            return False  # computed again
-        self._known[key] = failure or values
+        self._known[values] = outcome
         with self._lock:
             self.found += 1
             self.tell(self.computed, self.found)
         return True
 
-    def _keep(self, key: str, outcome: Outcome) -> None:
-        self._known[key] = outcome
+    def _keep(self, values: Values, outcome: Outcome) -> None:
+        self._known[values] = outcome
         if self.folder is not None:
-            failed = isinstance(outcome, str)
-            values = np.zeros(0) if failed else outcome
-            with whole(self.folder / f"{key}.npz") as part:
-                np.savez(part, values=values, failure=np.array(outcome if failed else ""))
+            file = self._file(values)
+            KEPT.keep(file, file.stem, outcome)
         with self._lock:
             self.computed += 1
             self.tell(self.computed, self.found)
+
+
+def _read(file: Path) -> tuple[str, Outcome]:
+    with np.load(file) as kept:
+        predicted = kept["predicted"]
+        if predicted.dtype != np.float64 or predicted.ndim != 1:
+            raise ValueError
+        return str(kept["stamp"]), str(kept["failure"]) or predicted
+
+
+def _write(file: Path, stamp: str, outcome: Outcome) -> None:
+    failed = isinstance(outcome, str)
+    predicted, failure = (np.zeros(0), outcome) if failed else (outcome, "")
+    with whole(file) as part:
+        np.savez(part, predicted=predicted, failure=np.array(failure), stamp=np.array(stamp))
+
+
+KEPT: Store[Outcome] = Store(_read, _write, warns=False)
 
 
 _own: list[Problem] = []  # the one problem of a process that evaluates
@@ -142,11 +153,11 @@ def _begin(problem: Problem) -> None:
     _own[:] = [problem]
 
 
-def _evaluate_own(values: tuple[float, ...]) -> Outcome:
+def _evaluate_own(values: Values) -> Outcome:
     return _evaluate(_own[0], values)
 
 
-def _evaluate(problem: Problem, values: tuple[float, ...]) -> Outcome:
+def _evaluate(problem: Problem, values: Values) -> Outcome:
     try:
         return np.concatenate(problem.predict(values))
     except (InputError, ComputationError) as error:

@@ -7,8 +7,6 @@ sources among it: results of another program are computed again.
 from __future__ import annotations
 
 import hashlib
-import json
-import warnings
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from foldyn.analyses import CaseFile, read_case
 from foldyn.cases import Case
 from foldyn.dynamics import simulate
-from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
+from foldyn.store import Store
 from foldyn.studies import find_case
 from foldyn.studies.herkal.models import REFERENCE, Variant, case_with
 from foldyn.studies.herkal.program import program
@@ -108,7 +106,7 @@ class Job:
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        save(compute(self), folder / self.file)
+        KEPT.keep(folder / self.file, self.settings(), compute(self))
 
 
 def case_file_digest(case: str) -> str:
@@ -121,7 +119,7 @@ def compute(job: Job) -> xarray.Dataset:
     case_file = read_case(find_case(f"herkal/{job.case}"))
     case = case_with(case_file, job.model, job.variant, job.numerics.divisions)
     kinds = {"path": _path, "modes": _modes, "motion": _motion}
-    return _vertices_of(kinds[job.kind](job, case_file, case), job, case_file)
+    return _vertices_of(kinds[job.kind](job, case_file, case), case_file)
 
 
 def _path(job: Job, case_file: CaseFile, case: Case) -> xarray.Dataset:
@@ -142,36 +140,29 @@ def _motion(job: Job, case_file: CaseFile, case: Case) -> xarray.Dataset:
     return simulate(case, **arguments)
 
 
-def _vertices_of(found: xarray.Dataset, job: Job, case_file: CaseFile) -> xarray.Dataset:
-    """Result at the pattern's vertices, which all models have, with the settings of the job."""
+def _vertices_of(found: xarray.Dataset, case_file: CaseFile) -> xarray.Dataset:
+    """Result at the pattern's vertices, which all models have."""
     kept = found.drop_vars("velocity", errors="ignore")
     kept = kept.sel(node=range(len(case_file.pattern.vertices)))
     kept.attrs |= {
         "rerunnable": 0,
         "not_rerunnable_because": "a study keeps what happens at the pattern's vertices only",
-        SETTINGS: _text(job),
     }
     return kept
 
 
-def _text(job: Job) -> str:
-    return json.dumps(job.settings(), sort_keys=True)
+def _read(file: Path) -> tuple[str, xarray.Dataset]:
+    found = load(file)
+    return found.attrs.get(SETTINGS, ""), found
+
+
+def _write(file: Path, stamp: str, result: xarray.Dataset) -> None:
+    save(result.assign_attrs({SETTINGS: stamp}), file)
+
+
+KEPT: Store[xarray.Dataset] = Store(_read, _write)
 
 
 def stored(folder: Path, job: Job) -> xarray.Dataset | None:
     """Result of a job in a folder; None where there is none, or one of other settings."""
-    path = folder / job.file
-    if not path.is_file():
-        return None
-    try:
-        found = load(path)
-    except InputError:  # cut short by a full disk, or no result at all
-        warn_of_damage(path)
-        return None
-    return found if found.attrs.get(SETTINGS) == _text(job) else None
-
-
-def warn_of_damage(path: Path, then: str = "it is computed again") -> None:
-    """Tell that a file cannot be used, and what happens then."""
-    text = f"{path}: is damaged, or no file of this study; {then}"
-    warnings.warn(text, FoldynWarning, stacklevel=3)
+    return KEPT.find(folder / job.file, job.settings())

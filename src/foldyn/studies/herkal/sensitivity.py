@@ -18,14 +18,14 @@ from typing import Any, ClassVar
 
 import foldyn
 from foldyn.analyses import CaseFile, read_case
-from foldyn.errors import InputError
 from foldyn.input_files import from_json, read_text
+from foldyn.store import Store, stamp_of
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO, errors
 from foldyn.studies.herkal.models import LOADS, OTHERS, REFERENCE, Variant, rules
 from foldyn.studies.herkal.partners import partners
 from foldyn.studies.herkal.program import program
-from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, warn_of_damage
+from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute
 from foldyn.studies.herkal.variations import Variations
 from foldyn.writing import write_text
 
@@ -52,6 +52,21 @@ def load_sets(case_file: CaseFile) -> tuple[str, ...]:
 
 def _digest(rows: Any) -> str:
     return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+
+
+def _read(file: Path) -> tuple[str, list[dict[str, Any]]]:
+    found = from_json(read_text(file, "what a study keeps", MOST, "compute it again"))
+    if found["rows_sha256"] != _digest(found["rows"]):
+        raise ValueError
+    return stamp_of(found["settings"]), found["rows"]
+
+
+def _write(file: Path, stamp: str, rows: list[dict[str, Any]]) -> None:
+    kept = {"settings": json.loads(stamp), "rows": rows, "rows_sha256": _digest(rows)}
+    write_text(file, json.dumps(kept, indent=1) + "\n")
+
+
+KEPT: Store[list[dict[str, Any]]] = Store(_read, _write)
 
 
 @dataclass(frozen=True)
@@ -84,25 +99,11 @@ class _Kept:
 
     def result(self, folder: Path) -> list[dict[str, Any]] | None:
         """Rows that it found; None where there are none, or some of other settings."""
-        file = folder / f"{self.name}.json"
-        if not file.exists():
-            return None
-        try:
-            found = from_json(read_text(file, "what a study keeps", MOST, "compute it again"))
-            if found["settings"] != self.settings():
-                return None
-            if found["rows_sha256"] == _digest(found["rows"]):
-                return found["rows"]
-        except (InputError, TypeError, KeyError):
-            pass
-        warn_of_damage(file)
-        return None
+        return KEPT.find(folder / f"{self.name}.json", self.settings())
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        rows = list(self.rows())
-        kept = {"settings": self.settings(), "rows": rows, "rows_sha256": _digest(rows)}
-        write_text(folder / f"{self.name}.json", json.dumps(kept, indent=1) + "\n")
+        KEPT.keep(folder / f"{self.name}.json", self.settings(), list(self.rows()))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Compute the rows."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from foldyn.errors import InputError
 from foldyn.input_files import read_text
+from foldyn.store import warn_of_damage
 from foldyn.studies.herkal.metric import best, ranks
-from foldyn.studies.herkal.runs import warn_of_damage
 from foldyn.writing import whole
 
 STORED = Path(__file__).with_name("results")

@@ -21,6 +21,7 @@ from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import from_json, read_text
 from foldyn.linear import frf, modes
 from foldyn.results import netcdf, save
+from foldyn.store import Store
 from foldyn.studies.herkal import calibration, vibration
 from foldyn.studies.herkal.program import specimen_program
 from foldyn.studies.herkal.specimen import evaluation, synthetic
@@ -79,14 +80,10 @@ class Part:
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
-        try:
-            settings, kept = self._stamp(folder).read_text(encoding="utf-8").splitlines()
-            files = from_json(kept).items() if settings == self._text() else None
-        except (OSError, ValueError, AttributeError):  # not computed, or the stamp is damaged
-            return False
+        files = STAMPS.find(self._stamp(folder), self.settings())
         if files is None:
             return False
-        damaged = [name for name, told in files if _digest(folder / FOLDER / name) != told]
+        damaged = [name for name, told in files.items() if _digest(folder / FOLDER / name) != told]
         if damaged:
             text = f"{folder / FOLDER / damaged[0]}: is damaged or missing; it is computed again"
             warnings.warn(text, FoldynWarning, stacklevel=2)
@@ -108,18 +105,28 @@ class Part:
         self._stamp(folder).unlink(missing_ok=True)
         PARTS[self.part](self, inside)
         files = [inside / name for name in WRITES[self.part]]
-        kept = json.dumps({file.name: _digest(file) for file in files if file.is_file()})
-        write_text(self._stamp(folder), f"{self._text()}\n{kept}\n")
+        kept = {file.name: _digest(file) for file in files if file.is_file()}
+        STAMPS.keep(self._stamp(folder), self.settings(), kept)
 
     def _needed(self) -> list[Part]:
         seen, then = parts(self.shot, self.data)
         return {"fit": seen, "response": then[:1]}.get(self.part, [])
 
-    def _text(self) -> str:
-        return json.dumps(self.settings(), sort_keys=True)
-
     def _stamp(self, folder: Path) -> Path:
         return folder / FOLDER / f".{self.part}.done"
+
+
+def _read(file: Path) -> tuple[str, dict[str, str]]:
+    settings, files = file.read_text(encoding="utf-8").splitlines()
+    return settings, {**from_json(files)}
+
+
+def _write_stamp(file: Path, stamp: str, files: dict[str, str]) -> None:
+    write_text(file, f"{stamp}\n{json.dumps(files)}\n")
+
+
+# what a part has written, with digests; damage is told of by name in `there`
+STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 
 def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:

@@ -1,0 +1,71 @@
+# Public names and where they live; loaded when they are first used (facade.py)
+
+from foldyn import (
+    analyses as analyses,
+    cases as cases,
+    checks as checks,
+    dynamics as dynamics,
+    errors as errors,
+    experiment as experiment,
+    formats as formats,
+    linear as linear,
+    materials as materials,
+    mechanics as mechanics,
+    patterns as patterns,
+    plots as plots,
+    report as report,
+    results as results,
+    shells as shells,
+    signals as signals,
+    statics as statics,
+    structures as structures,
+    studies as studies,
+)
+from foldyn.analyses import read_case as read_case
+from foldyn.cases import (
+    Actuate as Actuate,
+    BaseMotion as BaseMotion,
+    Case as Case,
+    Chirp as Chirp,
+    Constant as Constant,
+    Fix as Fix,
+    Force as Force,
+    Function as Function,
+    Gravity as Gravity,
+    HalfSine as HalfSine,
+    Harmonic as Harmonic,
+    Impose as Impose,
+    Pulse as Pulse,
+    Ramp as Ramp,
+    Rayleigh as Rayleigh,
+    State as State,
+    Step as Step,
+    Table as Table,
+)
+from foldyn.dynamics import (
+    critical_step as critical_step,
+    initial_state as initial_state,
+    simulate as simulate,
+)
+from foldyn.experiment import fit as fit
+from foldyn.formats import read_pattern as read_pattern, write_pattern as write_pattern
+from foldyn.linear import frf as frf, mac as mac, modes as modes
+from foldyn.materials import (
+    BarLaw as BarLaw,
+    CustomBarLaw as CustomBarLaw,
+    CustomHingeLaw as CustomHingeLaw,
+    EnhancedLinear as EnhancedLinear,
+    HingeLaw as HingeLaw,
+)
+from foldyn.patterns import Pattern as Pattern
+from foldyn.results import (
+    Quantity as Quantity,
+    case_of as case_of,
+    load as load,
+    save as save,
+)
+from foldyn.shells import Shell as Shell, shell as shell
+from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
+from foldyn.structures import Sheet as Sheet, Structure as Structure, discretize as discretize
+
+__version__: str
