@@ -150,6 +150,7 @@ class Net(Discretized):
     node_mass: NDArray
     sheet = fd.Sheet(1.0, 0.0, 1.0)
     options = NoOptions()
+    kind = "springs"
     pattern = None
     folds = np.zeros((0, 4), np.int64)
     fold_rest = np.zeros(0)

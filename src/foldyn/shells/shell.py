@@ -91,6 +91,7 @@ class Shell(Discretized):
             f"{len(self.fold_stiffness)} folds, mass {self.options.mass}>"
         )
 
+    kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     massless: ClassVar[str] = "the rotations of a shell"
     bar_law: ClassVar[None] = None

@@ -46,6 +46,8 @@ class Discretized:
         Hinge row (nf, 4), rest angle (nf,), rad, of each fold, and the law of all.
     body : Body
         What solvers take.
+    kind : str
+        Its name in case files.
     energy_groups : mapping of str to str
         Parts of its strain energy, and what they are.
     massless : str
@@ -68,6 +70,7 @@ class Discretized:
     body: Body
     fill: Fill
     energy_groups: ClassVar[Mapping[str, str]]
+    kind: ClassVar[str]
     massless: ClassVar[str] = ""
 
     def __post_init__(self) -> None:

@@ -80,6 +80,7 @@ class Structure(Discretized):
             f"{len(self.folds)} folds, {len(self.bends)} bends, mass {self.options.mass}>"
         )
 
+    kind: ClassVar[str] = "bars_and_hinges"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     fill: ClassVar[Fill] = FILL
 
