@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -28,6 +28,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_scale, fold_stiffness
 from foldyn.structures.discretize import edge_lengths, per_crease
 from foldyn.structures.discretize import fold_rest as rest_of
+from foldyn.structures.made import Made
 from foldyn.structures.mass import MASS_RULES, Surface
 from foldyn.structures.structure import HingeKind
 from foldyn.values import show, whole
@@ -52,7 +53,7 @@ class ShellOptions:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shell:
+class Shell(Made):
     """A pattern as a thin shell; made by `shell`.
 
     Attributes
@@ -69,8 +70,6 @@ class Shell:
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `shell` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -82,15 +81,6 @@ class Shell:
     pattern: Pattern
     sheet: Sheet
     options: ShellOptions
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = np.array(value)
-                frozen.setflags(write=False)
-                object.__setattr__(self, item.name, frozen)
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -373,7 +363,7 @@ def shell(
         if (stiffness < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
     rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
-    made = Shell(
+    return Shell(
         nodes=x,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
@@ -383,9 +373,7 @@ def shell(
         pattern=pattern,
         sheet=sheet,
         options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
-    )
-    object.__setattr__(made, "as_made", True)
-    return made
+    ).marked()
 
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:

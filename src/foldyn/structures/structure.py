@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
@@ -17,6 +17,7 @@ from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
 from foldyn.mechanics.body import Fill
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
+from foldyn.structures.made import Made
 from foldyn.structures.mass import MASS_RULES, Surface
 from foldyn.structures.options import ModelOptions
 from foldyn.structures.sheet import Sheet
@@ -41,7 +42,7 @@ def _none(width: int, kind: type = np.int64) -> NDArray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure:
+class Structure(Made):
     """A discretized pattern; usually made by `discretize`.
 
     Attributes
@@ -61,8 +62,6 @@ class Structure:
         Node number of each panel's center, -1 without one.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `discretize` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -81,15 +80,6 @@ class Structure:
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
     node_mass: NDArray | None = None
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = np.array(value)
-                frozen.setflags(write=False)
-                object.__setattr__(self, item.name, frozen)
 
     def __repr__(self) -> str:
         """One line with the counts."""
