@@ -60,11 +60,12 @@ def example(title: str, names: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("title", EXISTING)
 def test_files_of_an_addition_are_those_of_one_that_is_there(title):
     new, old, mention = EXISTING[title]
-    listed = re.findall(r"^\d\. `(src/\S+\.py)`", section(title), re.M)
+    listed = re.findall(r"^\d\. `(src/\S+\.pyi?)`", section(title), re.M)
     found = {
         path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "src").rglob("*.py")
-        if re.search(mention, path.read_text("utf-8")) or (old and path.stem == old)
+        for path in (ROOT / "src").rglob("*.py*")
+        if path.suffix in (".py", ".pyi")
+        and (re.search(mention, path.read_text("utf-8")) or (old and path.stem == old))
     }
     if title == "An integrator":
         found -= {"src/foldyn/dynamics/choice.py"}  # which integrator "auto" takes

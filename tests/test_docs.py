@@ -31,6 +31,20 @@ def test_quickstart_runs(tmp_path, monkeypatch):
     assert (tmp_path / "miura.nc").exists()
 
 
+def test_the_quantities_of_the_results_page_can_be_sampled():
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    case = fd.Case(structure, loads=[fd.Force([6, 7, 8], (0.01, 0.0, 0.0))])
+    names = {"fd": fd, "np": np, "case": case}
+    (block,) = (b for b in blocks("results.md", "python") if "sample=" in b)
+    exec(compile(block, "results.md", "exec"), names)
+    motion = names["trajectory"]
+    assert motion["opening"].dims == ("time",) and motion["opening"].attrs["units"] == "m"
+    assert motion["momentum"].dims == ("time", "node", "axis")
+    impulse = motion["momentum"].sum("node").sel(axis="x").values
+    np.testing.assert_allclose(impulse, 0.03 * motion["time"], rtol=1e-9, atol=1e-15)
+
+
 def test_the_case_file_page_shows_a_case_file(tmp_path):
     block, *_ = blocks("case-file.md", "toml")
     (tmp_path / "case.toml").write_text(block, "utf-8")

@@ -58,7 +58,12 @@ from foldyn.materials import (
     HingeLaw as HingeLaw,
 )
 from foldyn.patterns import Pattern as Pattern
-from foldyn.results import case_of as case_of, load as load, save as save
+from foldyn.results import (
+    Quantity as Quantity,
+    case_of as case_of,
+    load as load,
+    save as save,
+)
 from foldyn.shells import Shell as Shell, shell as shell
 from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
 from foldyn.structures import Sheet as Sheet, Structure as Structure, discretize as discretize

@@ -6,7 +6,7 @@ that fails raises `ComputationError` (exit status 1) and carries what was comput
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -32,6 +32,10 @@ def shortened(message: str) -> str:
     return "\n".join(kept)
 
 
+ALSO = "\n  also "
+"""Between the lines of a message that tells several faults."""
+
+
 class FoldynError(Exception):
     """Base of everything that Foldyn raises on purpose."""
 
@@ -51,11 +55,20 @@ class InputError(FoldynError, ValueError):
         Path of what is wrong: "duration", "loads[0].history".
     file : path, optional
         File that says it.
+    others : sequence of InputError
+        What else is wrong, told in a line each.
     """
 
-    def __init__(self, reason: object = "", field: str = "", file: object = None) -> None:
-        self.reason, self.field, self.file = str(reason), field, file
-        super().__init__(f"{'' if file is None else f'{file}: '}{field}{self.reason}")
+    def __init__(
+        self,
+        reason: object = "",
+        field: str = "",
+        file: object = None,
+        others: Sequence[InputError] = (),
+    ) -> None:
+        self.reason, self.field, self.file, self.others = str(reason), field, file, tuple(others)
+        lines = dict.fromkeys(f"{one.field}{one.reason}" for one in (self, *self.others))
+        super().__init__(f"{'' if file is None else f'{file}: '}{ALSO.join(lines)}")
 
     @property
     def key(self) -> str:
@@ -65,7 +78,8 @@ class InputError(FoldynError, ValueError):
     def within(self, field: str, file: object = None) -> InputError:
         """The same error, seen from further out: its field is a part of another, or of a file."""
         inner = self.field if self.file is None else f"{self.file}: {self.field}"
-        return type(self)(self.reason, field + inner, file)
+        others = [other.within(field) for other in self.others]
+        return type(self)(self.reason, field + inner, file, others)
 
 
 @contextmanager
@@ -75,6 +89,32 @@ def within(field: str, file: object = None) -> Iterator[None]:
         yield
     except InputError as error:
         raise error.within(field, file) from None
+
+
+class Faults:
+    """Collects the faults of independent parts, to be told together."""
+
+    def __init__(self) -> None:
+        self.found: list[InputError] = []
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Keep an `InputError` for later."""
+        try:
+            yield
+        except InputError as error:
+            self.add(error)
+
+    def add(self, error: InputError) -> None:
+        """Add an error and its others."""
+        alone = InputError(error.reason, error.field, error.file)
+        self.found += [alone, *error.others]
+
+    def tell(self) -> None:
+        """Raise all that was found in one error, if anything was."""
+        if self.found:
+            first, *others = self.found
+            raise InputError(first.reason, first.field, first.file, others)
 
 
 class ComputationError(FoldynError, RuntimeError):

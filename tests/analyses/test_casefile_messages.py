@@ -354,3 +354,20 @@ def test_a_list_of_mass_rules_warns_once(read, example) -> None:
     with pytest.warns(FoldynWarning, match=r"loads\[0\].*in part") as record:
         read(text)
     assert len(record) == 1
+
+
+def test_all_faults_are_told_at_once(read, short) -> None:
+    """Of the keys, of the selections, and then of what only the made sheet can refuse."""
+    text = short.replace('kind = "miura"', 'kind = "mura"\ncell = [1, 1]').replace("xmin", "xmn")
+    with pytest.raises(InputError) as caught:
+        read(text)
+    kind, key, nodes = str(caught.value).split("\n  also ")
+    assert "pattern.kind = \"mura\": did you mean 'miura'?" in kind
+    assert key.startswith("pattern.cell: unknown key; did you mean 'cells'?")
+    assert nodes.startswith('supports[0].nodes = "xmn": xmn is not known; use xmin')
+    text = short.replace('nodes = "xmin"', "nodes = [99]").replace("[7, 6]", "[77]")
+    with pytest.raises(InputError) as caught:
+        read(text)
+    held, loaded = str(caught.value).split("\n  also ")
+    assert "supports[0].nodes = [99]: node 99 is out of range" in held
+    assert loaded.startswith("loads[0].nodes = [77]: node 77 is out of range")

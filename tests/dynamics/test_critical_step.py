@@ -18,20 +18,24 @@ OMEGA = 4.0
 
 def test_stability_limits_of_rk4():
     """2 sqrt(2) / w undamped; 2.7853 / |s| on the negative real axis."""
-    assert stability_limit(RK4, 10.0, 0.0, 0.0) == pytest.approx(2 * np.sqrt(2) / 10, rel=1e-6)
+    assert stability_limit(RK4, 10.0, fd.Rayleigh()) == pytest.approx(2 * np.sqrt(2) / 10, rel=1e-6)
     # overdamped by mass: s = -alpha for the rigid motion
-    assert stability_limit(RK4, 1e-3, 50.0, 0.0) == pytest.approx(2.785293563 / 50.0, rel=1e-6)
+    assert stability_limit(RK4, 1e-3, fd.Rayleigh(50.0)) == pytest.approx(
+        2.785293563 / 50.0, rel=1e-6
+    )
     # overdamped by stiffness: the fast root is close to -beta w^2
     fast = 0.5 * (1e-2 * 1e4**2 + np.sqrt((1e-2 * 1e4**2) ** 2 - 4 * 1e4**2))
-    assert stability_limit(RK4, 1e4, 0.0, 1e-2) == pytest.approx(2.785293563 / fast, rel=1e-4)
-    assert stability_limit(RK4, 0.0, 0.0, 0.0) == np.inf
+    assert stability_limit(RK4, 1e4, fd.Rayleigh(beta=1e-2)) == pytest.approx(
+        2.785293563 / fast, rel=1e-4
+    )
+    assert stability_limit(RK4, 0.0, fd.Rayleigh()) == np.inf
 
 
 def test_stability_limits_of_central_differences():
     """2 / w undamped, and with damping proportional to mass, which the method treats explicitly."""
     growth = METHODS["central_difference"].growth
-    assert stability_limit(growth, 10.0, 0.0, 0.0) == pytest.approx(0.2, rel=1e-6)
-    assert 0.5 < stability_limit(growth, 10.0, 1.0, 0.0) / 0.2 < 1.0
+    assert stability_limit(growth, 10.0, fd.Rayleigh()) == pytest.approx(0.2, rel=1e-6)
+    assert 0.5 < stability_limit(growth, 10.0, fd.Rayleigh(1.0)) / 0.2 < 1.0
 
 
 @pytest.mark.filterwarnings("ignore:the energy balance")

@@ -11,7 +11,7 @@ import pytest
 from bodies import paper_specimen
 
 from foldyn.linear import character, equivalent_slope, modes
-from foldyn.results.modes import MODE_VARIABLES
+from foldyn.results.quantities import MODES
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "modes.md").read_text("utf-8")
 
@@ -30,7 +30,7 @@ def test_the_examples_run():
 
 def test_every_variable_has_a_row():
     rows = "".join(line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `"))
-    assert [name for name in MODE_VARIABLES if f"`{name}`" not in rows] == []
+    assert [name for name in MODES if f"`{name}`" not in rows] == []
 
 
 def test_the_slope_at_rest():

@@ -35,8 +35,7 @@ def made(case, f=F, poles=POLES, quantity="receptance", coherence=None, facts=No
     drive[7, 0] = 1.0
     more = {}
     if coherence is not None:
-        values = np.full((len(f), n, 3), coherence)
-        more["coherence"] = (("frequency", "node", "axis"), values, "1", "coherence")
+        more["coherence"] = np.full((len(f), n, 3), coherence)
     statistics = {"method": "direct", "base_axis": "x", **(facts or {})}
     return frf_dataset(case, f, quantity, response, np.zeros((n, 3)), drive, statistics, more)
 

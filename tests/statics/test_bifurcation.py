@@ -62,18 +62,17 @@ def test_stability_counts(path):
 
 def test_by_bisection_alone(monkeypatch):
     """Solvers that do not tell their pivots (PARDISO) locate by the count."""
-    from foldyn.statics import linear_solver, stability
+    from foldyn.algebra import superlu
+    from foldyn.statics import stability
 
     found = []
     plain = stability._bisected
     monkeypatch.setattr(stability, "_bisected", lambda *a: found.append(1) or plain(*a))
-    count = linear_solver.SuperLU.negative
-    pivots = linear_solver.SuperLU.pivots
-    monkeypatch.setattr(
-        linear_solver.SuperLU, "negative", lambda self: int((pivots(self) < 0).sum())
-    )
-    monkeypatch.setattr(linear_solver.SuperLU, "pivots", lambda self: None)
-    assert count is not linear_solver.SuperLU.negative
+    count = superlu.SuperLU.negative
+    pivots = superlu.SuperLU.pivots
+    monkeypatch.setattr(superlu.SuperLU, "negative", lambda self: int((pivots(self) < 0).sum()))
+    monkeypatch.setattr(superlu.SuperLU, "pivots", lambda self: None)
+    assert count is not superlu.SuperLU.negative
     path = down()
     assert len(found) == 4
     marked = path.isel(step=path.point.values != "regular")

@@ -7,10 +7,11 @@ import pytest
 from scipy import sparse
 from sheets import compression
 
+from foldyn.algebra.choice import factorizer
+from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.errors import InputError
 from foldyn.statics import SOLVERS, OrigamiProblem, Settings, Solver, trace
-from foldyn.statics.backends import factorizer
-from foldyn.statics.linear_solver import Reduction, SingularTangentError, SuperLU
 
 PRESENT = [name for name, backend in SOLVERS.items() if backend.present]
 

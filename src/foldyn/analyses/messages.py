@@ -8,6 +8,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from foldyn.cases.decode import unknown_key
+from foldyn.errors import ALSO
 from foldyn.values import SHOWN, nearest, show
 
 MOST_LINES = 12
@@ -45,10 +46,10 @@ def describe(
         and not (item["type"] == "missing" and item["loc"] in meant)
     ]
     found = [*unknown, *rest][:MOST_LINES]
-    lines = [_line(item, schema, kinds) for item in found]
+    lines = [line for item in found for line in _lines(item, schema, kinds)]
     if len(unknown) + len(rest) > MOST_LINES:
         lines.append(f"{len(unknown) + len(rest) - MOST_LINES} more")
-    return "\n  also ".join(dict.fromkeys(lines))
+    return ALSO.join(dict.fromkeys(lines))
 
 
 def dotted(location: Sequence[str | int]) -> str:
@@ -60,13 +61,21 @@ def dotted(location: Sequence[str | int]) -> str:
     return text
 
 
+def _lines(
+    item: Mapping[str, Any], schema: type[BaseModel], kinds: Mapping[str, type[BaseModel]]
+) -> list[str]:
+    if item["type"] != "value_error":
+        return [_line(item, schema, kinds)]
+    error = item["ctx"]["error"]  # an InputError of ours: its text continues the path
+    place = dotted(item["loc"])
+    return [f"{place}{one.field}{one.reason}" for one in (error, *error.others)]
+
+
 def _line(
     item: Mapping[str, Any], schema: type[BaseModel], kinds: Mapping[str, type[BaseModel]]
 ) -> str:
     location, kind, value = item["loc"], item["type"], item["input"]
     place, context = dotted(location), item.get("ctx", {})
-    if kind == "value_error":  # an InputError of ours: its text continues the path
-        return f"{place}{context['error']}"
     if kind == "extra_forbidden":
         at, key = location[:-1], str(location[-1])
         owners = [name for name, other in kinds.items() if key in _keys(other, at)]

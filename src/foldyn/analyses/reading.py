@@ -22,7 +22,7 @@ from foldyn.cases import (
 )
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.formats import read_pattern
 from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern
@@ -121,12 +121,17 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     model = MODELS[schema.model.kind]
     masses = list(schema.model.mass or [model.mass])
     cases: dict[str, Case] = {}
-    with within("", path):
+    kind, faults = ANALYSES[schema.analysis.kind], Faults()
+    pattern: Any = None
+    sheet: Any = None
+    with faults.collected():
         pattern = _pattern(schema.pattern, path.parent)
+    with faults.collected():
         sheet = Sheet(**schema.sheet.model_dump())
-        kind = ANALYSES[schema.analysis.kind]
-        if sheet.density is None and kind.needs_density:
-            raise InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density")
+    if schema.sheet.density is None and kind.needs_density:
+        faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
+    with within("", path):
+        faults.tell()
         if schema.model.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping."):

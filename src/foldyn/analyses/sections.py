@@ -9,6 +9,7 @@ sections. Validators raise InputError with a text that continues the key's path 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -27,12 +28,12 @@ from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import support_from
-from foldyn.errors import InputError
+from foldyn.errors import Faults, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
 from foldyn.structures.options import CALIBRATIONS, SCHEMES
-from foldyn.values import MOST, choice, number, numbers, show, vector
+from foldyn.values import MOST, choice, nearest, number, numbers, show, vector
 
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
@@ -71,7 +72,7 @@ def _pattern(value: Any) -> dict[str, Any]:
             raise InputError(".vertices: missing; faces need vertices")
         raise InputError(": give kind (a generator), file, or vertices and faces")
     if "kind" in value:
-        choice(".kind", value["kind"], GENERATORS)
+        _check_generator(value)
     elif "file" in value:
         check_keys(value, ["file"])
         if not isinstance(value["file"], str) or not value["file"]:
@@ -82,6 +83,20 @@ def _pattern(value: Any) -> dict[str, Any]:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
     return dict(value)
+
+
+def _check_generator(value: Mapping[str, Any]) -> None:
+    """Refuse an unknown generator, and keys that it, or the one that is meant, does not have."""
+    faults, kind = Faults(), value["kind"]
+    with faults.collected():
+        choice(".kind", kind, GENERATORS)
+    meant = nearest(kind, GENERATORS) if isinstance(kind, str) else None
+    if meant is not None:
+        known = [*signature(GENERATORS[meant]).parameters, "kind"]
+        for key in value:
+            with faults.collected():
+                check_keys({key: None}, known)
+    faults.tell()
 
 
 def _inline(value: Mapping[str, Any]) -> None:

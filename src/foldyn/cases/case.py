@@ -17,7 +17,7 @@ from foldyn.cases.loads import LOADS, Gravity
 from foldyn.cases.part import Load
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
-from foldyn.errors import InputError
+from foldyn.errors import Faults, InputError
 from foldyn.values import show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
@@ -90,9 +90,24 @@ class Case:
             raise InputError(
                 f"damping = {show(self.damping)}: must be Rayleigh(alpha=..., beta=...)"
             )
+        self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         for place, load in self._loads():
             load.check(self.structure, self.fixed, place)
+
+    def _check_selections(self) -> None:
+        """Refuse nodes and creases that are not there, all at once."""
+        faults = Faults()
+        for i, support in enumerate(self.supports):
+            if not isinstance(support, BaseMotion):
+                with faults.collected():
+                    self._nodes_of(i, support)
+        for place, load in self._loads():
+            with faults.collected():
+                load.loaded(self.structure, place)
+            with faults.collected():
+                load.rest_changes(self.structure, place)
+        faults.tell()
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:

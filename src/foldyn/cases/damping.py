@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from foldyn.values import choice, number
 
@@ -35,3 +36,12 @@ class Rayleigh:
         object.__setattr__(self, "alpha", number("alpha", self.alpha, least=0.0))
         object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
         choice("state", self.state, STATES)
+
+    def matrix(self, mass: Any, stiffness: Any) -> Any:
+        """C from M (kg) and K0 (N/m)."""
+        damping = mass * self.alpha
+        return damping if self.beta == 0.0 else damping + self.beta * stiffness
+
+    def rate(self, omega: Any) -> Any:
+        """Damping (1/s) of a mode with angular frequency omega (rad/s) and modal mass 1 kg m2."""
+        return self.alpha + self.beta * omega**2

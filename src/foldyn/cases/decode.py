@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from foldyn.cases.histories import HISTORIES, History, Table
-from foldyn.errors import InputError
+from foldyn.errors import Faults, InputError, within
 from foldyn.values import choice, number, show, suggest, whole
 
 
@@ -69,19 +69,24 @@ def call_from(
         for name, parameter in inspect.signature(function).parameters.items()
         if name not in skip
     }
-    check_keys(arguments, parameters)
-    for name, parameter in parameters.items():
-        if parameter.default is parameter.empty and name not in arguments:
-            raise InputError(f".{name}: missing; known keys: {', '.join(parameters)}")
+    faults = Faults()
+    for key in arguments:
+        with faults.collected():
+            check_keys({key: None}, parameters)
+    if not faults.found:  # a misspelled key is missing, too
+        for name, parameter in parameters.items():
+            if parameter.default is parameter.empty and name not in arguments:
+                known = ", ".join(parameters)
+                faults.add(InputError(f": missing; known keys: {known}", f".{name}"))
     values = dict(arguments)
     if not checks_itself:
         hints = get_type_hints(function.__init__ if isinstance(function, type) else function)
-        for name, value in values.items():
-            values[name] = _checked(f".{name}", value, hints.get(name, Any))
-    try:
+        for name in values.keys() & parameters.keys():
+            with faults.collected():
+                values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
+    faults.tell()
+    with within("." if checks_itself else ": "):
         return function(**values)
-    except InputError as error:
-        raise InputError(f"{'.' if checks_itself else ': '}{error}") from None
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -89,7 +94,7 @@ def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
     known = list(known)
     for key in table:
         if key not in known:
-            raise InputError(f".{key}: {unknown_key(key, known)}")
+            raise InputError(f": {unknown_key(key, known)}", f".{key}")
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:

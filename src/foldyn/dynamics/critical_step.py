@@ -88,6 +88,5 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     growth = suited(method, case.structure).growth
     if growth is None:
         return np.inf
-    alpha, beta = case.damping.alpha, case.damping.beta
     omega = largest_frequency(case, u)
-    return MARGIN * stability_limit(growth, omega, alpha, beta)
+    return MARGIN * stability_limit(growth, omega, case.damping)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import generalized_alpha
 from foldyn.dynamics.choice import AUTO, choose
@@ -20,6 +22,7 @@ from foldyn.dynamics.methods import Method, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
+from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
@@ -31,7 +34,7 @@ from foldyn.dynamics.timing import (
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.fill import check_fill
+from foldyn.results import Quantity
 from foldyn.values import number
 
 if TYPE_CHECKING:
@@ -60,6 +63,7 @@ def simulate(
     start: float = 0.0,
     progress: bool | Reporter | None = None,
     spectral_radius: float | None = None,
+    sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
 
@@ -94,6 +98,10 @@ def simulate(
     spectral_radius : float, optional
         Of `generalized_alpha`: what a step leaves of the fastest vibrations, from 0 (nothing) to 1
         (all); 0.8 by default.
+    sample : mapping of str to callable or Quantity, optional
+        Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
+        m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,
+        function)` with its unit, meaning and dimensions. They are evaluated at every sample.
 
     Returns
     -------
@@ -108,6 +116,8 @@ def simulate(
     ------
     InputError
         An argument out of range, a step above the critical one, a free node without mass.
+    ComputationError
+        A function of `sample` failed, or gave another shape or no finite numbers, after the start.
     InstabilityError, PenetrationError
         The motion grew without bound or became NaN; panel passed through panel. What was
         computed until then is in the exception's `partial`.
@@ -124,7 +134,7 @@ def simulate(
     initial displacement.
     """
     motion = prepare(
-        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius
+        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius, sample
     )
     return motion.run(progress)
 
@@ -140,6 +150,7 @@ def prepare(
     tolerance: float | None = None,
     start: float = 0.0,
     spectral_radius: float | None = None,
+    sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
 ) -> Motion:
     """Check everything that `simulate` checks and choose the step, without computing a motion.
 
@@ -185,7 +196,7 @@ def prepare(
         )
     check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
-        check_fill(case.structure)
+        check_fill(case.structure.fill, case.structure.body.size)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
         memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY
@@ -203,7 +214,8 @@ def prepare(
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u)
     beginning = partial(begin, case, u, v, plan, packed)
-    return Motion(case, integrator, plan, critical, force, beginning, packed, reason)
+    sampler = Sampler(case, sample or {}, u, v, plan.start)
+    return Motion(case, integrator, plan, critical, force, beginning, packed, sampler, reason)
 
 
 def _with_radius(method: Method, spectral_radius: float | None) -> Method:

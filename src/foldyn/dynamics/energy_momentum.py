@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.damping import add_viscous, drag, drag_works, viscous_work
 from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.discrete_gradient import (
     add_bar_forces,
@@ -28,8 +29,7 @@ from foldyn.dynamics.implicit.discrete_gradient import (
 )
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
-from foldyn.dynamics.inertia import kinetic_energy, times_mass
-from foldyn.dynamics.system import moving_energy
+from foldyn.dynamics.inertia import times_mass
 from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
@@ -64,7 +64,7 @@ class EnergyMomentum:
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`."""
-        return Weights(1.0, (2.0 / h + self.bench.packed.system.alpha) / h, 1.0 / h)
+        return Weights(1.0, (2.0 / h + self.bench.packed.system.damping.alpha) / h, 1.0 / h)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
@@ -122,7 +122,7 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
         q1[i] = q0[i] + d[i]
         w1[i] = 2.0 * d[i] / h - w0[i]
         a1[i] = (w1[i] - w0[i]) / h
-        x[i] = a1[i] + system.alpha * 0.5 * (w0[i] + w1[i])
+        x[i] = a1[i] + drag(system.damping, 0.5 * (w0[i] + w1[i]))
     for node in range(mass.diagonal.size):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
@@ -140,10 +140,11 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     add_bar_forces(model, s.displacement, s.velocity, new.force)
     add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
     u0, u1 = flat(s.displacement), flat(s.velocity)
-    for i in range(system.stiff_indptr.size - 1):
-        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-            j = system.stiff_indices[k]
-            bracket[i] += system.stiff_data[k] * (u1[j] - u0[j]) / h
+    if system.damping.data.size > 0:
+        speed = flat(s.product)
+        for i in range(speed.size):
+            speed[i] = (u1[i] - u0[i]) / h
+        add_viscous(system.damping, speed, bracket, 0, speed.size)
     loads = system.loads
     for k in range(loads.dof.size):
         bracket[loads.dof[k]] -= loads.value[k] * mean[loads.row[k], 0]
@@ -177,12 +178,9 @@ def _works(system, mass, h, old, new, shift, s):
     for i in range(du.size):
         du[i] = flat(shift)[i]
         speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
-    done, lost = 0.0, 0.0
-    if system.alpha > 0.0:
-        jolts = moving_energy(system.moved_mass, old.factor)
-        jolts += moving_energy(system.moved_mass, new.factor)
-        done += system.alpha * h * jolts
-        lost += system.alpha * h * (2.0 * kinetic_energy(mass, s.moving, s.product) + jolts)
+    done, lost = drag_works(
+        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.moving, s.product
+    )
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
@@ -192,10 +190,7 @@ def _works(system, mass, h, old, new, shift, s):
         row = loads.row[k]
         mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
         done += loads.value[k] * mean * du[loads.dof[k]]
-    for i in range(system.stiff_indptr.size - 1):
-        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-            lost += du[i] * system.stiff_data[k] * du[system.stiff_indices[k]] / h
-    return done, lost
+    return done, lost + viscous_work(system.damping, s.displacement, s.displacement) / h
 
 
 @kernel

@@ -184,6 +184,16 @@ def _lumped_sum(diagonal, v):
     return total
 
 
+@kernel
+def moving_energy(mass, factor):
+    """Kinetic energy (J) of S f', `mass` the system's `moved_mass`, for factors (h, 3)."""
+    total = 0.0
+    for k in range(mass.shape[0]):
+        for l in range(mass.shape[0]):  # noqa: E741
+            total += mass[k, l] * factor[k, 1] * factor[l, 1]
+    return 0.5 * total
+
+
 @scalar
 def kinetic_energy(m, v, product):
     """v M v / 2 (J), v (n, 3); product (n, 3) is scratch, used if the matrix is not diagonal."""

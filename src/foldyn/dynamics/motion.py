@@ -17,10 +17,17 @@ from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.methods import Method
 from foldyn.dynamics.progress import Progress, Reporter, reporter
+from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.stability import is_stable, stability_limit
 from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import expected_samples
-from foldyn.errors import FoldynWarning, InstabilityError, MotionInterrupted, PenetrationError
+from foldyn.errors import (
+    ComputationError,
+    FoldynWarning,
+    InstabilityError,
+    MotionInterrupted,
+    PenetrationError,
+)
 from foldyn.results import trajectory_dataset
 
 if TYPE_CHECKING:
@@ -38,11 +45,11 @@ class Motion:
 
     def __init__(
         self, case: Case, method: Method, plan: Plan, critical: float, force: bool,
-        begin: Callable[[], Course], packed: Packed, reason: str = "",
+        begin: Callable[[], Course], packed: Packed, sampler: Sampler, reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
-        self._begin, self._packed = begin, packed
+        self._begin, self._packed, self._sampler = begin, packed, sampler
         self._course, self._out = begin(), self._room(0)
         self.at_rest = not (self._course.u.any() or self._course.v.any())
         self.seconds = 0.0
@@ -67,6 +74,7 @@ class Motion:
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
         self._course, self._out = self._begin(), self._room(self.expected_samples)
+        self._sampler.clear()
         self._integrate(*reporter(progress))
         if told := self._doubts(self._audit()):
             warnings.warn(told, FoldynWarning, stacklevel=3)
@@ -95,6 +103,7 @@ class Motion:
                 clock = time.perf_counter() - clock
                 began = time.perf_counter() if began is None else began
                 self.seconds = time.perf_counter() - began
+                self._sample()
                 if callbacks.error is not None:
                     self._raise(callbacks.error)
                 if code == Outcome.FULL:
@@ -119,6 +128,13 @@ class Motion:
             ) from None
         finally:
             close()
+
+    def _sample(self) -> None:
+        """Evaluate what the user samples at the samples that are new."""
+        try:
+            self._sampler.take(self._out, self.stored)
+        except SamplingError as error:
+            raise ComputationError(str(error), self._dataset()) from error
 
     def _raise(self, error: BaseException) -> None:
         """Raise what a function of time of the user's has raised."""
@@ -160,11 +176,10 @@ class Motion:
 
     def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
-        damping = self.case.damping.alpha, self.case.damping.beta
         omega, growth = largest_frequency(self.case, u), self.method.growth
         assert growth is not None  # of explicit methods
-        if not is_stable(growth, omega, *damping, self.plan.dt):
-            limit = stability_limit(growth, omega, *damping)
+        if not is_stable(growth, omega, self.case.damping, self.plan.dt):
+            limit = stability_limit(growth, omega, self.case.damping)
             raise InstabilityError(
                 f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
@@ -225,7 +240,7 @@ class Motion:
         )
         return trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
-            self._statistics(self.plan),
+            self._statistics(self.plan), self._sampler.columns(self.stored),
         )  # fmt: skip
 
     def _written(self) -> Samples:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case, State
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, Plan
-from foldyn.dynamics.system import Packed, follow, moving_energy, place, scratch
+from foldyn.dynamics.inertia import moving_energy
+from foldyn.dynamics.system import Packed, follow, place, scratch
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance

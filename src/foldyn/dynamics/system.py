@@ -20,10 +20,12 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuator_power, actuators, turn
+from foldyn.dynamics.damping import Damping, add_viscous, damping_of, drag, drag_power
 from foldyn.dynamics.inertia import (
     Inertia,
     inertia,
     kinetic_energy,
+    moving_energy,
     own_kinetic_energy,
     substitute,
     times_mass,
@@ -54,10 +56,7 @@ class System(NamedTuple):
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
     supported: NDArray  # (s,) dofs 3 place + axis, in the order of the case's
-    alpha: float
-    stiff_indptr: NDArray  # beta K0 by rows; none if beta = 0
-    stiff_indices: NDArray
-    stiff_data: NDArray
+    damping: Damping
     waves: Waveforms
     loads: Entries  # N
     moved: Entries  # S, m
@@ -118,13 +117,6 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         for shape, history in (*case.imposed_terms, *case.base_terms)
     ]
     callbacks = Callbacks()
-    if case.damping.beta > 0.0:
-        state = start if case.damping.state == "start" else None
-        state = np.zeros_like(structure.nodes) if state is None else state
-        k0 = structure.body.tangent(structure.body.dofs(state))
-        k0 = by.matrix(k0) * case.damping.beta
-    else:
-        k0 = sparse.csr_array((0, 0))
     body, turned = actuators(body, structure.fold_law, case.actuation_terms, histories)
     system = System(
         varies=bool(histories),
@@ -134,10 +126,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         energies=len(body.energy_groups),
         order=by.order,
         supported=by.dofs(case.supported_dofs),
-        alpha=float(case.damping.alpha),
-        stiff_indptr=k0.indptr.astype(np.int64),
-        stiff_indices=k0.indices.astype(np.int64),
-        stiff_data=np.asarray(k0.data, float),
+        damping=damping_of(case, by, start),
         waves=pack_waveforms(histories, callbacks, span),
         loads=_entries([(by.inward(p), history) for p, history in case.load_terms], histories),
         moved=_entries(moves, histories),
@@ -230,19 +219,9 @@ def _carry(moved, factor, q, w, displacement, velocity):
 
 
 @kernel
-def moving_energy(mass, factor):
-    """Kinetic energy (J) of S f', `mass` the system's `moved_mass`."""
-    total = 0.0
-    for k in range(mass.shape[0]):
-        for l in range(mass.shape[0]):  # noqa: E741
-            total += mass[k, l] * factor[k, 1] * factor[l, 1]
-    return 0.5 * total
-
-
-@kernel
-def _moving_power(moved, moved_mass, alpha, force, factor):
+def _moving_power(moved, moved_mass, damping, force, factor):
     """Power (W) of moving supports but for what changes the kinetic energy of S f'."""
-    power = 2.0 * alpha * moving_energy(moved_mass, factor)
+    power = drag_power(damping, moving_energy(moved_mass, factor))
     bracket = flat(force)
     for k in range(moved.dof.size):
         power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]
@@ -272,34 +251,30 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     force_of(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
     power_in, power_out = 0.0, 0.0
-    loads = system.loads
+    loads, damping = system.loads, system.damping
     for k in range(s.loads[0], s.loads[1]):
         dof = loads.dof[k]
         load = loads.value[k] * s.factor[loads.row[k], 0]
         force[dof] -= load
         power_in += load * speed[dof]
-    if system.stiff_data.size > 0:
-        for i in range(first, last):
-            viscous = 0.0
-            for p in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-                viscous += system.stiff_data[p] * speed[system.stiff_indices[p]]
-            force[i] += viscous
-            power_out += viscous * speed[i]
+    if damping.data.size > 0:
+        power_out += add_viscous(damping, speed, force, first, last)
         wait(work.team)  # others look at this member's velocities
     if not mass.lumped:  # on one thread only
         substitute(mass, s.force, out, s.line)
-    alpha, accelerated, relative = system.alpha, flat(out)[first:last], flat(w)[first:last]
+    accelerated, relative = flat(out)[first:last], flat(w)[first:last]
     if mass.lumped:
         bracket, inverse = force[first:last], flat(mass.inverse)[first:last]
         for i in range(bracket.size):
-            accelerated[i] = -bracket[i] * inverse[i] - alpha * relative[i]
+            accelerated[i] = -bracket[i] * inverse[i] - drag(damping, relative[i])
     else:
         for i in range(relative.size):
-            accelerated[i] = -accelerated[i] - alpha * relative[i]
-    if alpha > 0.0:
-        power_out += 2.0 * alpha * own_kinetic_energy(mass, v, s.product, work.strips.own)
+            accelerated[i] = -accelerated[i] - drag(damping, relative[i])
+    if damping.alpha > 0.0:
+        kinetic = own_kinetic_energy(mass, v, s.product, work.strips.own)
+        power_out += drag_power(damping, kinetic)
     if system.moves:
-        power_in += _moving_power(system.moved, system.moved_mass, alpha, s.force, s.factor)
+        power_in += _moving_power(system.moved, system.moved_mass, damping, s.force, s.factor)
     if system.turns:
         power_in += actuator_power(model, system.actuators, s.factor, work.fold_angle)
     return power_in, power_out
@@ -334,7 +309,7 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     energy[groups] = kinetic_energy(mass, s.velocity, s.product)
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
-        reaction[k] += system.alpha * product[system.supported[k]]
+        reaction[k] += drag(system.damping, product[system.supported[k]])
     energies_of(model, s.displacement, work, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]

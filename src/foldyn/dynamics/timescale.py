@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case
-from foldyn.statics.linear_solver import SingularTangentError, SuperLU
 
 MOST_TIMES = 4000  # at which loads are looked at
 AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in motion

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.pencil import EPS, Pencil
-from foldyn.statics.linear_solver import Factorization, SingularTangentError
 
 MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
 DENSE = 60  # dofs up to which all modes are found at once (the other way is as quick)

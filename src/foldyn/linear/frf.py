@@ -64,11 +64,6 @@ METHODS: Mapping[str, Method] = {
 }
 
 COPIES = 4  # of the response, while it is found and stored
-_MORE: Mapping[str, tuple[tuple[str, ...], str, str]] = {
-    "coherence": (("frequency", "node", "axis"), "1", "coherence"),
-    "swing": (("frequency",), "degrees", "largest amplitude of a superlinear hinge"),
-    "unsteadiness": (("frequency",), "1", "relative error that transients leave, estimated"),
-}
 
 
 def frf(
@@ -187,9 +182,8 @@ def frf(
         **found.facts,
         "wall_seconds": time.perf_counter() - began,
     }
-    more = {name: (_MORE[name][0], values, *_MORE[name][1:]) for name, values in found.more.items()}
     return frf_dataset(
-        case, frequency, driven.quantity, found.response, at, driven.vector, facts, more
+        case, frequency, driven.quantity, found.response, at, driven.vector, facts, found.more
     )
 
 

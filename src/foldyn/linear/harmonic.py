@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.answer import Answer
-from foldyn.linear.direct import dynamic_stiffness, solve, warn_of_resonances
+from foldyn.linear.direct import dynamic_stiffness, warn_of_resonances
 from foldyn.linear.excitation import Drive
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.secant import equivalent_slope

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
 from foldyn.errors import FoldynWarning
-from foldyn.linear.equilibrium import Station, station
+from foldyn.linear.equilibrium import station
 from foldyn.linear.secant import equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
-from foldyn.statics.fill import check_fill
 from foldyn.values import number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
@@ -98,7 +98,7 @@ def linearize(
     """
     amplitude = _amplitude(secant)
     check_mass(case.structure.mass, case.fixed)
-    check_fill(case.structure)
+    check_fill(case.structure.fill, case.structure.body.size)
     where = station(case, state, load_factor)
     body = where.body
     free = np.concatenate([case.free_dofs, body.hidden])
@@ -114,7 +114,7 @@ def linearize(
         free=free,
         stiffness=_block(stiffness, free),
         mass=_block(mass, free),
-        damping=_damping(case, where, exact, mass, free),
+        damping=_block(case.damping.matrix(mass, _reference(case, exact)), free),
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=where.relative,
@@ -150,19 +150,12 @@ def _all_mass(case: Case, hidden: int) -> sparse.csr_array:
     return sparse.csr_array(nodal)
 
 
-def _damping(
-    case: Case, where: Station, exact: sparse.csr_array, mass: sparse.csr_array, free: NDArray
-) -> sparse.csc_array:
-    """alpha M + beta K0 on the free dofs."""
-    damping = case.damping
-    matrix = _block(mass, free) * damping.alpha
-    if damping.beta == 0.0:
-        return matrix
-    reference = exact
-    if damping.state == "rest":
-        body = case.structure.body
-        reference = body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
-    return sparse.csc_array(matrix + damping.beta * _block(reference, free))
+def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
+    """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
+    if case.damping.state != "rest" or case.damping.beta == 0.0:
+        return exact
+    body = case.structure.body
+    return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
 
 
 def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:

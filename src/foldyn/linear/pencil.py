@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.statics.backends import factorizer
-from foldyn.statics.linear_solver import Factorization, SingularTangentError
+from foldyn.algebra.choice import factorizer
+from foldyn.algebra.superlu import Factorization, SingularTangentError
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: how far from zero rounding may move an eigenvalue

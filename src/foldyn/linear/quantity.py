@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
-from foldyn.results.frf import RESPONSES
+from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
 from foldyn.values import choice
 
@@ -61,6 +61,6 @@ def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
             "velocities and accelerations"
         )
     values = convert_response(response["frequency"].values, response[held].values, held, quantity)
-    units, text = RESPONSES[quantity]
-    named = (response[held].dims, values, {"units": units, "long_name": text})
+    other = RESPONSES[quantity]
+    named = variable(tuple(map(str, response[held].dims)), values, other.units, other.text)
     return response.drop_vars(held).assign({quantity: named})

@@ -23,15 +23,6 @@ from scipy import sparse
 from foldyn.mechanics.tangent import Sparsity
 
 
-class Fill(NamedTuple):
-    """Memory that the factors of a tangent take, by experience, and what makes it less."""
-
-    per_doubling: float  # bytes a dof for each doubling of the number of dofs,
-    least: int  # from so many dofs on
-    field: str
-    remedy: str
-
-
 class SoftHinges(NamedTuple):
     """Hinges of a law that has no slope at rest, h of them, in a state."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.linear import convert
 from foldyn.linear.quantity import PER_FORCE, quantity_of
-from foldyn.results.frf import RESPONSES
+from foldyn.results.quantities import RESPONSES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +91,7 @@ def curves_of(
 
 def unit_of(quantity: str) -> str:
     """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
-    unit = RESPONSES[quantity][0].replace("s2", "s²")
+    unit = RESPONSES[quantity].units.replace("s2", "s²")
     return "" if unit == "1" else f" ({unit})"
 
 

@@ -5,9 +5,11 @@ from foldyn.results.frf import frf_dataset
 from foldyn.results.modes import modes_dataset
 from foldyn.results.origin import case_of, check_result
 from foldyn.results.path import path_dataset
+from foldyn.results.quantities import Quantity
 from foldyn.results.store import load, save
 
 __all__ = [
+    "Quantity",
     "case_of",
     "check_result",
     "frf_dataset",

@@ -15,17 +15,18 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.cases import HISTORIES, Case, Fix
 from foldyn.cases.document import Document, to_document
 from foldyn.results.missing import with_reason
+from foldyn.results.quantities import MOTION, Quantity, energies_of, variables
 
 FORMAT = 1
 """Number of the layout of results, raised when older programs could not read a new one."""
 
 AXIS = np.array(["x", "y", "z"])
 
-ENERGIES: Mapping[str, str] = {
-    "kinetic": "kinetic energy",
-    "dissipated": "energy dissipated by damping since the start",
-    "work": "work of the loads since the start",
-}
+TAKEN = frozenset(
+    {*MOTION, "time", "node", "axis", "support", "support_node", "support_axis", "case"}
+    | {"rest_position", "vertices", "faces", "face_offsets", "assignments"}
+)
+"""Names that every motion has."""
 _OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 
 
@@ -37,6 +38,7 @@ def trajectory_dataset(
     reaction: ArrayLike,
     energies: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
+    sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
 ) -> xr.Dataset:
     """Dataset of a motion, which carries its own case.
 
@@ -55,6 +57,8 @@ def trajectory_dataset(
     statistics : mapping
         Facts about the run, each stored as an attribute. `start`, `dt` (s) and `steps` give the
         stage times t_n and t_n + dt/2 at which functions of time are sampled.
+    sampled : mapping of str to (Quantity, array_like of shape (nt, ...)), optional
+        What the user has added.
 
     Returns
     -------
@@ -67,25 +71,15 @@ def trajectory_dataset(
         case, else 0, and `not_rerunnable_because` says why.
     """
     time = np.array(time, dtype=np.float64)
-    data = motion_variables("time", displacement, reaction)
-    data["velocity"] = variable(("time", "node", "axis"), velocity, "m/s", "velocity")
-    texts = {**ENERGIES, **case.structure.energy_groups}
-    for name, values in energies.items():
-        data[name] = variable(("time",), values, "J", texts[name])
+    added = sampled or {}
+    known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
+    values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
+    data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
     varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
-    sampled = any(type(part.history) not in HISTORIES.values() for part in varying)
-    times = stage_times(statistics) if sampled else None
+    called = any(type(part.history) not in HISTORIES.values() for part in varying)
+    times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
     return result_dataset("trajectory", case, data, along, statistics, times)
-
-
-def motion_variables(along: str, displacement: ArrayLike, reaction: ArrayLike) -> dict[str, Any]:
-    """Displacements (m) and reactions (N) along a dimension, as variables of a result."""
-    text = "displacement from the rest position"
-    return {
-        "displacement": variable((along, "node", "axis"), displacement, "m", text),
-        "reaction": variable((along, "support"), reaction, "N", "force of the support"),
-    }
 
 
 def result_dataset(
@@ -167,11 +161,6 @@ def _case_variables(document: Document) -> dict[str, Any]:
         attributes = {"units": "m"} if name in ("rest_position", "vertices") else {}
         variables[name] = (dimensions.get(name, own), array, attributes)
     return variables
-
-
-def variable(dimensions: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
-    """Variable of a result with its units and a text for axes of figures."""
-    return dimensions, np.asarray(values), {"units": units, "long_name": text}
 
 
 def _attributes(statistics: Mapping[str, Any]) -> dict[str, Any]:

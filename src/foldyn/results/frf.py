@@ -10,15 +10,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
-from foldyn.results.dataset import result_dataset, variable
-
-RESPONSES: Mapping[str, tuple[str, str]] = {
-    "receptance": ("m/N", "displacement per force"),
-    "mobility": ("m/(N s)", "velocity per force"),
-    "accelerance": ("m/(N s2)", "acceleration per force"),
-    "transmissibility": ("1", "displacement per displacement of the base"),
-}
-"""What a frequency response may hold, with unit and text."""
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import ESTIMATES, PLACE, RESPONSES, variable, variables
 
 
 def frf_dataset(
@@ -29,7 +22,7 @@ def frf_dataset(
     displacement: ArrayLike,
     drive: ArrayLike,
     statistics: Mapping[str, Any],
-    more: Mapping[str, tuple[tuple[str, ...], ArrayLike, str, str]] | None = None,
+    more: Mapping[str, ArrayLike] | None = None,
 ) -> xr.Dataset:
     """Dataset of a frequency response, which carries its own case.
 
@@ -49,8 +42,8 @@ def frf_dataset(
         Amplitudes of the forces on the nodes (N), or of the displacements of the base (m).
     statistics : mapping
         Facts about the run, each stored as an attribute.
-    more : mapping of str to (dimensions, values, units, text), optional
-        Further variables, such as the coherence.
+    more : mapping of str to array_like, optional
+        Further variables, of `quantities.ESTIMATES`.
 
     Returns
     -------
@@ -58,15 +51,10 @@ def frf_dataset(
         The response under its own name, complex (frequency, node, axis), `displacement`, `drive`
         (node, axis), and what every result has.
     """
-    units, text = RESPONSES[quantity]
+    values = {quantity: np.asarray(response, np.complex128), **(more or {})}
+    data = variables({**RESPONSES, **ESTIMATES}, "frequency", values)
     driven = "N" if quantity == "receptance" else "m"
-    plane, place = ("frequency", "node", "axis"), ("node", "axis")
-    data = {
-        quantity: variable(plane, np.asarray(response, np.complex128), units, text),
-        "displacement": variable(place, displacement, "m", "displacement of the state"),
-        "drive": variable(place, drive, driven, "amplitude of the drive"),
-    }
-    for name, (dimensions, values, unit, words) in (more or {}).items():
-        data[name] = variable(dimensions, values, unit, words)
+    data["displacement"] = variable(PLACE, displacement, "m", "displacement of the state")
+    data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
     along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
     return result_dataset("frf", case, data, along, statistics)

@@ -10,9 +10,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
-from foldyn.results.dataset import motion_variables, result_dataset, variable
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import PATH, energies_of, variables
 
-WORK = "work of loads, supports and actuators since the first point"
 _KINDS = ("regular", "limit", "bifurcation")
 
 
@@ -54,18 +54,8 @@ def path_dataset(
         As `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
     """
     factor = np.array(load_factor, dtype=np.float64)
-    data = motion_variables("step", displacement, reaction)
-    texts = {"work": WORK, **case.structure.energy_groups}
-    for name, values in energies.items():
-        data[name] = variable(("step",), values, "J", texts[name])
     kinds = np.array(solution["point"], dtype=f"<U{max(map(len, _KINDS))}")
-    texts = {
-        "negative_eigenvalues": "negative eigenvalues of the tangent (unstable if any)",
-        "iterations": "Newton iterations",
-        "residual": "residual as a fraction of the forces at play",
-    }
-    for name, text in texts.items():
-        data[name] = ("step", np.asarray(solution[name]), {"long_name": text})
-    data["point"] = ("step", kinds, {"long_name": "kind of the point"})
+    values = {"displacement": displacement, "reaction": reaction, **energies, **solution}
+    data = variables({**PATH, **energies_of(case)}, "step", values | {"point": kinds})
     along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
     return result_dataset("path", case, data, along, statistics, None, obstacles)

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
+from foldyn.algebra.fill import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
-from foldyn.mechanics.body import Fill
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.shells.body import GROUPS, ShellBody
@@ -381,10 +381,8 @@ def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ..
     try:
         pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
     except TypeError:
-        raise InputError(
-            f"clamped = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
-        ) from None
-    for pair in pairs:
-        if pair not in boundary:
-            raise InputError(f"clamped: {pair} is no boundary edge of the pattern")
+        why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
+        raise InputError(why, "clamped") from None
+    if inner := [pair for pair in pairs if pair not in boundary]:
+        raise InputError(f": {inner[0]} is no boundary edge of the pattern", "clamped")
     return tuple((pair[0], pair[1]) for pair in pairs)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from foldyn.algebra.superlu import SuperLU
 from foldyn.errors import InputError
 from foldyn.mechanics.body import Unstrained
-from foldyn.statics.linear_solver import SuperLU
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
 

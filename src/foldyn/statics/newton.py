@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.statics.backends import factorizer
-from foldyn.statics.linear_solver import Factorization, Reduction, SingularTangentError
+from foldyn.algebra.choice import factorizer
+from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.statics.problem import Problem
 from foldyn.statics.settings import Settings
 from foldyn.statics.tolerance import Balance, balance, converged

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, State
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 from foldyn.results import path_dataset
@@ -26,7 +27,6 @@ from foldyn.statics.arguments import (
     plan,
 )
 from foldyn.statics.course import Until, driven, free
-from foldyn.statics.fill import check_fill
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.methods import Method, method_of
 from foldyn.statics.newton import Solver
@@ -144,7 +144,7 @@ def trace(
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
         raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
-    check_fill(case.structure)
+    check_fill(case.structure.fill, case.structure.body.size)
     problem = OrigamiProblem(case, held, state, adaptive_load, inertia_relief)
     check_start(problem)
     check_actuation(problem, goes)

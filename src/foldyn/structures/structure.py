@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
+from foldyn.algebra.fill import Fill
 from foldyn.errors import InputError
 from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
-from foldyn.mechanics.body import Fill
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.made import Made

@@ -20,13 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, turn
-from foldyn.dynamics.implicit.banded import substitute
+from foldyn.dynamics.damping import drag, drag_works, viscous_work
 from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
-from foldyn.dynamics.inertia import kinetic_energy, times_mass
-from foldyn.dynamics.system import acceleration, moving_energy
+from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.system import acceleration
 from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
@@ -67,7 +68,7 @@ class Alpha:
         """See `Scheme`; the mass carries what multiplies alpha M too."""
         am, af, beta, gamma = self._p
         rate = (1.0 - af) * gamma / (beta * h)
-        mass = (1.0 - am) / (beta * h * h) + rate * self.bench.packed.system.alpha
+        mass = (1.0 - am) / (beta * h * h) + rate * self.bench.packed.system.damping.alpha
         return Weights(1.0 - af, mass, rate)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
@@ -135,8 +136,8 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     acceleration(model, system, mass, new.q, new.w, t, out, work, s)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
-        viscous = system.alpha * ((1.0 - af) * w1[i] + af * w0[i])
-        x[i] = (1.0 - am) * a1[i] + am * a0[i] + viscous
+        slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
+        x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
     new.factor[:] = s.factor
     times_mass(mass, s.moving, out)
     inertia = 0.0
@@ -189,13 +190,9 @@ def _works(system, mass, h, old, new, shift, s):
     for i in range(du.size):
         du[i] = flat(shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
-    done, lost = 0.0, 0.0
-    if system.alpha > 0.0:
-        lost += 2.0 * system.alpha * h * kinetic_energy(mass, s.velocity, s.product)
-        jolts = moving_energy(system.moved_mass, old.factor)
-        jolts += moving_energy(system.moved_mass, new.factor)
-        done += system.alpha * h * jolts
-        lost += system.alpha * h * jolts
+    done, lost = drag_works(
+        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity, s.product
+    )
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
@@ -206,13 +203,7 @@ def _works(system, mass, h, old, new, shift, s):
         row = loads.row[k]
         mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
         done += loads.value[k] * mean * du[loads.dof[k]]
-    speed = flat(s.velocity)
-    for i in range(system.stiff_indptr.size - 1):
-        viscous = 0.0
-        for k in range(system.stiff_indptr[i], system.stiff_indptr[i + 1]):
-            viscous += system.stiff_data[k] * speed[system.stiff_indices[k]]
-        lost += viscous * du[i]
-    return done, lost
+    return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
 
 
 @kernel

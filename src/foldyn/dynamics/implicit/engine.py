@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.banded import one_thread
 from foldyn.dynamics.course import Course, Outcome, Plan, Samples, sample
 from foldyn.dynamics.implicit import convergence
-from foldyn.dynamics.implicit.banded import one_thread
 from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
 from foldyn.dynamics.implicit.horizon import horizon
 from foldyn.dynamics.implicit.matrix import StepMatrix

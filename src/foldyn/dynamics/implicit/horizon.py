@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench
 from foldyn.dynamics.inertia import times_mass
-from foldyn.statics.linear_solver import SingularTangentError
 
 
 def horizon(bench: Bench, matrix: StepMatrix, duration: float) -> float:

@@ -2,7 +2,7 @@
 
 All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
 puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
-along the sheet or, where that would be too wide, a sparse matrix for the backends of statics.
+along the sheet or, where that would be too wide, a sparse matrix.
 """
 
 from __future__ import annotations
@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.dynamics.implicit.banded import BandLU, Cholesky
+from foldyn.algebra.banded import BandLU, Cholesky
+from foldyn.algebra.choice import factorizer, takes_band
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.flat import flat
 from foldyn.mechanics import Sparsity
-from foldyn.statics.backends import factorizer
-from foldyn.statics.linear_solver import SingularTangentError, SuperLU
-
-# products of a band's factorization (rows times width squared) above which a sparse one is quicker
-MOST_SYMMETRIC, MOST_UNSYMMETRIC = 8e9, 4e9
 
 
 class Weights(NamedTuple):
@@ -73,12 +70,10 @@ class StepMatrix:
         self.stiffness = np.zeros(shape)
         self._blocks = Blocks(self.stiffness, np.zeros(shape), np.zeros(shape))
         self._blocks.mass[where] = nodal.data[:, None, None] * np.eye(3)
-        if system.stiff_data.size:
-            k0 = (system.stiff_data, system.stiff_indices, system.stiff_indptr)
-            blocks = sparse.csr_array(k0, (3 * nodes, 3 * nodes)).tobsr((3, 3))
-            blocks.sort_indices()
-            where = _slots(self.pattern, blocks.indptr, blocks.indices)
-            self._blocks.damping[where] = blocks.data
+        blocks = system.damping.viscous(3 * nodes).tobsr((3, 3))
+        blocks.sort_indices()
+        where = _slots(self.pattern, blocks.indptr, blocks.indices)
+        self._blocks.damping[where] = blocks.data
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[self.blocks.unused] = True
@@ -93,10 +88,9 @@ class StepMatrix:
     def _prepare(self, entries: tuple[NDArray, NDArray, NDArray]) -> None:
         row, column, take = entries
         size, width = len(self.free), int(np.abs(row - column).max(initial=0))
-        most = MOST_SYMMETRIC if self._symmetric else MOST_UNSYMMETRIC
         self._sparse = _Sparse(row, column, take, size, self._symmetric)
         self._band = None
-        if float(size) * (width + 1) ** 2 <= most:
+        if takes_band(size, width, self._symmetric):
             self._band = _Band(row, column, take, size, width, self._symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
 

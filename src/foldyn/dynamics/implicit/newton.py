@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.convergence import (
     GO_ON,
     NEW_MATRIX,
@@ -20,7 +21,6 @@ from foldyn.dynamics.implicit.convergence import (
 )
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.scheme import Scheme
-from foldyn.statics.linear_solver import SingularTangentError
 
 MOST = 25  # iterations
 SAME_STEP = 1e-3  # relative difference of steps that may share a matrix

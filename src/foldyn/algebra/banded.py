@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from threadpoolctl import ThreadpoolController
 
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.jit.compiled import summing
-from foldyn.statics.linear_solver import SingularTangentError
 
 
 class Cholesky:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.statics.linear_solver import SingularTangentError
+from foldyn.algebra.superlu import SingularTangentError
 
 SYMMETRIC_INDEFINITE = -2
 NEGATIVE = 23  # number of the entry of iparm with the count of negative eigenvalues

@@ -1,4 +1,4 @@
-"""Backends for sparse factorizations, and the choice among them."""
+"""The choice of a factorization by the size of a matrix."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import NamedTuple
 
+from foldyn.algebra.pardiso import Pardiso
+from foldyn.algebra.superlu import Factorizer, SuperLU
 from foldyn.errors import InputError
-from foldyn.statics.linear_solver import Factorizer, SuperLU
-from foldyn.statics.pardiso import Pardiso
 
 
 class Backend(NamedTuple):
@@ -46,3 +46,12 @@ def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
             "install it, or choose 'superlu'"
         )
     return name, SOLVERS[name].factorize
+
+
+# products of a band's factorization (rows times width squared) above which a sparse one is quicker
+MOST_SYMMETRIC, MOST_UNSYMMETRIC = 8e9, 4e9
+
+
+def takes_band(size: int, width: int, symmetric: bool) -> bool:
+    """Whether a matrix of so many rows with all entries in a band is factorized as one."""
+    return float(size) * (width + 1) ** 2 <= (MOST_SYMMETRIC if symmetric else MOST_UNSYMMETRIC)

@@ -4,8 +4,8 @@ The tangent of a structure is symmetric but, beyond a critical point, indefinite
 P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylvester's law of
 inertia), so one factorization gives both the step and the stability.
 
-SciPy's SuperLU is always there. Backends that are faster on large structures (PARDISO, CHOLMOD)
-are optional packages: see `backends`.
+SciPy's SuperLU is always there. What is faster on large structures (PARDISO) is an optional
+package; `choice` takes what is there.
 """
 
 from __future__ import annotations
@@ -87,31 +87,3 @@ def _eigenvalues(matrix: sparse.csc_array) -> NDArray:
     if matrix.shape[0] > MOST_DENSE:
         raise SingularTangentError("the tangent has a vanishing pivot")
     return np.linalg.eigvalsh(matrix.toarray())
-
-
-class Reduction:
-    """Takes the block of the free dofs out of matrices of one sparsity pattern."""
-
-    def __init__(self, free: NDArray) -> None:
-        self.free = free
-        self._pattern: tuple[NDArray, NDArray] | None = None
-
-    def __call__(self, matrix: sparse.csr_array) -> sparse.csc_array:
-        """Block of the free dofs, by columns (which, the matrix being symmetric, are its rows)."""
-        pattern = (matrix.indptr, matrix.indices)
-        if self._pattern is None or not all(map(np.array_equal, pattern, self._pattern)):
-            self._prepare(matrix)
-        size = len(self.free)
-        return sparse.csc_array(
-            (matrix.data[self._take], self._indices, self._indptr), shape=(size, size)
-        )
-
-    def _prepare(self, matrix: sparse.csr_array) -> None:
-        self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
-        numbered = sparse.csr_array(
-            (np.arange(matrix.nnz, dtype=np.int64), matrix.indices, matrix.indptr),
-            shape=matrix.shape,
-        )
-        block = numbered[self.free][:, self.free].tocsr()
-        block.sort_indices()
-        self._take, self._indices, self._indptr = block.data, block.indices, block.indptr

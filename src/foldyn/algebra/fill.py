@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
+from foldyn.algebra.choice import factorizer
 from foldyn.memory import check_memory
-from foldyn.statics.backends import factorizer
 
 PARDISO = 0.3
-"""What PARDISO takes of that: 1.4 GiB instead of 3.5 for the modes of 240,600 dofs."""
+"""What PARDISO takes of SuperLU's: 1.4 GiB instead of 3.5 for the modes of 240,600 dofs."""
 
 
-def check_fill(structure: Any) -> None:
+class Fill(NamedTuple):
+    """Memory that SuperLU's factors take, by experience with a model, and what makes it less."""
+
+    per_doubling: float  # bytes a dof for each doubling of the number of dofs,
+    least: int  # from so many dofs on
+    field: str
+    remedy: str
+
+
+def check_fill(fill: Fill, dofs: int) -> None:
     """Refuse a structure whose factors memory cannot hold."""
-    fill, dofs = structure.fill, structure.body.size
     needed = fill.per_doubling * dofs * max(math.log2(max(dofs, 1) / fill.least), 1.0)
     if factorizer("auto", dofs)[0] == "pardiso":
         needed *= PARDISO

@@ -1,0 +1,113 @@
+"""Quantities that the user adds to a motion: functions of the state, evaluated at its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.dynamics.course import Samples
+from foldyn.errors import FoldynError, InputError
+from foldyn.results import Quantity
+from foldyn.results.dataset import TAKEN
+from foldyn.values import show
+
+
+class SamplingError(FoldynError):
+    """A function gave what cannot be stored, at a sample after the first."""
+
+
+class Sampler:
+    """Values of a user's quantities along a motion.
+
+    Parameters
+    ----------
+    case : Case
+    given : mapping of str to callable or Quantity
+        As of `simulate`.
+    u, v : ndarray, shape (n, 3)
+        State at the start, at which each function is tried.
+    start : float
+        Time there, s.
+
+    Raises
+    ------
+    InputError
+        A name that results have already; a function that fails, or gives no finite number or
+        array of the dimensions that it names.
+    """
+
+    def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
+        if not isinstance(given, Mapping):
+            raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
+        structure = case.structure
+        taken = {*TAKEN, *structure.energy_groups}
+        sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.supported_dofs)}
+        self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
+        for name, what in given.items():
+            if not isinstance(name, str) or not name.isidentifier() or name in taken:
+                raise InputError(f": {name!r} is not free; choose another name", "sample")
+            quantity = what if isinstance(what, Quantity) else Quantity(function=what)
+            try:
+                shape = _value(quantity, u, v, start).shape
+            except SamplingError as error:
+                raise InputError(f": {error}", f"sample.{name}") from error.__cause__
+            dims = quantity.dims or tuple(f"{name}_{k}" for k in range(len(shape)))
+            known = tuple(sizes.setdefault(*pair) for pair in zip(dims, shape, strict=False))
+            if len(dims) != len(shape) or known != shape:
+                raise InputError(
+                    f": returned an array of shape {shape}, which does not fit its dimensions "
+                    f"({', '.join(dims)})",
+                    f"sample.{name}",
+                )
+            self._quantities[name] = quantity._replace(dims=dims), shape
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all values."""
+        self._values: dict[str, list[NDArray]] = {name: [] for name in self._quantities}
+        self._taken = 0
+
+    def take(self, samples: Samples, count: int) -> None:
+        """Evaluate at the samples up to `count` that are new; raises SamplingError."""
+        for k in range(self._taken, count):
+            state = samples.displacement[k], samples.velocity[k], float(samples.time[k])
+            for name, (quantity, shape) in self._quantities.items():
+                try:
+                    value = _value(quantity, *state)
+                    if value.shape != shape:
+                        raise SamplingError(f"returned an array of shape {value.shape}")
+                except SamplingError as error:
+                    place = f"sample.{name}, at t = {state[2]:.6g} s"
+                    raise SamplingError(f"{place}: {error}") from error.__cause__
+                self._values[name].append(value)
+            self._taken = k + 1
+
+    def columns(self, count: int) -> dict[str, tuple[Quantity, NDArray]]:
+        """Quantities with their values at the first `count` samples, nan where there is none."""
+        found = {}
+        for name, (quantity, shape) in self._quantities.items():
+            column, values = np.full((count, *shape), np.nan), self._values[name][:count]
+            column[: len(values)] = np.reshape(values, (-1, *shape))
+            found[name] = quantity, column
+        return found
+
+
+def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
+    """Value at a state, which the function may not change."""
+    if not callable(quantity.function):
+        raise SamplingError("has no function: give one of (displacement, velocity, time)")
+    try:
+        given = quantity.function(u.copy(), v.copy(), time)
+    except Exception as error:
+        raise SamplingError(f"the function raised {type(error).__name__}: {error}") from error
+    try:
+        value = np.array(given, float)
+    except (TypeError, ValueError):
+        raise SamplingError(f"returned {show(given)}; give a number or an array") from None
+    if not np.isfinite(value).all():
+        raise SamplingError(f"returned {show(given)}; give finite numbers")
+    return value

@@ -1,0 +1,100 @@
+"""What results hold: each variable with its unit, its meaning and its dimensions, once.
+
+A quantity that is a function of the state can be added to a motion by its user:
+``simulate(..., sample={"tip": Quantity("m", "height of the tip", function=height)})``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class Quantity(NamedTuple):
+    """A variable of a result.
+
+    Parameters
+    ----------
+    units : str
+        Its unit, "m/s"; "1" or nothing where it has none.
+    text : str
+        What it is, as labels of figures say it.
+    dims : tuple of str
+        Its dimensions beside that along which the result runs: "node", "axis", or others.
+    function : callable, optional
+        Its value, a number or an array with these dimensions, from displacement (n, 3), m, velocity
+        (n, 3), m/s, and time, s. What is known without it is computed along with the motion.
+    """
+
+    units: str = ""
+    text: str = ""
+    dims: tuple[str, ...] = ()
+    function: Callable[[NDArray, NDArray, float], ArrayLike] | None = None
+
+
+PLACE = ("node", "axis")
+
+STATE = {
+    "displacement": Quantity("m", "displacement from the rest position", PLACE),
+    "reaction": Quantity("N", "force of the support", ("support",)),
+}
+MOTION: Mapping[str, Quantity] = STATE | {
+    "velocity": Quantity("m/s", "velocity", PLACE),
+    "kinetic": Quantity("J", "kinetic energy"),
+    "dissipated": Quantity("J", "energy dissipated by damping since the start"),
+    "work": Quantity("J", "work of the loads since the start"),
+}
+PATH: Mapping[str, Quantity] = STATE | {
+    "work": Quantity("J", "work of loads, supports and actuators since the first point"),
+    "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
+    "point": Quantity(text="kind of the point"),
+    "iterations": Quantity(text="Newton iterations"),
+    "residual": Quantity(text="residual as a fraction of the forces at play"),
+}
+MODES: Mapping[str, Quantity] = {
+    "frequency": Quantity("Hz", "frequency"),
+    "eigenvalue": Quantity("rad2/s2", "square of the angular frequency (negative: unstable)"),
+    "shape": Quantity("m", "mode shape, of the modal mass 1 kg m2", PLACE),
+    "rigid": Quantity("1", "whether the mode is a rigid motion that nothing resists"),
+    "rigid_share": Quantity("1", "share of the shape in the space of rigid motions"),
+    "damping_ratio": Quantity("1", "modal damping ratio"),
+    "participation": Quantity("kg m", "participation factor", ("axis",)),
+    "effective_mass": Quantity("kg", "effective mass", ("axis",)),
+}
+RESPONSES: Mapping[str, Quantity] = {
+    "receptance": Quantity("m/N", "displacement per force", PLACE),
+    "mobility": Quantity("m/(N s)", "velocity per force", PLACE),
+    "accelerance": Quantity("m/(N s2)", "acceleration per force", PLACE),
+    "transmissibility": Quantity("1", "displacement per displacement of the base", PLACE),
+}
+"""What a frequency response may hold, one of these,"""
+ESTIMATES: Mapping[str, Quantity] = {
+    "coherence": Quantity("1", "coherence", PLACE),
+    "swing": Quantity("degrees", "largest amplitude of a superlinear hinge"),
+    "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
+}
+"""and what its method tells beside it."""
+
+
+def variables(
+    known: Mapping[str, Quantity], along: str, values: Mapping[str, ArrayLike]
+) -> dict[str, Any]:
+    """Variables of a dataset from values along a dimension."""
+    return {
+        name: variable((along, *known[name].dims), array, known[name].units, known[name].text)
+        for name, array in values.items()
+    }
+
+
+def variable(dims: tuple[str, ...], values: ArrayLike, units: str, text: str) -> tuple:
+    """Variable of a dataset with its unit, if it has one, and a text for axes of figures."""
+    attributes = {"units": units, "long_name": text}
+    return dims, np.asarray(values), {key: word for key, word in attributes.items() if word}
+
+
+def energies_of(case: Any) -> dict[str, Quantity]:
+    """Parts of the strain energy of a case's structure."""
+    return {name: Quantity("J", text) for name, text in case.structure.energy_groups.items()}
