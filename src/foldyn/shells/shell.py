@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -69,8 +69,6 @@ class Shell(Discretized):
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `shell` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -82,7 +80,6 @@ class Shell(Discretized):
     pattern: Pattern
     sheet: Sheet
     options: ShellOptions
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -347,7 +344,7 @@ def shell(
         if (stiffness < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
     rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
-    made = Shell(
+    return Shell(
         nodes=x,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
@@ -357,9 +354,7 @@ def shell(
         pattern=pattern,
         sheet=sheet,
         options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
-    )
-    object.__setattr__(made, "as_made", True)
-    return made
+    ).marked()
 
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
@@ -367,10 +362,8 @@ def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ..
     try:
         pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
     except TypeError:
-        raise InputError(
-            f"clamped = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
-        ) from None
-    for pair in pairs:
-        if pair not in boundary:
-            raise InputError(f"clamped: {pair} is no boundary edge of the pattern")
+        why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
+        raise InputError(why, "clamped") from None
+    if inner := [pair for pair in pairs if pair not in boundary]:
+        raise InputError(f": {inner[0]} is no boundary edge of the pattern", "clamped")
     return tuple((pair[0], pair[1]) for pair in pairs)

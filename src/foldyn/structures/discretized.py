@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -15,6 +14,7 @@ from foldyn.algebra.fill import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.body import Body
+from foldyn.structures.made import Made
 from foldyn.structures.mass import Surface
 from foldyn.structures.sheet import Sheet
 
@@ -29,8 +29,8 @@ class HingeKind(NamedTuple):
     rest: NDArray
 
 
-class Discretized:
-    """Base of the data classes that are structures; their arrays become read-only.
+class Discretized(Made):
+    """Base of the data classes that are structures.
 
     Attributes
     ----------
@@ -72,14 +72,6 @@ class Discretized:
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
     massless: ClassVar[str] = ""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):  # pyright: ignore[reportArgumentType]
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = np.array(value)
-                frozen.setflags(write=False)
-                object.__setattr__(self, item.name, frozen)
 
     @cached_property
     def bar_length(self) -> NDArray:

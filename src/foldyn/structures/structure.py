@@ -51,8 +51,6 @@ class Structure(Discretized):
         Node number of each panel's center, -1 without one.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `discretize` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -71,7 +69,6 @@ class Structure(Discretized):
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
     node_mass: NDArray | None = None
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
 
     def __repr__(self) -> str:
         """One line with the counts."""
