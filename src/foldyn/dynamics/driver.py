@@ -18,7 +18,7 @@ from foldyn.dynamics.choice import AUTO, choose
 from foldyn.dynamics.course import Plan
 from foldyn.dynamics.critical_step import critical_step
 from foldyn.dynamics.inertia import check_mass, is_lumped
-from foldyn.dynamics.methods import Method, method_of, suited
+from foldyn.dynamics.methods import Integrator, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
@@ -218,7 +218,7 @@ def prepare(
     return Motion(case, integrator, plan, critical, force, beginning, packed, sampler, reason)
 
 
-def _with_radius(method: Method, spectral_radius: float | None) -> Method:
+def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:
     """The method with the spectral radius that is asked for."""
     if spectral_radius is None:
         return method
@@ -233,7 +233,7 @@ def _with_radius(method: Method, spectral_radius: float | None) -> Method:
 
 
 def _plan(
-    case: Case, method: Method, duration: float, dt: float | None, every: int | float,
+    case: Case, method: Integrator, duration: float, dt: float | None, every: int | float,
     critical: float, force: bool, tolerance: float | None, start: float,
 ) -> Plan:  # fmt: skip
     """Steps and samples that the arguments of `simulate` ask for."""

@@ -23,7 +23,7 @@ from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
 
 
-class Method(NamedTuple):
+class Integrator(NamedTuple):
     """An integrator.
 
     Parameters
@@ -74,18 +74,18 @@ class Method(NamedTuple):
         return Compiled(self.loop, packed, 1 if self.adaptive else threads_of(packed))
 
 
-METHODS: Mapping[str, Method] = {
+METHODS: Mapping[str, Integrator] = {
     method.name: method
     for method in (
-        Method("rk4", rk4.ORDER, rk4.advance, rk4.growth, 4, looks=(0.0, 0.5, 1.0)),
-        Method(
+        Integrator("rk4", rk4.ORDER, rk4.advance, rk4.growth, 4, looks=(0.0, 0.5, 1.0)),
+        Integrator(
             "central_difference",
             central_difference.ORDER,
             central_difference.advance,
             central_difference.growth,
             1,
         ),
-        Method(
+        Integrator(
             "dormand_prince",
             dormand_prince.ORDER,
             dormand_prince.advance,
@@ -93,21 +93,21 @@ METHODS: Mapping[str, Method] = {
             6,
             adaptive=True,
         ),
-        Method(
+        Integrator(
             "newmark",
             generalized_alpha.ORDER,
             residual,
             scheme=generalized_alpha.newmark,
             massless=True,
         ),
-        Method(
+        Integrator(
             "generalized_alpha",
             generalized_alpha.ORDER,
             residual,
             scheme=generalized_alpha.scheme(),
             massless=True,
         ),
-        Method(
+        Integrator(
             "energy_momentum",
             energy_momentum.ORDER,
             energy_momentum.residual,
@@ -118,14 +118,14 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-def method_of(name: str) -> Method:
+def method_of(name: str) -> Integrator:
     """Integrator by its name."""
     if not isinstance(name, str) or name not in METHODS:
         raise InputError(f" = {name!r}: choose auto or one of {', '.join(METHODS)}", "method")
     return METHODS[name]
 
 
-def suited(name: str, structure: Any) -> Method:
+def suited(name: str, structure: Any) -> Integrator:
     """Integrator by its name, for a structure."""
     method = method_of(name)
     found = _lacking(method, structure)
@@ -137,7 +137,7 @@ def suited(name: str, structure: Any) -> Method:
     return method
 
 
-def _lacking(method: Method, structure: Any) -> str:
+def _lacking(method: Integrator, structure: Any) -> str:
     """What a method needs and a structure lacks, in words; empty where nothing."""
     if structure.massless and not method.massless:
         return f"{structure.massless} have no mass"

@@ -15,7 +15,7 @@ from foldyn.dynamics.audit import Rounding, audited, energy_error, energy_scale
 from foldyn.dynamics.course import Course, Outcome, Plan, Samples, samples
 from foldyn.dynamics.critical_step import MARGIN, largest_frequency
 from foldyn.dynamics.engine import Engine
-from foldyn.dynamics.methods import Method
+from foldyn.dynamics.methods import Integrator
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.stability import is_stable, stability_limit
@@ -44,7 +44,7 @@ class Motion:
     """A motion that is ready to be computed; made by `prepare`."""
 
     def __init__(
-        self, case: Case, method: Method, plan: Plan, critical: float, force: bool,
+        self, case: Case, method: Integrator, plan: Plan, critical: float, force: bool,
         begin: Callable[[], Course], packed: Packed, sampler: Sampler, reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan

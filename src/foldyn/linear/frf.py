@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Method(NamedTuple):
+class ResponseMethod(NamedTuple):
     """A way to a frequency response.
 
     `compute` takes what moves, a `Linearized` with its drive if `linear`, else a `Rig`; then the
@@ -51,15 +51,15 @@ class Method(NamedTuple):
     secant: float | None = None
 
 
-METHODS: Mapping[str, Method] = {
+METHODS: Mapping[str, ResponseMethod] = {
     method.name: method
     for method in (
-        Method("direct", Direct, direct, linear=True),
-        Method("modal", Modal, modal, linear=True),
-        Method("harmonic", HarmonicBalance, harmonic, linear=True, secant=REFERENCE),
-        Method("impulse", Impulse, impulse, linear=False),
-        Method("stepped_sine", SteppedSine, stepped_sine, linear=False),
-        Method("burst_random", BurstRandom, burst_random, linear=False),
+        ResponseMethod("direct", Direct, direct, linear=True),
+        ResponseMethod("modal", Modal, modal, linear=True),
+        ResponseMethod("harmonic", HarmonicBalance, harmonic, linear=True, secant=REFERENCE),
+        ResponseMethod("impulse", Impulse, impulse, linear=False),
+        ResponseMethod("stepped_sine", SteppedSine, stepped_sine, linear=False),
+        ResponseMethod("burst_random", BurstRandom, burst_random, linear=False),
     )
 }
 
@@ -155,9 +155,9 @@ def frf(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
-    how = METHODS[choice("method", method, METHODS)]
-    chosen = _options(how, options)
-    frequency = _frequencies(frequencies, how)
+    way = METHODS[choice("method", method, METHODS)]
+    chosen = _options(way, options)
+    frequency = _frequencies(frequencies, way)
     check_memory(
         "frequencies", f"the response at {len(frequency)} frequencies",
         16.0 * COPIES * len(frequency) * case.structure.nodes.size, "take fewer",
@@ -166,14 +166,14 @@ def frf(
     report, close = reporter(progress)
     began = time.perf_counter()
     try:
-        compute = _linear if how.linear else _in_time
+        compute = _linear if way.linear else _in_time
         at, found = compute(
-            case, driven, frequency, state, secant, load_factor, how, chosen, report
+            case, driven, frequency, state, secant, load_factor, way, chosen, report
         )
     finally:
         close()
     facts = {
-        "method": how.name,
+        "method": way.name,
         **driven.facts(),
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": secant,
@@ -189,14 +189,14 @@ def frf(
 
 def _linear(
     case: Case, drive: Drive, frequency: NDArray, state: Any, secant: float | None,
-    load_factor: float, how: Method, options: Any, report: Reporter,
+    load_factor: float, way: ResponseMethod, options: Any, report: Reporter,
 ) -> tuple[NDArray, Answer]:  # fmt: skip
-    if how.secant is not None:
-        _refuse_secant(secant, how, "finds the swing of each hinge itself")
-        secant = how.secant
+    if way.secant is not None:
+        _refuse_secant(secant, way, "finds the swing of each hinge itself")
+        secant = way.secant
     system = linearize(case, state, secant, load_factor)
     _warn_of_instability(system)
-    found = how.compute(system, drive, frequency, options, report)
+    found = way.compute(system, drive, frequency, options, report)
     return system.displacement, Answer(
         absolute(system, drive, found.response),
         found.more,
@@ -218,36 +218,36 @@ def _warn_of_instability(system: Linearized) -> None:
 
 def _in_time(
     case: Case, drive: Drive, frequency: NDArray, state: Any, secant: float | None,
-    load_factor: float, how: Method, options: Any, report: Reporter,
+    load_factor: float, way: ResponseMethod, options: Any, report: Reporter,
 ) -> tuple[NDArray, Answer]:  # fmt: skip
-    _refuse_secant(secant, how, "takes the laws as they are")
+    _refuse_secant(secant, way, "takes the laws as they are")
     rig = Rig(station(case, state, load_factor), drive, options)
-    found = how.compute(rig, frequency, options, report)
+    found = way.compute(rig, frequency, options, report)
     facts = {"integrator": rig.integrator, "dt": options.dt, **found.facts}
     return rig.state, found._replace(facts=facts)
 
 
-def _refuse_secant(secant: float | None, how: Method, why: str) -> None:
+def _refuse_secant(secant: float | None, way: ResponseMethod, why: str) -> None:
     if secant is not None:
         raise InputError(
-            f" = {secant!r}: the method {how.name} {why}; leave secant out, and give the "
+            f" = {secant!r}: the method {way.name} {why}; leave secant out, and give the "
             "amplitude of the drive instead",
             "secant",
         )
 
 
-def _options(how: Method, given: Mapping[str, Any]) -> Any:
-    known = [field.name for field in fields(how.options)]
+def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
+    known = [field.name for field in fields(way.options)]
     for name in given:
         if name not in known:
             takes = f"it takes {', '.join(known)}" if known else "it takes no options of its own"
             raise InputError(
-                f"{name}: is no option of the method {how.name}; {suggest(name, known)}{takes}"
+                f"{name}: is no option of the method {way.name}; {suggest(name, known)}{takes}"
             )
-    return how.options(**given)
+    return way.options(**given)
 
 
-def _frequencies(given: ArrayLike, how: Method) -> NDArray[np.float64]:
+def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray[np.float64]:
     frequency = np.atleast_1d(numbers("frequencies", given))
     if frequency.ndim != 1 or not frequency.size:
         raise InputError(
@@ -257,8 +257,8 @@ def _frequencies(given: ArrayLike, how: Method) -> NDArray[np.float64]:
         raise InputError(
             ": must increase from 0 Hz or more; sort them and drop doubles", "frequencies"
         )
-    if frequency[0] == 0.0 and how.name in ("stepped_sine", "burst_random"):
-        raise InputError(f": {how.name} cannot give 0 Hz; begin above it", "frequencies")
-    if frequency[-1] == 0.0 and not how.linear:
+    if frequency[0] == 0.0 and way.name in ("stepped_sine", "burst_random"):
+        raise InputError(f": {way.name} cannot give 0 Hz; begin above it", "frequencies")
+    if frequency[-1] == 0.0 and not way.linear:
         raise InputError(": 0 Hz alone needs statics, or the direct method", "frequencies")
     return frequency

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Gravity, State
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
-from foldyn.statics.methods import Method
+from foldyn.statics.methods import PathMethod
 from foldyn.statics.origami import OrigamiProblem, drives, is_actuated
 from foldyn.values import number, numbers, show, whole
 
@@ -24,7 +24,7 @@ COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of 
 FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
 
 
-class Plan(NamedTuple):
+class PathPlan(NamedTuple):
     """Where a path begins and goes."""
 
     begin: float
@@ -34,7 +34,9 @@ class Plan(NamedTuple):
     first_step: float
 
 
-def plan(method: Method, load_factors: Any, steps: int | None, first_step: float | None) -> Plan:
+def plan(
+    method: PathMethod, load_factors: Any, steps: int | None, first_step: float | None
+) -> PathPlan:
     """Check the arguments that say where a path goes."""
     factors = None if load_factors is None else _factors(load_factors)
     if first_step is not None and method.rule is None:
@@ -60,7 +62,7 @@ def plan(method: Method, load_factors: Any, steps: int | None, first_step: float
         raise InputError(f" = {step:g} leads away from the last load factor {end:g}", "first_step")
     if end is not None and abs(step) > abs(way):
         step = way
-    return Plan(begin, [], end, int(steps or STEPS_FREE), float(step))
+    return PathPlan(begin, [], end, int(steps or STEPS_FREE), float(step))
 
 
 def check_steps(steps: Any, dofs: int) -> None:
@@ -71,7 +73,7 @@ def check_steps(steps: Any, dofs: int) -> None:
     )
 
 
-def _driven(method: Method, factors: list[float] | None, steps: int | None) -> Plan:
+def _driven(method: PathMethod, factors: list[float] | None, steps: int | None) -> PathPlan:
     if factors is not None and steps is not None:
         raise InputError(
             " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
@@ -82,7 +84,7 @@ def _driven(method: Method, factors: list[float] | None, steps: int | None) -> P
     for i, (one, other) in enumerate(pairwise(factors)):
         if one == other:
             raise InputError(f": number {i + 1} repeats the one before, {one:g}", "load_factors")
-    return Plan(factors[0], factors[1:], None, len(factors) - 1, 0.0)
+    return PathPlan(factors[0], factors[1:], None, len(factors) - 1, 0.0)
 
 
 def _factors(given: Any) -> list[float]:
@@ -137,7 +139,7 @@ def initial_state(case: Case, initial: Any) -> NDArray | None:
 
 
 def check_case(
-    case: Case, method: Method, constant: Sequence[int], goes: Plan, adaptive: bool
+    case: Case, method: PathMethod, constant: Sequence[int], route: PathPlan, adaptive: bool
 ) -> None:
     """Refuse a case in which nothing happens along the path."""
     if not len(case.free_dofs):
@@ -151,7 +153,7 @@ def check_case(
             "Actuate among the loads; paths under forces take 'newton' or 'arc_length'",
             "method",
         )
-    if not goes.factors and goes.begin == 0.0 and method.rule is None:
+    if not route.factors and route.begin == 0.0 and method.rule is None:
         return  # one point, of what is constant
     if not (drives(case, constant) or adaptive):
         raise InputError(
@@ -171,11 +173,11 @@ def check_start(problem: OrigamiProblem) -> None:
         raise InputError(f": the neighboring nodes {one} and {other} fall together", "initial")
 
 
-def check_actuation(problem: OrigamiProblem, goes: Plan) -> None:
+def check_actuation(problem: OrigamiProblem, route: PathPlan) -> None:
     """Refuse load factors at which a rest angle would leave 0 to 360 degrees."""
     if not problem.actuation.acts:
         return
-    for factor in (goes.begin, *goes.factors, *([] if goes.end is None else [goes.end])):
+    for factor in (route.begin, *route.factors, *([] if route.end is None else [route.end])):
         beyond = np.flatnonzero(np.isnan(problem.actuation.rest(factor)))
         if beyond.size:
             raise InputError(

@@ -10,7 +10,7 @@ from foldyn.statics.arc_rules import Cylinder, Plane
 from foldyn.statics.continuation import ArcRule
 
 
-class Method(NamedTuple):
+class PathMethod(NamedTuple):
     """How a path is followed.
 
     `rule` is None where the load factor drives the path; `between` says whether points between
@@ -22,15 +22,15 @@ class Method(NamedTuple):
     between: bool
 
 
-METHODS: Mapping[str, Method] = {
-    "newton": Method("newton", None, False),
-    "displacement": Method("displacement", None, True),
-    "mgdcm": Method("mgdcm", Plane, True),
-    "arc_length": Method("arc_length", Cylinder, True),
+METHODS: Mapping[str, PathMethod] = {
+    "newton": PathMethod("newton", None, False),
+    "displacement": PathMethod("displacement", None, True),
+    "mgdcm": PathMethod("mgdcm", Plane, True),
+    "arc_length": PathMethod("arc_length", Cylinder, True),
 }
 
 
-def method_of(name: str) -> Method:
+def method_of(name: str) -> PathMethod:
     """Method by its name."""
     if not isinstance(name, str) or name not in METHODS:
         raise InputError(f" = {name!r}: choose one of {', '.join(METHODS)}", "method")

@@ -17,7 +17,7 @@ from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInt
 from foldyn.results import path_dataset
 from foldyn.statics import stability_changes
 from foldyn.statics.arguments import (
-    Plan,
+    PathPlan,
     check_actuation,
     check_case,
     check_start,
@@ -28,7 +28,7 @@ from foldyn.statics.arguments import (
 )
 from foldyn.statics.course import Until, driven, free
 from foldyn.statics.mechanism import refuse_mechanisms
-from foldyn.statics.methods import Method, method_of
+from foldyn.statics.methods import PathMethod, method_of
 from foldyn.statics.newton import Solver
 from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem
 from foldyn.statics.settings import Settings
@@ -133,13 +133,13 @@ def trace(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
-    how = method_of(method)
+    way = method_of(method)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
-    goes = plan(how, load_factors, steps, first_step)
+    route = plan(way, load_factors, steps, first_step)
     held = constant_loads(case, constant)
     state = initial_state(case, initial)
-    check_case(case, how, held, goes, adaptive_load is not None)
+    check_case(case, way, held, route, adaptive_load is not None)
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
@@ -147,14 +147,14 @@ def trace(
     check_fill(case.structure.fill, case.structure.body.size)
     problem = OrigamiProblem(case, held, state, adaptive_load, inertia_relief)
     check_start(problem)
-    check_actuation(problem, goes)
+    check_actuation(problem, route)
     refuse_mechanisms(problem)
     solver = Solver(problem, settings)
     facts = {
-        "method": how.name,
-        "steps": goes.steps,
+        "method": way.name,
+        "steps": route.steps,
         "load_factors": load_factors,
-        "first_step": goes.first_step if how.rule is not None else None,
+        "first_step": route.first_step if way.rule is not None else None,
         "constant": held or None,
         "inertia_relief": inertia_relief,
         "started_from": "rest" if state is None else "state",
@@ -162,27 +162,31 @@ def trace(
     recorder = Recorder(problem, solver, facts, adaptive_load is not None)
 
     def course() -> Walk:
-        first = _first(solver, problem, goes, state)
+        first = _first(solver, problem, route, state)
         yield first
-        yield from _onward(solver, how, goes, first, on_nodes(until, problem))
+        yield from _onward(solver, way, route, first, on_nodes(until, problem))
 
     return recorder.record(course(), progress)
 
 
-def _first(solver: Solver, problem: OrigamiProblem, goes: Plan, state: NDArray | None) -> Station:
+def _first(
+    solver: Solver, problem: OrigamiProblem, route: PathPlan, state: NDArray | None
+) -> Station:
     """The point where the path begins."""
     if state is not None:
-        return settle(solver, problem.start(), goes.begin)
+        return settle(solver, problem.start(), route.begin)
     first = settle(solver, problem.start(), 0.0)
-    if goes.begin != 0.0:
-        *_, first = walk(solver, first, [goes.begin], False)
+    if route.begin != 0.0:
+        *_, first = walk(solver, first, [route.begin], False)
     return first
 
 
-def _onward(solver: Solver, how: Method, goes: Plan, first: Station, until: Until | None) -> Walk:
-    if how.rule is None:
-        return driven(solver, first, goes.factors, how.between, until)
-    return free(solver, first, how.rule, goes.first_step, goes.steps, goes.end, until)
+def _onward(
+    solver: Solver, way: PathMethod, route: PathPlan, first: Station, until: Until | None
+) -> Walk:
+    if way.rule is None:
+        return driven(solver, first, route.factors, way.between, until)
+    return free(solver, first, way.rule, route.first_step, route.steps, route.end, until)
 
 
 def on_nodes(until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem) -> Any:
