@@ -57,8 +57,7 @@ def plot_laws(
     if not kinds and bars is None:
         raise InputError("structure: is a shell without folds, which has no laws to draw")
     columns = len(kinds) + (bars is not None)
-    figure = style.new_figure(3.5 * columns, 3.9)
-    style.title_above(figure, title)
+    figure = style.new_figure(3.5 * columns, 3.9, title)
     frames = figure.subplots(1, columns, squeeze=False)[0]
     for axes, kind in zip(frames, kinds, strict=False):
         _draw_hinges(axes, *kind)

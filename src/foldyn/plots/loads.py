@@ -91,8 +91,7 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     panels = [panel for panel in panels if panel[1]] or panels[:1]
     entries = sum(len(curves) for _, curves in panels)
     height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
-    figure = style.new_figure(6.5, height)
-    style.title_above(figure, title)
+    figure = style.new_figure(6.5, height, title)
     rows = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
     time = np.linspace(start, start + duration, _SAMPLES)
     handles = []

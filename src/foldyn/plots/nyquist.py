@@ -165,8 +165,7 @@ def _resonance(f: NDArray[np.float64], natural: float, ratio: float) -> NDArray[
 def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     columns = min(count, _COLUMNS)
     rows = -(-count // columns)
-    figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows)
-    style.title_above(figure, title)
+    figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows, title)
     grid = figure.subplots(rows, columns, squeeze=False)
     frames = [grid[divmod(k, columns)] for k in range(rows * columns)]
     for spare in frames[count:]:

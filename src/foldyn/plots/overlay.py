@@ -57,8 +57,9 @@ def draw_overlay(
     low, high = _extent(np.concatenate([seen, model]), picture.shape)
     span = high - low
     # a line above for the title, two below for the legend
-    figure = style.new_figure(_WIDTH, 0.9 + _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.6)))
-    style.title_above(figure, title)
+    figure = style.new_figure(
+        _WIDTH, 0.9 + _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.6)), title
+    )
     axes = figure.add_subplot()
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
     keys = []

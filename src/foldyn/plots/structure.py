@@ -14,16 +14,10 @@ from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.plots import loads as histories
 from foldyn.plots import marks, scene, style
-from foldyn.plots.loads import (
-    describe_base,
-    describe_gravity,
-    describe_imposed,
-    describe_load,
-    signed_peak,
-)
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 
 if TYPE_CHECKING:
     from foldyn.cases import Case
@@ -106,15 +100,12 @@ def draw_structure(
     keys: list[Any] = []
     if displacement is not None:
         everything.append(sheet.nodes)
-        keys.append(Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed"))
-        if scale != 1.0:
-            keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+        keys += rest_keys(scale)
     keys += edge_keys(sheet, elements, loads)
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += [key for group in arrows for key in group.keys]
 
-    labels = [str(key.get_label()) for key in keys]
-    columns = style.columns_that_fit(labels, scene.WIDTH, _LEGEND_COLUMNS)
+    columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
     rows = -(-len(keys) // columns)
     figure, axes = scene.view_figure(np.vstack(everything), sight, title, rows)
     if displacement is not None:
@@ -193,11 +184,11 @@ def _motions(
         return []
     base = [vectors for vectors, _ in sheet.case.base_terms]
     middle = [points[np.any(vectors != 0.0, axis=1)].mean(axis=0) for vectors in base]
-    moves = np.array([signed_peak(vectors) for vectors in base])
+    moves = np.array([histories.signed_peak(vectors) for vectors in base])
     imposed = [vectors for vectors, _ in sheet.case.imposed_terms]
     return [
-        *_nodal(points, imposed, length, sight, style.IMPOSED, describe_imposed),
-        *_single(np.array(middle), moves, length, sight, style.BASE, describe_base),
+        *_nodal(points, imposed, length, sight, style.IMPOSED, histories.describe_imposed),
+        *_single(np.array(middle), moves, length, sight, style.BASE, histories.describe_base),
     ]
 
 
@@ -211,8 +202,15 @@ def _loads(
     gravity = np.array([vector for vector, _ in sheet.case.gravity_terms])
     middle = [_center_of_mass(sheet, points)] * len(gravity) if len(gravity) else []
     return [
-        *_nodal(points, forces, length, sight, style.LOAD, describe_load),
-        *_single(np.array(middle), gravity, 1.5 * length, sight, style.GRAVITY, describe_gravity),
+        *_nodal(points, forces, length, sight, style.LOAD, histories.describe_load),
+        *_single(
+            np.array(middle),
+            gravity,
+            1.5 * length,
+            sight,
+            style.GRAVITY,
+            histories.describe_gravity,
+        ),
     ]
 
 
