@@ -88,6 +88,28 @@ class Measurement(ABC):
         return np.zeros(0)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NodeValues(Measurement):
+    """Values of each of the nodes: `values`, its second axis along the nodes."""
+
+    values: Any = ()
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        named, known = len(self.where(case)), self.values.shape[1]
+        if named != known:
+            raise InputError(f"{self._of('values')}: are of {known} nodes, {named} are named")
+
+    def _per_node(self, values: NDArray[np.float64], rows: int, what: str) -> NDArray[np.float64]:
+        """The values of as many rows, a column for each node."""
+        values = values[:, None] if values.ndim == 1 else values
+        if values.ndim != 2 or len(values) != rows:
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be ({rows} {what}, nodes)"
+            )
+        return values
+
+
 def column(name: str, values: Any, length: int | None = None) -> NDArray[np.float64]:
     """Finite numbers in a row, of a given length where one is given."""
     array = numbers(name, values)

@@ -12,15 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn import signals
 from foldyn.errors import InputError
 from foldyn.experiment import History
-from foldyn.signals import (
-    fill_gaps,
-    first_turning_point,
-    remove_trend,
-    sampling_interval,
-    subtract_final,
-)
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
 from foldyn.studies.herkal.specimen.release import release_of
 
@@ -95,7 +89,7 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     inside = known[(known >= first) & (known <= last)]
     if np.diff(inside).max() - 1 > gap:
         return np.full(stop - start, np.nan)
-    return fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
+    return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
 def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
@@ -147,14 +141,14 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
     whole -= final
     before = _mean(measured.values[held : released + 1, seen]) - final
     shown = swing[turn - first :]
-    resting = subtract_final(shown, SETTLED)
+    resting = signals.subtract_final(shown, SETTLED)
     since = time - time[released]
     steps = {
         "as tracked": (since, measured.values[:, column]),
         "from the release on": (since[released:stop], window[:, column]),
         "from the first turning point on": (times, shown),
         "less its final position": (times, resting),
-        "without the line of best fit": (times, remove_trend(resting)),
+        "without the line of best fit": (times, signals.remove_trend(resting)),
     }
     return FreeVibration(history, whole, before, float(time[released]), steps)
 
@@ -163,14 +157,14 @@ def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Times at one interval, where they differ from it by what tables round off only."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
-        sampling_interval(time)  # says what is wrong
+        signals.sampling_interval(time)  # says what is wrong
     return even
 
 
 def _turn(swing: NDArray[np.float64], name: str) -> int:
     """Index of the first turning point."""
     try:
-        return first_turning_point(swing)
+        return signals.first_turning_point(swing)
     except InputError:
         raise InputError(
             f"{name} does not swing back after it moved fastest: no release, or one that is damped "
@@ -188,7 +182,7 @@ def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np
             f"{name} was lost for more than {gap} frames while it swings; light the specimen "
             "better, or film it from nearer"
         )
-    return first, fill_gaps(x[first : last + 1], gap)
+    return first, signals.fill_gaps(x[first : last + 1], gap)
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:
