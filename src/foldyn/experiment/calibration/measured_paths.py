@@ -42,6 +42,7 @@ class ForceDisplacement(Measurement):
     kind: ClassVar[str] = "force_displacement"
     analysis: ClassVar[str] = "statics"
     unit: ClassVar[str] = "N"
+    word: ClassVar[str] = IMPOSED
 
     def __post_init__(self) -> None:
         """Check the arguments."""

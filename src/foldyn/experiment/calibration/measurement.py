@@ -53,11 +53,13 @@ class Measurement(ABC):
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     unit: ClassVar[str] = "m"
+    word: ClassVar[str] = ""  # that selects nodes in a way of its own
 
     def __post_init__(self) -> None:
         """Check what all have."""
         object.__setattr__(self, "name", self.name or self.kind)
-        object.__setattr__(self, "nodes", check_nodes(self.nodes, self._of("nodes")))
+        if not (isinstance(self.nodes, str) and self.nodes == self.word):
+            object.__setattr__(self, "nodes", check_nodes(self.nodes, self._of("nodes")))
         if self.sigma is not None:
             number(self._of("sigma"), self.sigma, above=0.0)
         for key in self.changes:
