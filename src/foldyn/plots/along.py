@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots.chosen import AXES, check_nodes_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 CRITICAL = ("limit", "bifurcation")

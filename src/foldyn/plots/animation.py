@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, runs, way
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 from foldyn.plots.writers import WRITERS, filmed, find_ffmpeg
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 DPI = {".gif": 100, ".mp4": 200}
 """Dots per inch of an animation by the end of the file's name."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 AXES = ("x", "y", "z")
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.strain import PARTS, parts_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def energy_error(trajectory: xr.Dataset) -> np.ndarray:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,9 +17,6 @@ from foldyn.plots import style
 from foldyn.plots.modes import hertz
 from foldyn.plots.responses import Curve, curves_of, unit_of
 from foldyn.signals import find_peaks
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PROMINENCE = 0.05
 """Least prominence of a peak that is marked, as a part of the curve's maximum."""

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def plot_history(

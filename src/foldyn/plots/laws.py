@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +10,8 @@ from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    from foldyn.shells import Shell
-    from foldyn.structures import Structure
+from foldyn.shells import Shell
+from foldyn.structures import Structure
 
 MOST_CURVES = 4
 # A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from foldyn.cases import Actuate, Impose, resolve_nodes
+from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.actuation import resolve_creases
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    from foldyn.cases import Case
 
 _SAMPLES = 2001
 _LISTED = 3

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys
 from foldyn.plots.side_by_side import side_by_side
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 MOST_MODES = 12
 """Modes that one figure shows at most."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,9 +17,6 @@ from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import CRITICAL, along, asked, check_paths, runs, signed
 from foldyn.plots.chosen import AXES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _UNSTABLE = (0, (4, 2))
 _MARKS: Mapping[str, dict[str, Any]] = {

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 from numpy.typing import NDArray
@@ -14,9 +14,6 @@ from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.strain import PARTS, stacked
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _NONE = 1e-9  # of the largest energy: below it there is nothing to share
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
@@ -14,9 +14,6 @@ from foldyn.linear import convert
 from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.results.quantities import RESPONSES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True)

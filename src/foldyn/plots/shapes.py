@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots.along import check_path, evenly
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys
 from foldyn.plots.side_by_side import side_by_side
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 
 def draw_shapes(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,16 +13,14 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.patterns import Pattern
 from foldyn.plots import loads as histories
 from foldyn.plots import marks, scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
-
-if TYPE_CHECKING:
-    from foldyn.cases import Case
-    from foldyn.patterns import Pattern
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 _MOST_LOADS_LISTED = 4
 _LEGEND_COLUMNS = 3

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
@@ -17,9 +17,6 @@ from foldyn.studies.herkal.metric import UP_TO, content
 from foldyn.studies.herkal.models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
-
-if TYPE_CHECKING:
-    import xarray
 
 TARGETS = Path(__file__).with_name("targets.toml")
 BAND = (1.4, 2.4)  # Hz, where second peaks are sought

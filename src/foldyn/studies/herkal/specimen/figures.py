@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import WATCHED
 from foldyn.studies.herkal.specimen.agreement import content
 from foldyn.studies.herkal.vibration import CORNER, Response
-
-if TYPE_CHECKING:
-    import xarray
 
 WIDTH = 9.0  # inches
 COLUMNS = 3  # front nodes of a row of the pattern
