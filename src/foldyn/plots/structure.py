@@ -78,6 +78,8 @@ def draw_structure(
     sheet = Sheet3D.of(case_or_structure)
     points = sheet.nodes + scale * checked_displacement(sheet, displacement)
     sight = View(*view)
+    if sheet.case is None:
+        supports = loads = False
     size = sheet.size
     # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
@@ -159,8 +161,6 @@ def _supports(
     sheet: Sheet3D, points: NDArray[np.float64], size: float, sight: View
 ) -> list[_Supports]:
     """Return the marks of the nodes that are held, and of those that are moved."""
-    if sheet.case is None:
-        return []
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
     moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
     kinds = [
@@ -178,8 +178,6 @@ def _motions(
     sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
 ) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    if sheet.case is None:
-        return []
     base = [vectors for vectors, _ in sheet.case.base_terms]
     middle = [points[np.any(vectors != 0.0, axis=1)].mean(axis=0) for vectors in base]
     moves = np.array([histories.signed_peak(vectors) for vectors in base])
@@ -194,8 +192,6 @@ def _loads(
     sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
 ) -> list[_Arrows]:
     """Return arrows of forces, and of gravity at the center of mass."""
-    if sheet.case is None:
-        return []
     forces = [vectors for vectors, _ in sheet.case.force_terms]
     gravity = np.array([vector for vector, _ in sheet.case.gravity_terms])
     middle = [_center_of_mass(sheet, points)] * len(gravity) if len(gravity) else []
