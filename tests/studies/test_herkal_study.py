@@ -30,9 +30,8 @@ from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.partners import FAR, LEAST_MAC
 from foldyn.studies.herkal.pool import Done
 from foldyn.studies.herkal.runs import Job, Numerics
-from foldyn.studies.herkal.second_shell import second_table
 from foldyn.studies.herkal.specimen.measured import Data
-from foldyn.studies.herkal.study import LINEAR, Plan, Study, mean_ranks
+from foldyn.studies.herkal.study import LINEAR, Plan, Study, mean_ranks, second_table
 from foldyn.studies.targets import Target, Verdict, read_targets
 
 SHORT = Numerics(divisions=2, dt=0.02, duration=0.5)
@@ -216,8 +215,7 @@ def small(tmp_path_factory):
     shell = Job("case1", REFERENCE, "motion", plan.numerics)
     pool.run([job for job in plan.jobs() if job != shell], folder, processes=1)
     panel = study.result("case1", "panel", "motion")
-    panel.attrs[runs.SETTINGS] = runs._text(shell)
-    fd.save(panel, folder / shell.file)
+    runs.KEPT.keep(folder / shell.file, shell.settings(), panel)
     return Study(plan, study.folder)
 
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.plots.chosen import AXES, check_nodes_of
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-AXES = "xyz"
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 CRITICAL = ("limit", "bifurcation")
 """Kinds of points that figures mark."""
@@ -100,17 +98,9 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
     return found
 
 
-def check_nodes_of(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> list[int]:
-    """The nodes as a list, refused where a path does not have one."""
-    numbers = [int(node) for node in nodes]
-    if not numbers:
-        raise InputError("nodes: empty; name at least one node to show")
-    for label, path in paths.items():
-        stored = path["node"].values
-        for node in numbers:
-            if node not in stored:
-                raise InputError(
-                    f"nodes: {node} is not in {label!r}, whose nodes are "
-                    f"{stored.min()}..{stored.max()}"
-                )
-    return numbers
+def asked(
+    paths: Mapping[str, xr.Dataset], nodes: Sequence[int], direction: str | None
+) -> tuple[list[int], str]:
+    """Nodes that all paths have, and the direction, by default that in which they move farthest."""
+    numbers = check_nodes_of(paths, nodes)
+    return numbers, main_direction(paths, numbers) if direction is None else direction

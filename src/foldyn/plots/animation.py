@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, runs, way
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
 from foldyn.plots.writers import WRITERS, filmed, find_ffmpeg
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 DPI = {".gif": 100, ".mp4": 200}
 """Dots per inch of an animation by the end of the file's name."""
@@ -91,9 +88,7 @@ def animate(
 
     sight = View(*view)
     extent = np.vstack([sheet.nodes, moving.reshape(-1, 3)])
-    # Where all creases are actuated, their glow would tell nothing and hide the panels.
-    glow = len(sheet.actuated) < len(sheet.pattern.creases)
-    keys = edge_keys(sheet, actuated=glow)
+    keys = edge_keys(sheet, actuated=sheet.glows)
     traveled = _center_path(sheet, moving)
     if traveled is not None:
         keys.append(Line2D([], [], **_PATH, marker="o", markersize=4.0, label="center of mass"))
@@ -101,7 +96,7 @@ def animate(
         extent, sight, title or " ", legend_rows=-(-len(keys) // 3), width=6.0
     )
     add_undeformed(axes, sheet)
-    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=glow)
+    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.glows)
     dots = [] if traveled is None else [(_draw_path(axes, traveled), traveled)]
     style.legend_below(figure, keys)
     clock = figure.text(
@@ -205,11 +200,7 @@ def frame_displacements(
         raise InputError("result: has neither times nor steps; give a motion or a path")
     dimension = "time" if "time" in result.sizes else "step"
     motion = result["displacement"].transpose(dimension, "node", "axis").values
-    if motion.shape[1:] != sheet.nodes.shape:
-        raise InputError(
-            f"result: it has {motion.shape[1]} nodes, the structure {len(sheet.nodes)}; give "
-            "the case that was computed"
-        )
+    sheet.check_nodes("result: it has", motion)
     if len(motion) < 2:
         raise InputError("result: a single sample does not move; store more of them")
     if not np.isfinite(motion).all():

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.strain import PARTS, parts_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def energy_error(trajectory: xr.Dataset) -> np.ndarray:
@@ -59,8 +55,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     if missing:
         raise InputError(f"trajectory: no {', '.join(missing)}; give a dataset of foldyn.simulate")
     time = trajectory["time"].values
-    figure = style.new_figure(7.5, 5.0)
-    style.title_above(figure, title)
+    figure = style.new_figure(7.5, 5.0, title)
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1.0]})
     style.frame(upper, "", "energy (J)")
     style.frame(lower, "time (s)", "balance error (J)")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,9 +17,6 @@ from foldyn.plots import style
 from foldyn.plots.modes import hertz
 from foldyn.plots.responses import Curve, curves_of, unit_of
 from foldyn.signals import find_peaks
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PROMINENCE = 0.05
 """Least prominence of a peak that is marked, as a part of the curve's maximum."""
@@ -71,8 +68,7 @@ def plot_frf(
         raise InputError(f"prominence: {prominence!r}; give a part of the maximum, 0 to below 1")
     coherent = any(curve.coherence is not None for curve in curves)
     heights = [2.6, 1.3, 1.0][: 3 if coherent else 2]
-    figure = style.new_figure(8.0, 1.2 + sum(heights))
-    style.title_above(figure, title)
+    figure = style.new_figure(8.0, 1.2 + sum(heights), title)
     rows = figure.subplots(
         len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
     )[:, 0]
@@ -111,9 +107,7 @@ def plot_frf(
         look = {"marker": "o", "markersize": 4.5, "markerfacecolor": "white"}
         keys = [*keys, Line2D([], [], color=style.GRAY, linestyle="none", label="peak", **look)]
     if keys:
-        style.legend_below(
-            figure, keys, style.columns_that_fit([str(k.get_label()) for k in keys], 7.6, 5)
-        )
+        style.legend_below(figure, keys, 5, width=7.6)
     figure.align_ylabels(list(rows))
     return style.finish(figure)
 

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-AXES = ("x", "y", "z")
 
 
 def plot_history(
@@ -61,18 +57,12 @@ def plot_history(
     """
     if not trajectories:
         raise InputError("trajectories: empty; give at least one {label: dataset}")
-    numbers = [int(node) for node in nodes]
-    if not numbers:
-        raise InputError("nodes: empty; name at least one node to show")
-    for label, dataset in trajectories.items():
-        stored = dataset["node"].values
-        for node in numbers:
-            if node not in stored:
-                raise InputError(
-                    f"nodes: {node} is not in {label!r}, whose nodes are "
-                    f"{stored.min()}..{stored.max()}"
-                )
-    directions = _directions(trajectories, numbers, axes)
+    numbers = check_nodes_of(trajectories, nodes)
+    moved = {
+        label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values
+        for label, one in trajectories.items()
+    }
+    chosen = directions(axes, len(numbers), moved.values())
     intervals = {
         label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
     }
@@ -82,13 +72,12 @@ def plot_history(
         raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
 
     rows = len(numbers)
-    figure = style.new_figure(9.0, 1.15 + 1.75 * rows)
-    style.title_above(figure, title)
+    figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
     grid = figure.subplots(
         rows, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [1.45, 1.0]}
     )
     handles = []
-    for row, (node, direction) in enumerate(zip(numbers, directions, strict=True)):
+    for row, (node, direction) in enumerate(zip(numbers, chosen, strict=True)):
         left, right = grid[row]
         last = row == rows - 1
         style.frame(
@@ -100,7 +89,7 @@ def plot_history(
         style.frame(right, "frequency (Hz)" if last else "", "amplitude (m)", f"node {node}")
         for index, (label, dataset) in enumerate(trajectories.items()):
             time = dataset["time"].values
-            motion = _component(dataset, node, direction)
+            motion = moved[label][:, row, AXES.index(direction)]
             frequencies, amplitude = spectrum(
                 motion, intervals[label], window=window, detrend=detrend
             )
@@ -119,36 +108,3 @@ def plot_history(
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
     return style.finish(figure)
-
-
-def _component(dataset: xr.Dataset, node: int, direction: str) -> np.ndarray:
-    """Return one displacement component over time."""
-    return dataset["displacement"].sel(node=node, axis=direction).values
-
-
-def _directions(
-    trajectories: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
-    axes: str | Sequence[str] | None,
-) -> list[str]:
-    """Return one direction per node."""
-    if axes is None:
-        largest = np.max(
-            [
-                np.abs(d["displacement"].sel(node=list(nodes), axis=list(AXES)).values).max(0)
-                for d in trajectories.values()
-            ],
-            axis=0,
-        )
-        return [AXES[k] for k in largest.argmax(axis=1)]
-    chosen = [axes] if isinstance(axes, str) else list(axes)
-    for direction in chosen:
-        if direction not in AXES:
-            raise InputError(f'axes: {direction!r} is no direction; use "x", "y" or "z"')
-    if len(chosen) == 1:
-        return chosen * len(nodes)
-    if len(chosen) != len(nodes):
-        raise InputError(
-            f"axes: {len(chosen)} directions for {len(nodes)} nodes; give one, or one per node"
-        )
-    return chosen

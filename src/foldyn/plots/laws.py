@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,10 +10,8 @@ from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    from foldyn.shells import Shell
-    from foldyn.structures import Structure
+from foldyn.shells import Shell
+from foldyn.structures import Structure
 
 MOST_CURVES = 4
 # A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from
@@ -57,8 +55,7 @@ def plot_laws(
     if not kinds and bars is None:
         raise InputError("structure: is a shell without folds, which has no laws to draw")
     columns = len(kinds) + (bars is not None)
-    figure = style.new_figure(3.5 * columns, 3.9)
-    style.title_above(figure, title)
+    figure = style.new_figure(3.5 * columns, 3.9, title)
     frames = figure.subplots(1, columns, squeeze=False)[0]
     for axes, kind in zip(frames, kinds, strict=False):
         _draw_hinges(axes, *kind)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from foldyn.cases import Actuate, Impose, resolve_nodes
+from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.actuation import resolve_creases
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    from foldyn.cases import Case
 
 _SAMPLES = 2001
 _LISTED = 3
@@ -91,8 +88,7 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     panels = [panel for panel in panels if panel[1]] or panels[:1]
     entries = sum(len(curves) for _, curves in panels)
     height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
-    figure = style.new_figure(6.5, height)
-    style.title_above(figure, title)
+    figure = style.new_figure(6.5, height, title)
     rows = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
     time = np.linspace(start, start + duration, _SAMPLES)
     handles = []

@@ -62,10 +62,8 @@ def plot_mac(
     down, across = values.shape
     cell = min(_CELL, 6.0 / max(down, across))
     long = 0.07 * max(len(label) for label in labels[1]) > cell  # labels that would touch
-    figure = style.new_figure(
-        max(_MARGIN + _BAR + cell * across, 3.2), max(_MARGIN + cell * down, 2.2)
-    )
-    style.title_above(figure, title)
+    width, height = max(_MARGIN + _BAR + cell * across, 3.2), max(_MARGIN + cell * down, 2.2)
+    figure = style.new_figure(width, height, title)
     axes = figure.subplots()
     image = axes.imshow(values, cmap=_SHADES, vmin=0.0, vmax=1.0, interpolation="nearest")
     style.frame(axes, column_title, row_title)

@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
+from foldyn.cases import Case
 from foldyn.plots.animation import DPI, checked_kind
 from foldyn.plots.modes import ShownModes
 from foldyn.plots.scene import View
 from foldyn.plots.side_by_side import side_by_side
 from foldyn.plots.writers import WRITERS, filmed
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 _WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot be scrolled on a phone
 

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.plots import style
 from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import rest_keys
 from foldyn.plots.side_by_side import side_by_side
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 MOST_MODES = 12
 """Modes that one figure shows at most."""
@@ -115,19 +112,14 @@ class ShownModes:
         if amplitude is not None and not (np.isfinite(amplitude) and amplitude > 0.0):
             raise InputError(f"amplitude: {amplitude!r}; give a positive length in m")
         moved = modes["displacement"].transpose("node", "axis").values
-        if moved.shape != sheet.nodes.shape:
-            raise InputError(
-                f"modes: they have {len(moved)} nodes, the structure {len(sheet.nodes)}; give the "
-                "case that was computed"
-            )
+        sheet.check_nodes("modes: they have", moved)
         state = "undeformed" if not moved.any() else "equilibrium"
         sheet = replace(sheet, nodes=sheet.nodes + moved)
         shapes = modes["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
         swings = np.array([_readable(sheet, shape, amplitude) for shape in shapes])
         named = mode_names(sheet, modes, names)
         captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
-        notes = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label=state)]
-        return cls(sheet, swings, captions, notes)
+        return cls(sheet, swings, captions, rest_keys(state=state))
 
 
 def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -19,9 +20,6 @@ from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 from foldyn.plots.responses import Curve, curves_of, unit_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 MOST_CIRCLES = 6
 _COLUMNS = 3
@@ -165,8 +163,7 @@ def _resonance(f: NDArray[np.float64], natural: float, ratio: float) -> NDArray[
 def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     columns = min(count, _COLUMNS)
     rows = -(-count // columns)
-    figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows)
-    style.title_above(figure, title)
+    figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows, title)
     grid = figure.subplots(rows, columns, squeeze=False)
     frames = [grid[divmod(k, columns)] for k in range(rows * columns)]
     for spare in frames[count:]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
@@ -12,9 +11,6 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _MARGIN = 0.08  # of the model's size, around it
 _WIDTH = 8.0
@@ -57,8 +53,9 @@ def draw_overlay(
     low, high = _extent(np.concatenate([seen, model]), picture.shape)
     span = high - low
     # a line above for the title, two below for the legend
-    figure = style.new_figure(_WIDTH, 0.9 + _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.6)))
-    style.title_above(figure, title)
+    figure = style.new_figure(
+        _WIDTH, 0.9 + _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.6)), title
+    )
     axes = figure.add_subplot()
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
     keys = []

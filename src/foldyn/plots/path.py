@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,19 +15,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import (
-    AXES,
-    CRITICAL,
-    along,
-    check_nodes_of,
-    check_paths,
-    main_direction,
-    runs,
-    signed,
-)
-
-if TYPE_CHECKING:
-    import xarray as xr
+from foldyn.plots.along import CRITICAL, along, asked, check_paths, runs, signed
+from foldyn.plots.chosen import AXES
 
 _UNSTABLE = (0, (4, 2))
 _MARKS: Mapping[str, dict[str, Any]] = {
@@ -70,8 +60,7 @@ def plot_load_displacement(
         No path or node, a node that a path does not have, another direction.
     """
     check_paths(paths)
-    numbers = check_nodes_of(paths, nodes)
-    direction = main_direction(paths, numbers) if direction is None else direction
+    numbers, direction = asked(paths, nodes, direction)
     of = f" of node {numbers[0]}" if len(numbers) == 1 else ""
     figure, axes = _figure(title, f"displacement{of} along {direction} (m)", "load factor")
     curves = []
@@ -122,8 +111,7 @@ def plot_reaction(
         another direction.
     """
     check_paths(paths)
-    numbers = check_nodes_of(paths, nodes)
-    direction = main_direction(paths, numbers) if direction is None else direction
+    numbers, direction = asked(paths, nodes, direction)
     figure, axes = _figure(
         title, f"imposed displacement along {direction} (m)", f"force along {direction} (N)"
     )
@@ -165,8 +153,7 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
 
 
 def _figure(title: str, xlabel: str, ylabel: str) -> tuple[Figure, Axes]:
-    figure = style.new_figure(6.5, 4.4)
-    style.title_above(figure, title)
+    figure = style.new_figure(6.5, 4.4, title)
     axes = figure.subplots()
     style.frame(axes, xlabel, ylabel)
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
@@ -213,9 +200,7 @@ def _finish(
             look = {"color": style.GRAY, "linestyle": "none", **_MARKS[kind]}
             keys.append(Line2D([], [], **look, label=_NAMES[kind]))
     if keys:
-        style.legend_below(figure, keys, style.columns_that_fit(
-            [str(key.get_label()) for key in keys], figure.get_figwidth(), 4
-        ))  # fmt: skip
+        style.legend_below(figure, keys, 4, figure.get_figwidth())
     style.exponents(axes)
     axes.ticklabel_format(axis="x", scilimits=(-4, 4), useMathText=True)
     axes.xaxis.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)

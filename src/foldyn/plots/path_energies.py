@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import along, check_nodes_of, check_path, main_direction, way
+from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.strain import PARTS, stacked
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _NONE = 1e-9  # of the largest energy: below it there is nothing to share
 
@@ -75,8 +72,7 @@ def plot_path_energies(
     """
     check_path(path, "path")
     x, name = _abscissa(path, nodes, direction)
-    figure = style.new_figure(7.0, 5.0)
-    style.title_above(figure, title)
+    figure = style.new_figure(7.0, 5.0, title)
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.8, 1.0]})
     style.frame(upper, "", "strain energy (J)")
     style.frame(lower, name, "share")
@@ -106,8 +102,7 @@ def _abscissa(
 ) -> tuple[NDArray[np.float64], str]:
     """Return a quantity that only grows along the path, and its name."""
     if nodes is not None:
-        numbers = check_nodes_of({"path": path}, nodes)
-        direction = main_direction({"path": path}, numbers) if direction is None else direction
+        numbers, direction = asked({"path": path}, nodes, direction)
         moved = along(path, numbers, direction)
         if not (np.diff(moved) > 0.0).all():
             raise InputError(

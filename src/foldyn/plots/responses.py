@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.linear import convert
 from foldyn.linear.quantity import PER_FORCE, quantity_of
+from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.results.quantities import RESPONSES
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -59,9 +55,6 @@ def curves_of(
     """
     if not isinstance(responses, Mapping) or not responses:
         raise InputError("responses: give a mapping {label: response}, with at least one of them")
-    numbers = [int(node) for node in nodes]
-    if not numbers:
-        raise InputError("nodes: empty; name at least one node to show")
     held = {quantity_of(response) for response in responses.values()}
     if len(held) > 1:
         raise InputError("responses: forces drive some of them, a base others; draw them apart")
@@ -72,12 +65,9 @@ def curves_of(
             raise InputError(f"quantity: {quantity!r}; the response has {known}")
         shown = quantity
         responses = {label: convert(response, shown) for label, response in responses.items()}
-    for label, response in responses.items():
-        for node in numbers:
-            if node not in response["node"].values:
-                last = int(response["node"].values.max())
-                raise InputError(f"nodes: {node} is not in {label!r}, whose nodes are 0..{last}")
-    chosen = _directions(responses, numbers, axes, shown)
+    numbers = check_nodes_of(responses, nodes)
+    seen = (r[shown].sel(node=numbers, axis=list(AXES)).values for r in responses.values())
+    chosen = directions(axes, len(numbers), map(np.nan_to_num, seen))
     curves = []
     for label, response in responses.items():
         frequency = response["frequency"].values.astype(np.float64)
@@ -93,27 +83,3 @@ def unit_of(quantity: str) -> str:
     """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
     unit = RESPONSES[quantity].units.replace("s2", "s²")
     return "" if unit == "1" else f" ({unit})"
-
-
-def _directions(
-    responses: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
-    axes: str | Sequence[str] | None,
-    stored: str,
-) -> list[str]:
-    """One direction per node: by default the one in which it responds most."""
-    if axes is None:
-        seen = [r[stored].sel(node=list(nodes), axis=list(AXES)).values for r in responses.values()]
-        largest = np.max([np.abs(np.nan_to_num(values)).max(axis=0) for values in seen], axis=0)
-        return [AXES[k] for k in largest.argmax(axis=1)]
-    chosen = [axes] if isinstance(axes, str) else list(axes)
-    for axis in chosen:
-        if axis not in AXES:
-            raise InputError(f'axes: {axis!r} is no direction; use "x", "y" or "z"')
-    if len(chosen) == 1:
-        return chosen * len(nodes)
-    if len(chosen) != len(nodes):
-        raise InputError(
-            f"axes: {len(chosen)} directions for {len(nodes)} nodes; give one, or one per node"
-        )
-    return chosen

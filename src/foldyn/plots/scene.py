@@ -16,6 +16,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import NDArray
 
+from foldyn.errors import InputError
 from foldyn.plots import style
 
 PAPER = "#F2DFB8"
@@ -114,6 +115,19 @@ class Sheet3D:
             return np.zeros((0, 2), dtype=np.int64)
         return self.edges[self.case.actuated_creases]
 
+    @property
+    def glows(self) -> bool:
+        """Whether actuated creases are marked: a glow of all would tell nothing and hide panels."""
+        return len(self.actuated) < len(self.pattern.creases)
+
+    def check_nodes(self, result: str, moved: NDArray[np.float64], done: str = "computed") -> None:
+        """Refuse displacements (..., n, 3) of another number of nodes."""
+        if moved.shape[-2:] != self.nodes.shape:
+            raise InputError(
+                f"{result} {moved.shape[-2]} nodes, the structure {len(self.nodes)}; give the case "
+                f"that was {done}"
+            )
+
     def creases(self) -> dict[str, NDArray[np.int64]]:
         """Return the creases (k, p) of each assignment that occurs."""
         creases = self.edges[: len(self._creases)]
@@ -187,11 +201,7 @@ def view_figure(
     bottom = _TICKS + (0.1 + 0.19 * legend_rows if legend_rows else 0.0)
     height = top + seen.size[1] * scale + bottom
 
-    figure = style.new_figure(width, height, constrained=False)
-    if title:
-        figure.suptitle(
-            title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
-        )
+    figure = style.new_figure(width, height, title, constrained=False)
     center = _LEFT + 0.5 * (width - _LEFT - _RIGHT), bottom + 0.5 * seen.size[1] * scale
     axes = add_view(figure, seen, center, scale)
     _frame(axes, seen.middle, seen.box, scale * view.basis)

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.plots import style
 from foldyn.plots.along import check_path, evenly
 from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import rest_keys
 from foldyn.plots.side_by_side import side_by_side
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from foldyn.cases import Case
-    from foldyn.structures import Structure
+from foldyn.structures import Structure
 
 
 def draw_shapes(
@@ -65,17 +60,10 @@ def draw_shapes(
     sheet = Sheet3D.of(case_or_structure)
     numbers = chosen_points(path, points)
     displacement = path["displacement"].transpose("step", "node", "axis").values[numbers]
-    if displacement.shape[1:] != sheet.nodes.shape:
-        raise InputError(
-            f"path: it has {displacement.shape[1]} nodes, the structure {len(sheet.nodes)}; give "
-            "the case that was traced"
-        )
+    sheet.check_nodes("path: it has", displacement, "traced")
     positions = sheet.nodes + scale * displacement
-    notes = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed")]
-    if scale != 1.0:
-        notes.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
     captions = [describe_point(path, number) for number in numbers]
-    return side_by_side(sheet, positions, captions, View(*view), notes, title).figure
+    return side_by_side(sheet, positions, captions, View(*view), rest_keys(scale), title).figure
 
 
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:

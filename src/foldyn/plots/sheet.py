@@ -24,6 +24,14 @@ def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
     scene.add_segments(axes, sheet.nodes[sheet.edges], style.LIGHT, 0.9, zorder=0.6)
 
 
+def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
+    """Legend entries of the sheet at rest, and of the factor on displacements if it is not 1."""
+    keys = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label=state)]
+    if scale != 1.0:
+        keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+    return keys
+
+
 @dataclass(frozen=True)
 class EdgeKind:
     """Edges that look alike: the nodes along them (k, p), look and name."""

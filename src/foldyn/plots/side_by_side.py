@@ -71,9 +71,7 @@ def side_by_side(
     sight, count = view, len(shapes)
     room = np.vstack([sheet.nodes, shapes.reshape(-1, 3) if extent is None else extent])
     seen = scene.Seen.of(room, sight)
-    # Where all creases are actuated, their glow would tell nothing and hide the panels.
-    glow = len(sheet.actuated) < len(sheet.pattern.creases)
-    keys = [*notes, *edge_keys(sheet, actuated=glow)]
+    keys = [*notes, *edge_keys(sheet, actuated=sheet.glows)]
 
     columns = min(count, most_columns)
     columns = -(-count // -(-count // columns))  # rows as full as can be
@@ -85,15 +83,11 @@ def side_by_side(
     aside = inches * (sight.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
     below = _CAPTION + _LINE * max(caption.count("\n") for caption in captions)
     top = 0.42 if title else 0.1
-    entries = style.columns_that_fit([str(key.get_label()) for key in keys], width, 4)
+    entries = style.columns_that_fit(keys, width, 4)
     bottom = 0.12 + 0.19 * -(-len(keys) // entries)
     step = size[1] * inches + below
-    figure = style.new_figure(width, top + rows * step + bottom, constrained=False)
+    figure = style.new_figure(width, top + rows * step + bottom, title, constrained=False)
     height = figure.get_figheight()
-    if title:
-        figure.suptitle(
-            title, fontsize=style.TITLE, color=style.BLACK, y=1.0 - 0.1 / height, va="top"
-        )
     sheets = []
     for place, (caption, shape) in enumerate(zip(captions, shapes, strict=True)):
         row, column = divmod(place, columns)
@@ -104,7 +98,7 @@ def side_by_side(
         axes = scene.add_view(figure, seen, center, inches)
         axes.set_axis_off()
         add_undeformed(axes, sheet)
-        sheets.append(DrawnSheet(axes, sheet, shape, sight, actuated=glow))
+        sheets.append(DrawnSheet(axes, sheet, shape, sight, actuated=sheet.glows))
         figure.text(
             middle / width,
             (floor - 0.08) / height,

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from foldyn.plots import style
 from foldyn.shells.body import GROUPS as OF_SHELLS
 from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PARTS: Mapping[str, tuple[str, str]] = {
     "strain_bars": ("bars", style.VERMILLION),

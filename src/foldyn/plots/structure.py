@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,22 +13,14 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+from foldyn.plots import loads as histories
 from foldyn.plots import marks, scene, style
-from foldyn.plots.loads import (
-    describe_base,
-    describe_gravity,
-    describe_imposed,
-    describe_load,
-    signed_peak,
-)
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
-
-if TYPE_CHECKING:
-    from foldyn.cases import Case
-    from foldyn.patterns import Pattern
-    from foldyn.structures import Structure
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
+from foldyn.structures import Structure
 
 _MOST_LOADS_LISTED = 4
 _LEGEND_COLUMNS = 3
@@ -86,6 +78,8 @@ def draw_structure(
     sheet = Sheet3D.of(case_or_structure)
     points = sheet.nodes + scale * checked_displacement(sheet, displacement)
     sight = View(*view)
+    if sheet.case is None:
+        supports = loads = False
     size = sheet.size
     # Marks suit the sheet's size, but not so that they cover the panels of a large sheet.
     edge = float(np.median(np.linalg.norm(np.ptp(sheet.nodes[sheet.edges], axis=1), axis=1)))
@@ -106,15 +100,12 @@ def draw_structure(
     keys: list[Any] = []
     if displacement is not None:
         everything.append(sheet.nodes)
-        keys.append(Line2D([], [], color=style.LIGHT, linewidth=1.2, label="undeformed"))
-        if scale != 1.0:
-            keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+        keys += rest_keys(scale)
     keys += edge_keys(sheet, elements, loads)
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += [key for group in arrows for key in group.keys]
 
-    labels = [str(key.get_label()) for key in keys]
-    columns = style.columns_that_fit(labels, scene.WIDTH, _LEGEND_COLUMNS)
+    columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
     rows = -(-len(keys) // columns)
     figure, axes = scene.view_figure(np.vstack(everything), sight, title, rows)
     if displacement is not None:
@@ -170,8 +161,6 @@ def _supports(
     sheet: Sheet3D, points: NDArray[np.float64], size: float, sight: View
 ) -> list[_Supports]:
     """Return the marks of the nodes that are held, and of those that are moved."""
-    if sheet.case is None:
-        return []
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
     moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
     kinds = [
@@ -189,15 +178,13 @@ def _motions(
     sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
 ) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    if sheet.case is None:
-        return []
     base = [vectors for vectors, _ in sheet.case.base_terms]
     middle = [points[np.any(vectors != 0.0, axis=1)].mean(axis=0) for vectors in base]
-    moves = np.array([signed_peak(vectors) for vectors in base])
+    moves = np.array([histories.signed_peak(vectors) for vectors in base])
     imposed = [vectors for vectors, _ in sheet.case.imposed_terms]
     return [
-        *_nodal(points, imposed, length, sight, style.IMPOSED, describe_imposed),
-        *_single(np.array(middle), moves, length, sight, style.BASE, describe_base),
+        *_nodal(points, imposed, length, sight, style.IMPOSED, histories.describe_imposed),
+        *_single(np.array(middle), moves, length, sight, style.BASE, histories.describe_base),
     ]
 
 
@@ -205,14 +192,19 @@ def _loads(
     sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
 ) -> list[_Arrows]:
     """Return arrows of forces, and of gravity at the center of mass."""
-    if sheet.case is None:
-        return []
     forces = [vectors for vectors, _ in sheet.case.force_terms]
     gravity = np.array([vector for vector, _ in sheet.case.gravity_terms])
     middle = [_center_of_mass(sheet, points)] * len(gravity) if len(gravity) else []
     return [
-        *_nodal(points, forces, length, sight, style.LOAD, describe_load),
-        *_single(np.array(middle), gravity, 1.5 * length, sight, style.GRAVITY, describe_gravity),
+        *_nodal(points, forces, length, sight, style.LOAD, histories.describe_load),
+        *_single(
+            np.array(middle),
+            gravity,
+            1.5 * length,
+            sight,
+            style.GRAVITY,
+            histories.describe_gravity,
+        ),
     ]
 
 

@@ -47,13 +47,15 @@ FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
 TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
 
 
-def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
+def new_figure(width: float, height: float, title: str = "", constrained: bool = True) -> Figure:
     """Return an empty white figure on an Agg canvas.
 
     Parameters
     ----------
     width, height : float
         Size in inches.
+    title : str
+        Title of the figure, if it has one.
     constrained : bool
         Let matplotlib make room for labels and legends; False leaves axes where they are put.
     """
@@ -67,6 +69,7 @@ def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
     if not constrained:
         figure.set_layout_engine("none")  # against the caller's own setting of a layout
     FigureCanvasAgg(figure)
+    title_above(figure, title)
     return figure
 
 
@@ -103,8 +106,9 @@ def exponents(axes: Axes, ticks: int = 6) -> None:
     axes.locator_params(axis="y", nbins=ticks)
 
 
-def columns_that_fit(labels: Sequence[str], width: float, most: int) -> int:
+def columns_that_fit(handles: Sequence, width: float, most: int) -> int:
     """Columns of a legend, at most `most`, that fit a width (inches) by the length of its texts."""
+    labels = [str(handle.get_label()) for handle in handles]
     letter, handle, gap = 0.065, 0.38, 0.22  # inches, at the size of the legend's font
     for columns in range(most, 1, -1):
         rows = -(-len(labels) // columns)
@@ -115,13 +119,30 @@ def columns_that_fit(labels: Sequence[str], width: float, most: int) -> int:
     return 1
 
 
-def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:
-    """Put one legend for the whole figure below its axes, where it hides no data."""
-    constrained = isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
+def title_above(figure: Figure, title: str) -> None:
+    """Set the figure's title, if there is one."""
+    place = {} if _constrained(figure) else {"y": 1.0 - 0.1 / figure.get_figheight(), "va": "top"}
+    if title:
+        figure.suptitle(title, fontsize=TITLE, color=BLACK, **place)
+
+
+def _constrained(figure: Figure) -> bool:
+    return isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine)
+
+
+def legend_below(
+    figure: Figure, handles: Sequence, columns: int = 3, width: float | None = None
+) -> Legend:
+    """Put one legend for the whole figure below its axes, where it hides no data.
+
+    With a width (inches) it has as many columns, at most so many, as `columns_that_fit`.
+    """
+    if width is not None:
+        columns = columns_that_fit(handles, width, columns)
     return figure.legend(
         handles=list(handles),
         # "outside" makes room, which only the layout engine can do.
-        loc="outside lower center" if constrained else "lower center",
+        loc="outside lower center" if _constrained(figure) else "lower center",
         ncols=_even_columns(len(handles), columns),
         fontsize=TICK,
         labelcolor=BLACK,
@@ -129,12 +150,6 @@ def legend_below(figure: Figure, handles: Sequence, columns: int = 3) -> Legend:
         frameon=False,
         handlelength=2.6,
     )
-
-
-def title_above(figure: Figure, title: str) -> None:
-    """Set the figure's title, if there is one."""
-    if title:
-        figure.suptitle(title, fontsize=TITLE, color=BLACK)
 
 
 def finish(figure: Figure) -> Figure:

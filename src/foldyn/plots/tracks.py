@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LABELS = {"time": "time (s)", "photo": "photo", "load": "load (N)"}
 
@@ -63,8 +60,7 @@ def plot_tracks(
     along = "photo" if "photo" in tracks.dims else "time"
     shown = "load" if along == "photo" and "load" in tracks.coords else along
     across, label = tracks[shown].values, _LABELS[shown]
-    figure = style.new_figure(8.0, 1.1 + 1.6 * len(nodes))
-    style.title_above(figure, title)
+    figure = style.new_figure(8.0, 1.1 + 1.6 * len(nodes), title)
     grid = figure.subplots(len(nodes), 1, squeeze=False, sharex="col")[:, 0]
     keys = []
     for row, (node, axes) in enumerate(zip(nodes, grid, strict=True)):
@@ -115,8 +111,7 @@ def plot_steps(
     """
     if not steps:
         raise InputError("steps: empty; give at least the record as measured")
-    figure = style.new_figure(7.5, 0.8 + 1.35 * len(steps))
-    style.title_above(figure, title)
+    figure = style.new_figure(7.5, 0.8 + 1.35 * len(steps), title)
     grid = figure.subplots(len(steps), 1, squeeze=False, sharex="col")[:, 0]
     for row, (name, (time, values)) in enumerate(steps.items()):
         t: NDArray = np.asarray(time, dtype=np.float64)

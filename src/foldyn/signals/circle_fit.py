@@ -9,13 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import ComputationError, InputError
+from foldyn.signals import records
 from foldyn.signals.conversions import convert_response
-from foldyn.signals.records import (
-    DERIVATIVES,
-    checked_choice,
-    checked_curve,
-    checked_frequencies,
-)
 
 _FEWEST = 5  # points in a band: six real unknowns against ten real numbers
 _LARGEST_ERROR = 1.0 / 3.0  # of the damping ratio: mere noise gives circles with errors above 0.4
@@ -178,8 +173,8 @@ def _mobility(
     frequency: ArrayLike, response: ArrayLike, quantity: str
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Frequencies above 0 and the mobility there; NaN may stand outside the bands."""
-    checked_choice("quantity", quantity, DERIVATIVES)
-    f = checked_frequencies(frequency, fewest=_FEWEST)
+    records.checked_choice("quantity", quantity, records.DERIVATIVES)
+    f = records.checked_frequencies(frequency, fewest=_FEWEST)
     Y = np.asarray(response)
     if Y.shape != f.shape:
         raise InputError(
@@ -202,7 +197,7 @@ def _in_band(
             f"band: {int(inside.sum())} points between {low:g} and {high:g} Hz; a circle fit needs "
             f"at least {_FEWEST}: widen the band, or refine the frequencies"
         )
-    return f[inside], checked_curve("response", Y[inside], f[inside])
+    return f[inside], records.checked_curve("response", Y[inside], f[inside])
 
 
 def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:

@@ -9,16 +9,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import (
-    Window,
-    checked_choice,
-    checked_count,
-    checked_interval,
-    checked_number,
-    checked_window,
-    detrended,
-    real_array,
-)
+from foldyn.signals import records
 
 ESTIMATORS = ("h1", "h2")
 _FEWEST = 4  # samples of a segment
@@ -71,7 +62,7 @@ def frequency_response(
     estimator: str = "h1",
     segment: int | None = None,
     overlap: float = 0.0,
-    window: Window = None,
+    window: records.Window = None,
     detrend: str | None = None,
 ) -> FrequencyResponse:
     """Estimate a frequency response from records of force and response.
@@ -132,17 +123,19 @@ def frequency_response(
     >>> print(estimate.frequency[16], estimate.response[16].imag.round(12))
     25.0 -2.0
     """
-    checked_choice("estimator", estimator, ESTIMATORS)
-    interval = checked_interval(dt)
+    records.checked_choice("estimator", estimator, ESTIMATORS)
+    interval = records.checked_interval(dt)
     forces, responses = _records(force, response)
-    length = forces.shape[1] if segment is None else checked_count("segment", segment, _FEWEST)
+    length = (
+        forces.shape[1] if segment is None else records.checked_count("segment", segment, _FEWEST)
+    )
     if not _FEWEST <= length <= forces.shape[1]:
         raise InputError(
             f"segment: {length} samples, but a record has {forces.shape[1]}; a segment has from "
             f"{_FEWEST} samples to all of a record"
         )
-    shared = int(checked_number("overlap", overlap, least=0.0, below=1.0) * length)
-    weights = checked_window(window, length)
+    shared = int(records.checked_number("overlap", overlap, least=0.0, below=1.0) * length)
+    weights = records.checked_window(window, length)
 
     channels = responses.shape[2:]
     lines = length // 2 + 1
@@ -184,8 +177,8 @@ def _records(
     force: ArrayLike, response: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Force (records, n) and response (records, n, ...) of equal length."""
-    f = real_array("force", force)
-    x = real_array("response", response)
+    f = records.real_array("force", force)
+    x = records.real_array("response", response)
     if f.ndim not in (1, 2) or f.size == 0:
         raise InputError(
             f"force: shape {f.shape}; give one record, shape (n,), or several of one length, "
@@ -202,7 +195,7 @@ def _records(
 def _transform(
     x: NDArray[np.float64], weights: NDArray[np.float64], detrend: str | None
 ) -> NDArray[np.complex128]:
-    return scipy.fft.rfft(detrended(x, detrend) * _beside(weights, x), axis=0)
+    return scipy.fft.rfft(records.detrended(x, detrend) * _beside(weights, x), axis=0)
 
 
 def _beside(row: NDArray, other: NDArray) -> NDArray:

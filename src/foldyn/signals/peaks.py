@@ -8,14 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import (
-    DERIVATIVES,
-    checked_choice,
-    checked_count,
-    checked_curve,
-    checked_frequencies,
-    checked_number,
-)
+from foldyn.signals import records
 
 
 @dataclass(frozen=True)
@@ -90,9 +83,9 @@ def find_peaks(
     >>> print(peaks.frequency, 10 * np.sqrt(1 - 2 * 0.05**2))
     [9.97496867] 9.974968671630002
     """
-    order = DERIVATIVES[checked_choice("quantity", quantity, DERIVATIVES)]
+    order = records.DERIVATIVES[records.checked_choice("quantity", quantity, records.DERIVATIVES)]
     f, size = magnitude_curve(frequency, magnitude)
-    share = checked_number("prominence", prominence, least=0.0, below=1.0)
+    share = records.checked_number("prominence", prominence, least=0.0, below=1.0)
     from scipy.signal import find_peaks as search  # slow to import
 
     # an absolute floor of 0 would keep rounding on flat stretches
@@ -100,7 +93,7 @@ def find_peaks(
     index, properties = search(size, prominence=least)
     height = properties["prominences"]
     if count is not None:
-        most = np.argsort(height, kind="stable")[::-1][: checked_count("count", count)]
+        most = np.argsort(height, kind="stable")[::-1][: records.checked_count("count", count)]
         keep = np.sort(most)
         index, height = index[keep], height[keep]
     refined = [refined_peak(f, size, i, order) for i in index]
@@ -116,8 +109,8 @@ def magnitude_curve(
     frequency: ArrayLike, magnitude: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Frequencies and magnitudes, at least three, checked."""
-    f = checked_frequencies(frequency, fewest=3)
-    curve = checked_curve("magnitude", magnitude, f)
+    f = records.checked_frequencies(frequency, fewest=3)
+    curve = records.checked_curve("magnitude", magnitude, f)
     if (curve.imag == 0.0).all() and (curve.real < 0.0).any():
         raise InputError("magnitude: below 0; give the modulus, or the complex response")
     return f, np.abs(curve)

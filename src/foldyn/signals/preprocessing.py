@@ -10,13 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import (
-    checked_count,
-    checked_number,
-    checked_record,
-    detrended,
-    real_numbers,
-)
+from foldyn.signals import records
 
 _FEWEST = 4
 
@@ -38,8 +32,8 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
     InputError
         A longer gap, or one at an end: cut the record there.
     """
-    values = real_numbers("x", x)
-    most = checked_count("longest", longest)
+    values = records.real_numbers("x", x)
+    most = records.checked_count("longest", longest)
     known = np.isfinite(values)
     if values.ndim != 1 or known.sum() < _FEWEST:
         raise InputError(
@@ -75,8 +69,8 @@ def choose_window(
     InputError
         Fewer than four samples lie there.
     """
-    t = checked_record("time", time, 1)
-    values = real_numbers("x", x)
+    t = records.checked_record("time", time, 1)
+    values = records.real_numbers("x", x)
     if values.shape[:1] != t.shape:
         raise InputError(f"x: shape {values.shape}, but there are {t.size} times")
     inside = (t >= start) & (t <= stop)
@@ -102,8 +96,8 @@ def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
     InputError
         The record does not turn.
     """
-    values = checked_record("x", x, _FEWEST)
-    part = checked_number("least", least, above=0.0, below=1.0)
+    values = records.checked_record("x", x, _FEWEST)
+    part = records.checked_number("least", least, above=0.0, below=1.0)
     from scipy.signal import find_peaks  # slow to import
 
     limit = part * float(np.ptp(values))
@@ -128,12 +122,12 @@ def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
     part : float
         Share of the record whose mean is the final position.
     """
-    values = checked_record("x", x, _FEWEST)
-    share = checked_number("part", part, above=0.0, below=1.0)
+    values = records.checked_record("x", x, _FEWEST)
+    share = records.checked_number("part", part, above=0.0, below=1.0)
     count = max(1, round(share * values.size))
     return values - values[-count:].mean()
 
 
 def remove_trend(x: ArrayLike, kind: str = "linear") -> NDArray[np.float64]:
     """Record without its line of best fit ("linear") or its mean ("constant")."""
-    return detrended(checked_record("x", x, _FEWEST), kind)
+    return records.detrended(records.checked_record("x", x, _FEWEST), kind)

@@ -7,14 +7,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import (
-    checked_count,
-    checked_interval,
-    checked_window,
-    detrended,
-    finite,
-    real_numbers,
-)
+from foldyn.signals import records
 
 MINIMUM_SAMPLES = 4
 
@@ -66,13 +59,13 @@ def spectrum(
     """
     samples = _checked_samples(x, axis)
     n = samples.shape[0]
-    interval = checked_interval(dt)
-    length = n * checked_count("pad", pad)
+    interval = records.checked_interval(dt)
+    length = n * records.checked_count("pad", pad)
 
-    samples = detrended(samples, detrend)
+    samples = records.detrended(samples, detrend)
     gain = float(n)
     if window is not None:
-        weights = checked_window(window, n)
+        weights = records.checked_window(window, n)
         gain = float(weights.sum())
         samples = samples * weights.reshape((n,) + (1,) * (samples.ndim - 1))
 
@@ -84,10 +77,10 @@ def spectrum(
 
 def _checked_samples(x: ArrayLike, axis: int) -> NDArray[np.float64]:
     """Return the samples as float64 with time along axis 0."""
-    samples = real_numbers("x", x)
+    samples = records.real_numbers("x", x)
     if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
         raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
-    samples = finite("x", np.moveaxis(samples, axis, 0))
+    samples = records.finite("x", np.moveaxis(samples, axis, 0))
     if samples.shape[0] < MINIMUM_SAMPLES:
         raise InputError(
             f"x: {samples.shape[0]} samples along axis {axis}; a spectrum needs at least "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.experiment.calibration.fit_figures import (
-    MOST,
-    plot_correlation,
-    plot_forces,
-    plot_histories,
-    plot_shapes,
-    plot_spectra,
-)
+from foldyn.experiment.calibration import fit_figures
 from foldyn.experiment.calibration.fit_problem import Run
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.measured_motions import History, Spectrum
@@ -38,7 +32,7 @@ def write_fit(fit: Fit, folder: str | Path, title: str = "", note: str = "") -> 
     sections: list[Section] = [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
     if len(fit.estimates) > 1:
         picture = folder / "correlation.png"
-        _save(plot_correlation(fit), picture, note)
+        _save(fit_figures.plot_correlation(fit), picture, note)
         sections.append(
             Picture(
                 picture,
@@ -128,8 +122,8 @@ def _searches(fit: Fit) -> Table:
 
 def _caption(one: Measurement) -> str:
     told = f"{one.name}: {one.label} and model."
-    if isinstance(one, History | Spectrum) and one.values.shape[1] > MOST:
-        told += f" The first {MOST} of {one.values.shape[1]} nodes."
+    if isinstance(one, History | Spectrum) and one.values.shape[1] > fit_figures.MOST:
+        told += f" The first {fit_figures.MOST} of {one.values.shape[1]} nodes."
     return f"{told} Held out: the fit did not use it." if one.held_out else told
 
 
@@ -138,16 +132,17 @@ def _draw(fit: Fit, number: int, one: Measurement, folder: Path, note: str) -> P
     run = next(run for run in fit.problem.runs if number in run.members)
     values = [*fit.values.values()]
     case = fit.problem.case_file(run, values).case()
+    result = partial(fit.problem.result, run, values)
     if isinstance(one, ForceDisplacement):
-        figure = plot_forces(one, _curve(fit, run, one, case))
+        figure = fit_figures.plot_forces(one, _curve(fit, run, one, case))
     elif isinstance(one, Shapes):
         if len(one.axes) < 2:
             return None
-        figure = plot_shapes(one, case, one.shapes(fit.problem.result(run, values), case))
+        figure = fit_figures.plot_shapes(one, case, one.shapes(result(), case))
     elif isinstance(one, History):
-        figure = plot_histories(one, case, one.curves(fit.problem.result(run, values), case))
+        figure = fit_figures.plot_histories(one, case, one.curves(result(), case))
     elif isinstance(one, Spectrum):
-        figure = plot_spectra(one, case, one.spectra(fit.problem.result(run, values), case))
+        figure = fit_figures.plot_spectra(one, case, one.spectra(result(), case))
     else:
         return None
     picture = folder / f"data-{number}.png"

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
+from foldyn.experiment.calibration.measurement import NodeValues, axis_number, column
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number, numbers, show
 
@@ -24,7 +24,7 @@ REFINED = 8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class History(Measurement):
+class History(NodeValues):
     """Displacements of nodes along an axis over time.
 
     Parameters
@@ -45,7 +45,6 @@ class History(Measurement):
     """
 
     time: Any = ()
-    values: Any = ()
     axis: str = "x"
     delay: float = 0.0
     align: float = 0.0
@@ -61,12 +60,7 @@ class History(Measurement):
         time = column(self._of("time"), self.time)
         if len(time) < 2 or not (np.diff(time) > 0.0).all():
             raise InputError(f"{self._of('time')}: must be at least two increasing times (s)")
-        values = np.array(self.values, dtype=np.float64)
-        values = values[:, None] if values.ndim == 1 else values
-        if values.ndim != 2 or len(values) != len(time):
-            raise InputError(
-                f"{self._of('values')}: shape {values.shape}: must be ({len(time)} times, nodes)"
-            )
+        values = self._per_node(np.array(self.values, dtype=np.float64), len(time), "times")
         if np.isinf(values).any():
             raise InputError(f"{self._of('values')}: infinite; give NaN where a node was lost")
         if self.detrend not in DETRENDS:
@@ -98,11 +92,7 @@ class History(Measurement):
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """See `Measurement`."""
-        nodes = self.where(case)
-        if len(nodes) != self.values.shape[1]:
-            raise InputError(
-                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
-            )
+        super().check(case, arguments)
         early, late = self.time[0] + self.delay, self.time[-1] + self.delay
         _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
@@ -153,7 +143,7 @@ class History(Measurement):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Spectrum(Measurement):
+class Spectrum(NodeValues):
     """Amplitude spectra of the displacements of nodes along an axis.
 
     Parameters
@@ -173,7 +163,6 @@ class Spectrum(Measurement):
     """
 
     frequency: Any = ()
-    values: Any = ()
     time: Any = ()
     axis: str = "x"
     detrend: str | None = "constant"
@@ -187,12 +176,7 @@ class Spectrum(Measurement):
         axis_number(self._of("axis"), self.axis)
         frequency = column(self._of("frequency"), self.frequency)
         values = numbers(self._of("values"), self.values)
-        values = values[:, None] if values.ndim == 1 else values
-        if values.ndim != 2 or len(values) != len(frequency):
-            raise InputError(
-                f"{self._of('values')}: shape {values.shape}: must be ({len(frequency)} "
-                "frequencies, nodes)"
-            )
+        values = self._per_node(values, len(frequency), "frequencies")
         time = column(self._of("time"), self.time)
         sampling_interval(time)
         for name, value in (("frequency", frequency), ("values", values), ("time", time)):
@@ -239,11 +223,7 @@ class Spectrum(Measurement):
 
     def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
         """See `Measurement`."""
-        nodes = self.where(case)
-        if len(nodes) != self.values.shape[1]:
-            raise InputError(
-                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
-            )
+        super().check(case, arguments)
         _within(self._of("time"), self.time, arguments)
 
     def spectra(self, result: Any, case: Case) -> NDArray[np.float64]:

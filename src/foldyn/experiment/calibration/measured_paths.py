@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import Measurement, axis_number, column
+from foldyn.experiment.calibration.measurement import Measurement, NodeValues, axis_number, column
 from foldyn.values import choice, show
 
 IMPOSED = "imposed"
@@ -42,6 +42,7 @@ class ForceDisplacement(Measurement):
     kind: ClassVar[str] = "force_displacement"
     analysis: ClassVar[str] = "statics"
     unit: ClassVar[str] = "N"
+    word: ClassVar[str] = IMPOSED
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -98,7 +99,7 @@ class ForceDisplacement(Measurement):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Shapes(Measurement):
+class Shapes(NodeValues):
     """Displacements or positions of nodes at load factors.
 
     Parameters
@@ -112,7 +113,6 @@ class Shapes(Measurement):
     """
 
     load_factor: Any = ()
-    values: Any = ()
     axes: str = "xyz"
     quantity: str = "displacement"
     kind: ClassVar[str] = "shapes"
@@ -140,14 +140,6 @@ class Shapes(Measurement):
     def observed(self) -> NDArray[np.float64]:
         """See `Measurement`."""
         return self.values[np.isfinite(self.values)]
-
-    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
-        """See `Measurement`."""
-        nodes = self.where(case)
-        if len(nodes) != self.values.shape[1]:
-            raise InputError(
-                f"{self._of('values')}: are of {self.values.shape[1]} nodes, {len(nodes)} are named"
-            )
 
     def factors(self, case: Case) -> NDArray[np.float64]:
         """See `Measurement`."""

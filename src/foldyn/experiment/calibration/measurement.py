@@ -53,11 +53,13 @@ class Measurement(ABC):
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     unit: ClassVar[str] = "m"
+    word: ClassVar[str] = ""  # that selects nodes in a way of its own
 
     def __post_init__(self) -> None:
         """Check what all have."""
         object.__setattr__(self, "name", self.name or self.kind)
-        object.__setattr__(self, "nodes", check_nodes(self.nodes, self._of("nodes")))
+        if not (isinstance(self.nodes, str) and self.nodes == self.word):
+            object.__setattr__(self, "nodes", check_nodes(self.nodes, self._of("nodes")))
         if self.sigma is not None:
             number(self._of("sigma"), self.sigma, above=0.0)
         for key in self.changes:
@@ -86,6 +88,28 @@ class Measurement(ABC):
     def factors(self, case: Case) -> NDArray[np.float64]:
         """Load factors at which a path is needed; none where it is a motion."""
         return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NodeValues(Measurement):
+    """Values of each of the nodes: `values`, its second axis along the nodes."""
+
+    values: Any = ()
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        named, known = len(self.where(case)), self.values.shape[1]
+        if named != known:
+            raise InputError(f"{self._of('values')}: are of {known} nodes, {named} are named")
+
+    def _per_node(self, values: NDArray[np.float64], rows: int, what: str) -> NDArray[np.float64]:
+        """The values of as many rows, a column for each node."""
+        values = values[:, None] if values.ndim == 1 else values
+        if values.ndim != 2 or len(values) != rows:
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be ({rows} {what}, nodes)"
+            )
+        return values
 
 
 def column(name: str, values: Any, length: int | None = None) -> NDArray[np.float64]:

@@ -14,13 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.tracking.corners import CornerSettings, find_corners
 from foldyn.experiment.tracking.films import Film, checked_box, open_film, read_photo
-from foldyn.experiment.tracking.follow import FollowSettings, Step, follow
-from foldyn.experiment.tracking.guide import guide_of
-from foldyn.experiment.tracking.matching import Match, Placing, match_nodes
+from foldyn.experiment.tracking.follow import FollowSettings, Guide, Step, follow
+from foldyn.experiment.tracking.matching import (
+    Match,
+    Placing,
+    by_neighbors,
+    hidden_nodes,
+    match_nodes,
+)
 from foldyn.experiment.tracking.models import Model
 
 Tell = Callable[[int], None]
 
+_GUIDING = 6  # tracked nodes, without which the states of the model tell nothing
 _WHOLE = 0.95  # share of the frames told that a whole film has at least
 
 
@@ -104,7 +110,7 @@ def track_film(
         corners = match.expected[nodes].copy()
         corners[match.node] = match.uv
         unseen = ~np.isin(nodes, match.node)
-    guide = None if match is None or model is None else guide_of(match, model)
+    guide = None if match is None or model is None else _guide_of(match, model)
     steps: list[Step] = []
     frames = _kept(film.frames(), keep := [first])
     for number, step in enumerate(follow(frames, corners, reach, how.following, unseen, guide)):
@@ -206,6 +212,33 @@ def track_photos(
     ds.attrs |= {"source": ", ".join(str(getattr(path, "name", path)) for path in paths)}
     ds.attrs |= {"size": np.array(whole.shape[::-1]), "roi": np.array(box)}
     return _in_metres(ds, model, matches, how)
+
+
+def _guide_of(match: Match, model: Model) -> Guide:
+    """Guide for points of which the first ones are the vertices of the model, in order.
+
+    In each frame the state is taken whose projection lies nearest to the tracked nodes; what it
+    misses them by is carried over to each node from its neighbors. Lost nodes that a panel hides in
+    that state are not to be looked for.
+    """
+    count = model.vertices
+    view = match.view
+    flat = np.array([view.project(state[:count]) for state in model.states])
+    hidden = [hidden_nodes(state, model.triangles, view)[:count] for state in model.states]
+
+    def guide(place: NDArray[np.float64]) -> NDArray[np.float64]:
+        expected = np.full(place.shape, np.nan)
+        known = np.isfinite(place[:count, 0])
+        if known.sum() < _GUIDING:
+            return expected
+        misfit = place[:count][known] - flat[:, known]
+        misfit -= np.median(misfit, axis=1, keepdims=True)
+        nearest = int(np.argmin(np.abs(misfit).mean(axis=(1, 2))))
+        expected[:count] = by_neighbors(place[:count], flat[nearest], np.arange(count))
+        expected[:count][hidden[nearest] & ~known] = np.inf
+        return expected
+
+    return guide
 
 
 def _reach(how: Tracking, shape: tuple[int, ...]) -> float:

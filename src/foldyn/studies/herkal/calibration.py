@@ -19,18 +19,9 @@ import tomli_w
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from foldyn import experiment
 from foldyn.analyses import CaseFile, read_case
 from foldyn.analyses.reading import case_of_document, read_document
-from foldyn.experiment import (
-    Fit,
-    ForceDisplacement,
-    History,
-    Measurement,
-    Parameter,
-    Shapes,
-    Spectrum,
-    fit,
-)
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.key_paths import replaced
 from foldyn.results import save
@@ -44,12 +35,12 @@ DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
 """What the paper found, the truth of the synthetic data."""
 MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
 FOLD_RANGES = (
-    Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
-    Parameter("model.fold_law.theta1", 65.0, 45.0, 100.0),
+    experiment.Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
+    experiment.Parameter("model.fold_law.theta1", 65.0, 45.0, 100.0),
 )
 DAMPING_RANGES = (
-    Parameter("damping.alpha", 10.0, 0.0, 40.0),
-    Parameter("damping.beta", 2e-4, 0.0, 2e-3),
+    experiment.Parameter("damping.alpha", 10.0, 0.0, 40.0),
+    experiment.Parameter("damping.beta", 2e-4, 0.0, 2e-3),
 )
 FULL = 0.056  # m, displacement of the top in the shipped case
 WEIGHTS = (0.125, 0.226, 0.312)  # N
@@ -115,17 +106,17 @@ def weighed(changes: Mapping[str, Any] | None = None) -> NDArray[np.float64]:
     return found
 
 
-def static_data() -> list[Measurement]:
+def static_data() -> list[experiment.Measurement]:
     """Forces at the displacements under the three weights, and the shapes of the front nodes."""
     factors = weighed()
     path = pressed(factors)
     free = FRONT[3:]  # the top is imposed
     return [
-        ForceDisplacement(
+        experiment.ForceDisplacement(
             nodes=TOP, displacement=FULL * factors, force=force_on_top(path),
             sigma=FORCE_ERROR, name="weights", label=SYNTHETIC,
         ),
-        Shapes(
+        experiment.Shapes(
             nodes=free, load_factor=factors, values=path["displacement"].values[:, free],
             sigma=STATIC_ERROR, name="front corners", label=SYNTHETIC,
         ),
@@ -181,14 +172,14 @@ def released_case(
     return path
 
 
-def release_data(case: Path) -> list[Measurement]:
+def release_data(case: Path) -> list[experiment.Measurement]:
     """Histories of node 8, and of all other front nodes held out, as a film has them."""
     motion = read_case(case).run()
     time = np.arange(0.0, SEEN, 1.0 / RATE)
     along = motion["displacement"].sel(axis="x")
     others = tuple(node for node in FRONT if node != WATCHED)
     return [
-        History(
+        experiment.History(
             nodes=nodes, time=time, values=CubicSpline(motion["time"], along[:, list(nodes)])(time),
             axis="x", name=name, label=SYNTHETIC, sigma=FILM_ERROR, held_out=nodes == others,
         )
@@ -196,11 +187,13 @@ def release_data(case: Path) -> list[Measurement]:
     ]  # fmt: skip
 
 
-def noisy(data: Sequence[Measurement], draw: np.random.Generator) -> list[Measurement]:
+def noisy(
+    data: Sequence[experiment.Measurement], draw: np.random.Generator
+) -> list[experiment.Measurement]:
     """Measurements with random errors of the size that they name."""
     result = []
     for one in data:
-        field = "force" if isinstance(one, ForceDisplacement) else "values"
+        field = "force" if isinstance(one, experiment.ForceDisplacement) else "values"
         true = getattr(one, field)
         changed = true + one.sigma * draw.standard_normal(true.shape)
         result.append(replace(one, **{field: changed}))
@@ -217,11 +210,11 @@ def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, 
 
 def calibrate(
     folder: Path,
-    static: Sequence[Measurement] | None = None,
-    film: Sequence[Measurement] | None = None,
+    static: Sequence[experiment.Measurement] | None = None,
+    film: Sequence[experiment.Measurement] | None = None,
     seed: int = 1,
     **how: Any,
-) -> tuple[Fit, Fit]:
+) -> tuple[experiment.Fit, experiment.Fit]:
     """Fit the folds to the static test, then, with these folds, the damping to the release.
 
     Parameters
@@ -250,27 +243,27 @@ def calibrate(
     return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept, **how)
 
 
-def fit_folds(static: Sequence[Measurement], **how: Any) -> Fit:
+def fit_folds(static: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
     """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
-    return fit(find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **how)
+    return experiment.fit(find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **how)
 
 
-def changes_of(folds: Fit) -> dict[str, Any]:
+def changes_of(folds: experiment.Fit) -> dict[str, Any]:
     """What a fit of the folds changes in a case file, by key."""
     return folds.problem.space.changes([*folds.values.values()])
 
 
-def fit_damping(case: Path, film: Sequence[Measurement], **how: Any) -> Fit:
+def fit_damping(case: Path, film: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
     """Fit alpha and beta to a release."""
-    return fit(case, film, DAMPING_RANGES, **how)
+    return experiment.fit(case, film, DAMPING_RANGES, **how)
 
 
-def spectra_of(film: Sequence[Measurement]) -> list[Spectrum]:
+def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectrum]:
     """Spectra of the histories in which no sample is missing, held out."""
     return [
-        Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
+        experiment.Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
         for one in film
-        if isinstance(one, History) and np.isfinite(one.values).all()
+        if isinstance(one, experiment.History) and np.isfinite(one.values).all()
     ]
 
 

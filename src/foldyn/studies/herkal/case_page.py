@@ -135,10 +135,3 @@ def _modes(study: Study, case: str) -> Table:
         f"at rest: taken for turns of {SECANT:g} degree.",
         digits=2,
     )
-
-
-def _partner(frequency: float, deviation: float, mac: float) -> str:
-    """A mode beside that of the shell, on one line."""
-    if not math.isfinite(frequency):
-        return "none"
-    return f"{frequency:.3g} ({100 * deviation:+.0f} %, {mac:.2f})".replace(" ", NO_BREAK)

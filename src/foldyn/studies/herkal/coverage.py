@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from foldyn.experiment import Fit, fit
-from foldyn.studies import find_case
+from foldyn.experiment import Fit
 from foldyn.studies.herkal import calibration
 
 STORED = Path(__file__).with_name("coverage.json")
@@ -27,45 +25,20 @@ DRAWS = 100
 SEED = 20_000
 
 
-@dataclass(frozen=True)
-class Interval:
-    """An estimate of one draw.
-
-    Attributes
-    ----------
-    value, lower, upper : float
-    """
-
-    value: float
-    lower: float
-    upper: float
-
-    def contains(self, truth: float) -> bool:
-        """Whether the truth lies within."""
-        return self.lower <= truth <= self.upper
-
-
-def intervals(
-    fitted: Callable[[np.random.Generator], Fit], draws: int
-) -> dict[str, list[Interval]]:
-    """Intervals of all parameters over draws of the noise."""
-    found: dict[str, list[Interval]] = {}
-    for number in range(draws):
-        for one in fitted(np.random.default_rng(SEED + number)).estimates:
-            found.setdefault(one.key, []).append(Interval(one.value, one.lower, one.upper))
-    return found
-
-
-def summary(found: Mapping[str, Sequence[Interval]], truth: Mapping[str, float]) -> dict[str, Any]:
+def summary(
+    fitted: Callable[[np.random.Generator], Fit], draws: int, truth: Mapping[str, float]
+) -> dict[str, Any]:
     """Counts of the intervals that contain the truth, and how far off the estimates are."""
+    fits = [fitted(np.random.default_rng(SEED + number)) for number in range(draws)]
     told = {}
-    for key, some in found.items():
+    for key in truth:
+        some = [one[key] for one in fits]
         values = np.array([one.value for one in some])
         width = np.mean([0.5 * (one.upper - one.lower) for one in some])
         told[key] = {
             "truth": truth[key],
             "draws": len(some),
-            "contained": sum(one.contains(truth[key]) for one in some),
+            "contained": sum(one.lower <= truth[key] <= one.upper for one in some),
             "mean": float(values.mean()),
             "standard_deviation": float(values.std(ddof=1)) if len(some) > 1 else None,
             "largest_error": float(np.abs(values - truth[key]).max()),
@@ -79,28 +52,21 @@ def summary(found: Mapping[str, Sequence[Interval]], truth: Mapping[str, float])
 
 def folds(draws: int, folder: Path) -> dict[str, Any]:
     """Coverage of the fit of the folds."""
-    data, case = calibration.static_data(), find_case("herkal/specimen")
-    found = intervals(
-        lambda draw: fit(
-            case, calibration.noisy(data, draw), calibration.FOLD_RANGES,
-            ties=calibration.MIRRORED, folder=folder,
-        ),
-        draws,
+    data, noisy = calibration.static_data(), calibration.noisy
+    return summary(
+        lambda draw: calibration.fit_folds(noisy(data, draw), folder=folder),
+        draws, calibration.FOLDS,
     )  # fmt: skip
-    return summary(found, calibration.FOLDS)
 
 
 def damping(draws: int, folder: Path) -> dict[str, Any]:
     """Coverage of the fit of the damping to node 8 alone."""
-    case = calibration.released_case(folder)
+    case, noisy = calibration.released_case(folder), calibration.noisy
     data = calibration.release_data(case)[:1]
-    found = intervals(
-        lambda draw: fit(
-            case, calibration.noisy(data, draw), calibration.DAMPING_RANGES, folder=folder
-        ),
-        draws,
-    )
-    return summary(found, calibration.DAMPING)
+    return summary(
+        lambda draw: calibration.fit_damping(case, noisy(data, draw), folder=folder),
+        draws, calibration.DAMPING,
+    )  # fmt: skip
 
 
 def stored() -> dict[str, Any]:

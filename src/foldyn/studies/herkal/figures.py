@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from matplotlib.figure import Figure
 
 from foldyn.plots import style
 from foldyn.studies.herkal.models import label
 from foldyn.studies.herkal.variations import Variations
-
-if TYPE_CHECKING:
-    import xarray
 
 WIDTH, HEIGHT = 9.0, 3.4  # inches
 

@@ -7,16 +7,13 @@ shell's spectrum; then the mean over the nodes that the case reports.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import sampling_interval, spectrum
-
-if TYPE_CHECKING:
-    import xarray
 
 UP_TO = 5.0  # Hz
 AXES = ("x", "y", "z")

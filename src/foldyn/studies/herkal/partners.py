@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.linear import mac, pair_modes
-
-if TYPE_CHECKING:
-    import xarray
 
 LEAST_MAC = 0.5  # below which modes are no partners,
 FAR = 2.0  # nor where their frequencies are this many times apart

@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+import xarray
 
 from foldyn.analyses import CaseFile, read_case
 from foldyn.cases import Case
@@ -21,9 +23,6 @@ from foldyn.store import Store
 from foldyn.studies import find_case
 from foldyn.studies.herkal.models import REFERENCE, Variant, case_with
 from foldyn.studies.herkal.program import program
-
-if TYPE_CHECKING:
-    import xarray
 
 SETTINGS = "study_settings"
 EVERY = 0.01  # s, between samples where the case file does not say

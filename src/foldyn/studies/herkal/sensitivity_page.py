@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.report.album import Album
+from foldyn.studies.herkal import variations
+from foldyn.studies.herkal.case_page import cell
 from foldyn.studies.herkal.claims import paper_table
 from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.metric import best
 from foldyn.studies.herkal.models import OTHERS, label, paper_rules, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
-from foldyn.studies.herkal.variations import (
-    FILED,
-    Likeness,
-    Row,
-    Variations,
-    frequency_errors,
-    likeness,
-    standings,
-)
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
 TURNED = next(iter(OTHERS))
@@ -37,7 +29,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
 """One thing at a time."""
 
 
-def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:
+def sections(found: variations.Variations, album: Album, tolerance: float) -> list[Section]:
     """Text, tables and a figure; nothing where no case was computed as filed."""
     if not found.filed():
         return []
@@ -67,7 +59,7 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
     ]
 
 
-def opinion(found: Variations) -> str:
+def opinion(found: variations.Variations) -> str:
     """Say from the numbers how far a ranking reaches."""
     parts = []
     paper, names = paper_table(), paper_rules()
@@ -76,7 +68,7 @@ def opinion(found: Variations) -> str:
         if not rows:
             continue
         hits = sum(best({m: r[m] for m in names}) == best(paper[r["case"]]) for r in rows)
-        told = standings(rows, names)
+        told = variations.standings(rows, names)
         first = min(told, key=lambda m: told[m].mean_rank)
         worst = max(one.worst_rank for one in told.values())
         spared = [label(m) for m, one in told.items() if one.worst_rank < worst]
@@ -94,7 +86,7 @@ def opinion(found: Variations) -> str:
     return " ".join(parts)
 
 
-def one_at_a_time(found: Variations, tolerance: float) -> Table:
+def one_at_a_time(found: variations.Variations, tolerance: float) -> Table:
     """How near the table comes to the paper's, and how far it moves, with one thing changed."""
     names = paper_rules()
     filed = found.filed()
@@ -103,8 +95,8 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
         table = found.filed(**change)
         if not table:
             continue
-        paper = likeness(table, paper_table(), names, tolerance)
-        moved = likeness(table, filed, names, tolerance)
+        paper = variations.likeness(table, paper_table(), names, tolerance)
+        moved = variations.likeness(table, filed, names, tolerance)
         rows.append([what, *_beside_paper(paper), *(_moved(moved) if change else [None, None])])
     return Table(
         ["what is changed", f"numbers within {tolerance:.0%} of the paper's",
@@ -118,27 +110,27 @@ def one_at_a_time(found: Variations, tolerance: float) -> Table:
     )  # fmt: skip
 
 
-def _beside_paper(one: Likeness) -> list[Any]:
+def _beside_paper(one: variations.Likeness) -> list[Any]:
     cases = one.of // len(paper_rules())
     return [f"{one.within} of {one.of}", f"{one.same_best} of {cases}", f"{one.correlation:+.2f}"]
 
 
-def _moved(one: Likeness) -> list[Any]:
+def _moved(one: variations.Likeness) -> list[Any]:
     return [round(100.0 * one.median), round(100.0 * one.largest)]
 
 
-def _first(row: Row | None) -> str | None:
+def _first(row: variations.Row | None) -> str | None:
     if row is None:
         return None
     name = best({m: row[m] for m in paper_rules()})
     return f"{label(name)} ({row[name]:.2g})"
 
 
-def _cases(found: Variations) -> list[str]:
+def _cases(found: variations.Variations) -> list[str]:
     return list(found.filed())
 
 
-def by_load(found: Variations) -> Table:
+def by_load(found: variations.Variations) -> Table:
     """Which of the five is best under which load, bars and hinges as filed."""
     rows = []
     for loads, told in LOADED.items():
@@ -146,7 +138,9 @@ def by_load(found: Variations) -> Table:
             tables = {
                 row["case"]: row
                 for row in found.chosen(
-                    pulse=pulse, loads=loads, **{k: FILED[k] for k in ("bend_law", "calibration")}
+                    pulse=pulse,
+                    loads=loads,
+                    **{k: variations.FILED[k] for k in ("bend_law", "calibration")},
                 )
             }
             rows.append([told, pulse, *[_first(tables.get(case)) for case in _cases(found)]])
@@ -160,7 +154,7 @@ def by_load(found: Variations) -> Table:
     )
 
 
-def by_stiffness(found: Variations) -> Table:
+def by_stiffness(found: variations.Variations) -> Table:
     """Which of the five is best with which bends, load as filed."""
     rows = []
     for law in BEND_LAWS:
@@ -176,10 +170,10 @@ def by_stiffness(found: Variations) -> Table:
     )
 
 
-def over_all(found: Variations, law: str) -> Table:
+def over_all(found: variations.Variations, law: str) -> Table:
     """Standing of each distribution over all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
-    five, every = standings(chosen, paper_rules()), standings(chosen, rules())
+    five, every = variations.standings(chosen, paper_rules()), variations.standings(chosen, rules())
     rows: list[list[Any]] = []
     for model in rules():
         own, among = five.get(model), every[model]
@@ -196,7 +190,7 @@ def over_all(found: Variations, law: str) -> Table:
     )  # fmt: skip
 
 
-def orientations(found: Variations) -> Table:
+def orientations(found: variations.Variations) -> Table:
     """Equi-inertial both ways."""
     rows = []
     for case in _cases(found):
@@ -215,7 +209,7 @@ def orientations(found: Variations) -> Table:
     )  # fmt: skip
 
 
-def frequencies(found: Variations) -> Table:
+def frequencies(found: variations.Variations) -> Table:
     """Errors of the first frequencies, which no load has a part in."""
     names = (*rules(), TURNED)
     columns: list[tuple[str, dict[str, float], int]] = []
@@ -226,9 +220,9 @@ def frequencies(found: Variations) -> Table:
                 for row in found.frequencies
                 if row["bend_law"] == law and row["calibration"] == calibration
             ]
-            means, count = frequency_errors(chosen, names)
+            means, count = variations.frequency_errors(chosen, names)
             columns.append((f"{law}, {calibration}", means, count))
-    rows = [[label(m), *[_percent(means[m]) for _, means, _ in columns]] for m in names]
+    rows = [[label(m), *[cell(100.0 * means[m]) for _, means, _ in columns]] for m in names]
     return Table(
         ["distribution", *[title for title, _, _ in columns]],
         rows,
@@ -239,7 +233,3 @@ def frequencies(found: Variations) -> Table:
         "no stiffness at rest, are taken for turns of 1 degree.",
         digits=2,
     )
-
-
-def _percent(value: float) -> float | None:
-    return 100.0 * value if math.isfinite(value) else None

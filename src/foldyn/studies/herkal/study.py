@@ -6,24 +6,22 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile, read_case
 from foldyn.studies import find_case
-from foldyn.studies.herkal.metric import UP_TO, errors, ranks
+from foldyn.studies.herkal import metric
 from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of, rules
+from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.partners import Partners, partners
 from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, stored
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
-
-if TYPE_CHECKING:
-    import xarray
 
 CASES = ("case1", "case2", "case3", "case4")
 RESULTS = "runs"  # folder of the results in that of the study
@@ -143,8 +141,8 @@ class Study:
         motion = self.result(case, model, "motion", variant)
         if reference is None or motion is None:
             return None
-        up_to = self.case_file(case).output.max_frequency or UP_TO
-        return errors(motion, reference, nodes, axis, up_to)
+        up_to = self.case_file(case).output.max_frequency or metric.UP_TO
+        return metric.errors(motion, reference, nodes, axis, up_to)
 
     def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
         """The paper's metric, nan where a motion is missing."""
@@ -187,5 +185,38 @@ class Study:
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
     """Mean rank over the cases, each ranked among the given models alone."""
     names = list(models)
-    each = [ranks({m: row[m] for m in names if m in row}) for row in table.values()]
+    each = [metric.ranks({m: row[m] for m in names if m in row}) for row in table.values()]
     return {m: float(np.mean([r.get(m, np.nan) for r in each])) for m in names if each}
+
+
+def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
+    """Divisions of the finest stored motion of OpenSees and the errors against it, by case.
+
+    Cases without one, or with one of another length than the study's motions, are left out.
+    """
+    found = {}
+    for case in study.plan.cases:
+        for divisions, dt in reversed(stored_motions(case)):
+            row = _second_row(study, case, divisions, dt)
+            if row:
+                found[case] = divisions, row
+                break
+    return found
+
+
+def _second_row(study: Study, case: str, divisions: int, dt: float) -> dict[str, float]:
+    nodes, axis = study.reported(case)
+    theirs = read_motion(case, divisions, dt)
+    if theirs.node.tolist() != nodes:
+        return {}
+    up_to = study.case_file(case).output.max_frequency or metric.UP_TO
+    moved = theirs.displacement[:, :, metric.AXES.index(axis)]
+    reference = metric.content_of(theirs.time, moved, up_to)[1]
+    row = {}
+    for model in study.plan.models:
+        motion = study.result(case, model, "motion")
+        if motion is None or len(motion["time"]) != len(theirs.time):
+            return {}
+        ours = metric.content(motion, nodes, axis, up_to)[1]
+        row[model] = float(np.mean(metric.deviation(ours, reference)))
+    return row

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
 
 from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics import simulate
@@ -16,9 +18,6 @@ from foldyn.linear import character, frf, modes, peaks_of
 from foldyn.signals import LogDecrement, log_decrement
 from foldyn.studies.herkal.calibration import WATCHED, peak, shipped
 from foldyn.studies.targets import Verdict, read_targets, verdicts
-
-if TYPE_CHECKING:
-    import xarray
 
 TARGETS = Path(__file__).with_name("targets.toml")
 CORNER, TOP = 0, 3  # top nodes at a corner and in the middle

@@ -22,16 +22,8 @@ from foldyn.linear import modes
 from foldyn.statics import trace
 from foldyn.studies import find_case
 from foldyn.studies.herkal.models import REFERENCE, case_with
+from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.run import DT, SAMPLES
-from foldyn.studies.herkal.opensees.stored import (
-    CASES,
-    Moved,
-    Still,
-    read_motion,
-    read_still,
-    stored_divisions,
-    stored_motions,
-)
 
 COUNT = 5  # frequencies
 
@@ -42,12 +34,12 @@ def our_case(name: str, divisions: int) -> tuple[CaseFile, Case]:
     return case_file, case_with(case_file, REFERENCE, divisions=divisions)
 
 
-def our_still(name: str, divisions: int) -> Still:
+def our_still(name: str, divisions: int) -> stored.Still:
     """Statics and frequencies of a case study with our shell."""
     case_file, case = our_case(name, divisions)
     path = trace(case, steps=4)
     unloaded = replace(case, loads=())
-    return Still(
+    return stored.Still(
         node=case_file.output.nodes,
         load_factor=path.load_factor.values,
         displacement=path.displacement.sel(node=case_file.output.nodes).values,
@@ -56,7 +48,7 @@ def our_still(name: str, divisions: int) -> Still:
     )
 
 
-def our_motion(name: str, divisions: int, dt: float, duration: float | None = None) -> Moved:
+def our_motion(name: str, divisions: int, dt: float, duration: float | None = None) -> stored.Moved:
     """Motion of a case study with our shell, sampled like those of OpenSees.
 
     Its duration (s) is by default that of the case file.
@@ -64,7 +56,7 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
     case_file, case = our_case(name, divisions)
     whole = case_file.analysis.arguments["duration"]
     motion = simulate(case, duration or whole, method="newmark", dt=dt, every=SAMPLES)
-    return Moved(
+    return stored.Moved(
         node=case_file.output.nodes,
         time=motion.time.values,
         displacement=motion.displacement.sel(node=case_file.output.nodes).values,
@@ -72,7 +64,7 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
     )
 
 
-def away(still: Still, reference: Still) -> tuple[float, NDArray]:
+def away(still: stored.Still, reference: stored.Still) -> tuple[float, NDArray]:
     """Relative differences of the static displacements at full load and of the frequencies.
 
     The first is the largest of all nodes: distance over displacement.
@@ -82,7 +74,7 @@ def away(still: Still, reference: Still) -> tuple[float, NDArray]:
     return float(apart.max()), still.frequency / reference.frequency - 1.0
 
 
-def motion_away(motion: Moved, reference: Moved) -> float:
+def motion_away(motion: stored.Moved, reference: stored.Moved) -> float:
     """Relative difference of two motions: L2 over time, nodes and axes."""
     shared = np.isin(np.round(reference.time, 6), np.round(motion.time, 6))
     wanted = reference.displacement[shared]
@@ -104,7 +96,7 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.2f}"
 
 
-def still_row(still: Still, references: Sequence[Still]) -> list[str]:
+def still_row(still: stored.Still, references: Sequence[stored.Still]) -> list[str]:
     """Values and, in percent, how far they are from those of references.
 
     Of frequencies, that is the difference of the worst of the first three and of all.
@@ -124,7 +116,9 @@ def still_row(still: Still, references: Sequence[Still]) -> list[str]:
     return row
 
 
-def still_table(found: Iterable[Sequence[Still]], references: Sequence[Sequence[Still]]) -> str:
+def still_table(
+    found: Iterable[Sequence[stored.Still]], references: Sequence[Sequence[stored.Still]]
+) -> str:
     """Results of each case from coarse to fine, with their distances from the references.
 
     A list of references has one for each case, in the same order.
@@ -139,7 +133,9 @@ def still_table(found: Iterable[Sequence[Still]], references: Sequence[Sequence[
     return table(head, rows)
 
 
-def motion_table(found: Iterable[Sequence[Moved]], references: Sequence[Sequence[Moved]]) -> str:
+def motion_table(
+    found: Iterable[Sequence[stored.Moved]], references: Sequence[Sequence[stored.Moved]]
+) -> str:
     """The same of motions."""
     head = ["case", "divisions", "step, s", *["off, %"] * len(references)]
     rows = [
@@ -157,13 +153,13 @@ def motion_table(found: Iterable[Sequence[Moved]], references: Sequence[Sequence
 def main(arguments: list[str] | None = None) -> int:
     """Print what the command line asks for."""
     parser = argparse.ArgumentParser(description="Our shell beside OpenSees.")
-    parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
+    parser.add_argument("--cases", nargs="+", choices=stored.CASES, default=stored.CASES)
     parser.add_argument("--divisions", type=int, nargs="*", default=[16], help="of our shell")
     parser.add_argument("--motion", type=int, nargs="*", default=[], help="the same for motions")
     parser.add_argument("--dt", type=float, default=DT, help="time step of our motions, s")
     chosen = parser.parse_args(arguments)
     cases = chosen.cases
-    theirs = [[read_still(name, n) for n in stored_divisions(name)] for name in cases]
+    theirs = [[stored.read_still(name, n) for n in stored.stored_divisions(name)] for name in cases]
     finest = [stills[-1] for stills in theirs]
     print("OpenSees, and its distance from its finest mesh\n")
     print(still_table(theirs, [finest]), end="\n\n", flush=True)
@@ -172,8 +168,10 @@ def main(arguments: list[str] | None = None) -> int:
         print("Our shell, its distance from its finest mesh and from the finest of OpenSees\n")
         print(still_table(ours, [[s[-1] for s in ours], finest]), end="\n\n", flush=True)
 
-    cases = [name for name in cases if stored_motions(name)]
-    moved = [[read_motion(name, *one) for one in stored_motions(name)] for name in cases]
+    cases = [name for name in cases if stored.stored_motions(name)]
+    moved = [
+        [stored.read_motion(name, *one) for one in stored.stored_motions(name)] for name in cases
+    ]
     print("Motions of OpenSees, and their distance from the finest\n")
     best = [motions[-1] for motions in moved]
     print(motion_table(moved, [best]), end="\n\n", flush=True)

@@ -17,25 +17,18 @@ from typing import Any
 from foldyn.analyses import CaseFile, read_case
 from foldyn.errors import FoldynError
 from foldyn.studies import find_case
+from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.model import PanelShells
-from foldyn.studies.herkal.opensees.stored import (
-    CASES,
-    RESULTS,
-    Moved,
-    Still,
-    write_motion,
-    write_still,
-)
 
 DT = 0.005  # s
 SAMPLES = 0.01  # s, between those that are stored
 
 
-def still(name: str, divisions: int) -> Still:
+def still(name: str, divisions: int) -> stored.Still:
     """Statics under the loads of a case, and its frequencies at rest."""
     case_file, shells = _shells(name, divisions)
     path, node = shells.path(), case_file.output.nodes
-    return Still(
+    return stored.Still(
         node=node,
         load_factor=path.at,
         displacement=path.displacement[:, node],
@@ -44,13 +37,13 @@ def still(name: str, divisions: int) -> Still:
     )
 
 
-def motion(name: str, divisions: int, dt: float) -> Moved:
+def motion(name: str, divisions: int, dt: float) -> stored.Moved:
     """Motion of a case for as long as its file says."""
     case_file, shells = _shells(name, divisions)
     duration, node = case_file.analysis.arguments["duration"], case_file.output.nodes
     found = shells.motion(duration, dt, every=max(1, round(SAMPLES / dt)))
     about = {"dt": dt, "iterations": found.iterations, "seconds": found.seconds}
-    return Moved(
+    return stored.Moved(
         node=node,
         time=found.at,
         displacement=found.displacement[:, node],
@@ -76,20 +69,20 @@ def _about(name: str, shells: PanelShells) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> int:
     """Run what the command line says."""
     parser = argparse.ArgumentParser(description="Run cases with OpenSees.")
-    parser.add_argument("cases", nargs="+", choices=CASES)
+    parser.add_argument("cases", nargs="+", choices=stored.CASES)
     parser.add_argument("--divisions", type=int, nargs="+", default=[16])
     parser.add_argument("--motion", action="store_true", help="the motion, not statics")
     parser.add_argument("--dt", type=float, default=DT, help="time step of the motion, s")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results")
+    parser.add_argument("--out", type=Path, default=stored.RESULTS, help="folder of the results")
     chosen = parser.parse_args(arguments)
     chosen.out.mkdir(parents=True, exist_ok=True)
     for divisions in chosen.divisions:
         for name in chosen.cases:
             try:
                 if chosen.motion:
-                    path = write_motion(chosen.out, motion(name, divisions, chosen.dt))
+                    path = stored.write_motion(chosen.out, motion(name, divisions, chosen.dt))
                 else:
-                    path = write_still(chosen.out, still(name, divisions))
+                    path = stored.write_still(chosen.out, still(name, divisions))
             except FoldynError as error:
                 print(error, file=sys.stderr)
                 return 1

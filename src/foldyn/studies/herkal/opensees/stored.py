@@ -64,10 +64,7 @@ def write_still(folder: Path, result: Still) -> Path:
     """Write statics and frequencies; the file is returned."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}.json"
-    arrays = {
-        name: getattr(result, name).tolist()
-        for name in ("node", "load_factor", "displacement", "frequency")
-    }
+    arrays = {name: value.tolist() for name, value in vars(result).items() if name != "about"}
     path.write_text(json.dumps({"about": about, **arrays}, indent=1) + "\n", "utf-8")
     return path
 

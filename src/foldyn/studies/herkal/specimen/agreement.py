@@ -42,14 +42,6 @@ class Vibration:
     frequency: float = math.nan
     damping_ratio: float = math.nan
 
-    @property
-    def cells(self) -> list[float | None]:
-        """For a table: Hz, Hz and per cent."""
-        return [
-            float(v) if math.isfinite(v) else None
-            for v in (self.peak, self.frequency, 100.0 * self.damping_ratio)
-        ]
-
 
 def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
     """Axial vibration of a record of which nothing is missing."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import WATCHED
 from foldyn.studies.herkal.specimen.agreement import content
 from foldyn.studies.herkal.vibration import CORNER, Response
-
-if TYPE_CHECKING:
-    import xarray
 
 WIDTH = 9.0  # inches
 COLUMNS = 3  # front nodes of a row of the pattern
@@ -57,8 +54,7 @@ def _grid(
     note: str,
 ) -> Figure:
     rows = -(-len(curves) // COLUMNS)
-    figure = style.new_figure(WIDTH, 0.8 + 1.15 * rows)
-    style.title_above(figure, note)
+    figure = style.new_figure(WIDTH, 0.8 + 1.15 * rows, note)
     frames = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey="row").ravel()
     lines = []
     for k, (frame, (node, (along, film, model))) in enumerate(
@@ -79,8 +75,7 @@ def _grid(
 
 def plot_supports(front: xarray.Dataset, label: str, note: str) -> Figure:
     """Draw the watched node of the film and of the model with each support, and their spectra."""
-    figure = style.new_figure(WIDTH, 3.6)
-    style.title_above(figure, note)
+    figure = style.new_figure(WIDTH, 3.6, note)
     left, right = figure.subplots(1, 2)
     style.frame(left, "time (s)", "x displacement (mm)", f"node {WATCHED}")
     style.frame(right, "frequency (Hz)", "x amplitude (mm)")
@@ -110,8 +105,7 @@ def plot_responses(
     responses: Mapping[str, xarray.Dataset], peaks: Sequence[float], note: str
 ) -> Figure:
     """Draw the size of responses of a corner of the top along x, and the paper's peaks."""
-    figure = style.new_figure(7.0, 3.8)
-    style.title_above(figure, note)
+    figure = style.new_figure(7.0, 3.8, note)
     axes = figure.subplots()
     style.frame(axes, "frequency (Hz)", "receptance (mm/N)", f"node {CORNER} along x")
     for k, (name, found) in enumerate(responses.items()):

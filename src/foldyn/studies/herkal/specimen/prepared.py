@@ -12,17 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn import signals
 from foldyn.errors import InputError
 from foldyn.experiment import History
-from foldyn.signals import (
-    fill_gaps,
-    first_turning_point,
-    remove_trend,
-    sampling_interval,
-    subtract_final,
-)
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
-from foldyn.studies.herkal.specimen.release import release_of
 
 GAP = 1 / 30  # s, of a gap that is filled: a third of a period
 SLOWEST = 60.0  # frames per second
@@ -30,6 +23,11 @@ SLACK = 0.015  # s, by which the instant of the release may be wrong
 SETTLED = 0.1  # part of the record over which the final position is averaged
 ROUNDED = 0.01  # part of an interval by which a time may be rounded
 FEWEST = 0.5  # part of the frames in which a node must have been measured
+HELD = 0.0125  # s, for which it must have been still before
+AVERAGED = 0.05  # s, over which the held position is averaged
+STILL = 0.05  # part of its way by which it may wander while it is held
+SLOW = 0.1  # part of its largest speed below which it has not been let go yet
+ENOUGH = 8  # frames in which the watched node must have been measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +83,50 @@ def numbers_of(history: History) -> list[int]:
     return np.ravel(history.nodes).astype(int).tolist()
 
 
+def _release_of(x: NDArray[np.float64], step: float, name: str) -> tuple[int, int]:
+    """Find the release: where the fastest motion of a record begins.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Record of a node, NaN where it was lost.
+    step : float
+        Sampling interval (s).
+    name : str
+        Of the record, for messages.
+
+    Returns
+    -------
+    first, released : int
+        Samples between which the node is held: since when it has been still, and the last one
+        before it is let go.
+
+    Raises
+    ------
+    InputError
+        Too few samples, or the node is not still before it moves.
+    """
+    known = np.flatnonzero(np.isfinite(x))
+    if known.size < ENOUGH:
+        raise InputError(f"{name} was measured in {known.size} frames; at least {ENOUGH} needed")
+    speed = np.diff(x[known]) / np.diff(known)
+    k = int(np.argmax(np.abs(speed)))
+    least, sign = SLOW * abs(speed[k]), np.sign(speed[k])
+    while k > 0 and sign * speed[k - 1] > least:
+        k -= 1
+    released = int(known[k])
+    wander = np.abs(x[: released + 1] - x[released])
+    moving = np.flatnonzero(wander > STILL * np.abs(x[known[k:]] - x[released]).max())
+    first = max(int(moving[-1]) + 1 if moving.size else 0, released - round(AVERAGED / step))
+    if (released - first) * step < HELD:
+        raise InputError(
+            f"{name} is not still for {HELD:g} s before it moves fastest, {released * step:.3g} s "
+            "after the beginning: so the press before the release is unknown; give a film that "
+            "begins while the specimen is held"
+        )
+    return first, released
+
+
 def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[np.float64]:
     """Part of a record with short gaps filled; NaN where it was lost for longer."""
     known = np.flatnonzero(np.isfinite(x))
@@ -95,7 +137,7 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     inside = known[(known >= first) & (known <= last)]
     if np.diff(inside).max() - 1 > gap:
         return np.full(stop - start, np.nan)
-    return fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
+    return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
 def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
@@ -125,7 +167,7 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
             f"10 Hz; {SLOWEST:g} are needed"
         )
     gap = round(GAP / step)
-    held, released = release_of(measured.values[:, column], step, name)
+    held, released = _release_of(measured.values[:, column], step, name)
     stop = min(len(time), released + 1 + round(SEEN / step))
     window = measured.values[released:stop]
     first, swing = _known(window[:, column], name, gap)
@@ -147,14 +189,14 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
     whole -= final
     before = _mean(measured.values[held : released + 1, seen]) - final
     shown = swing[turn - first :]
-    resting = subtract_final(shown, SETTLED)
+    resting = signals.subtract_final(shown, SETTLED)
     since = time - time[released]
     steps = {
         "as tracked": (since, measured.values[:, column]),
         "from the release on": (since[released:stop], window[:, column]),
         "from the first turning point on": (times, shown),
         "less its final position": (times, resting),
-        "without the line of best fit": (times, remove_trend(resting)),
+        "without the line of best fit": (times, signals.remove_trend(resting)),
     }
     return FreeVibration(history, whole, before, float(time[released]), steps)
 
@@ -163,14 +205,14 @@ def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Times at one interval, where they differ from it by what tables round off only."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
-        sampling_interval(time)  # says what is wrong
+        signals.sampling_interval(time)  # says what is wrong
     return even
 
 
 def _turn(swing: NDArray[np.float64], name: str) -> int:
     """Index of the first turning point."""
     try:
-        return first_turning_point(swing)
+        return signals.first_turning_point(swing)
     except InputError:
         raise InputError(
             f"{name} does not swing back after it moved fastest: no release, or one that is damped "
@@ -188,7 +230,7 @@ def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np
             f"{name} was lost for more than {gap} frames while it swings; light the specimen "
             "better, or film it from nearer"
         )
-    return first, fill_gaps(x[first : last + 1], gap)
+    return first, signals.fill_gaps(x[first : last + 1], gap)
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,17 +12,15 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn import experiment
 from foldyn.analyses import read_case
 from foldyn.studies.herkal import calibration
-
-if TYPE_CHECKING:
-    import xarray
 
 SOFTER = {"sheet.youngs_modulus": 0.97 * 1.219e9}  # Pa: 3 % softer than the model
 OTHERWISE: Mapping[str, Any] = {**SOFTER, "model.mass": "consistent"}  # the model: circumcenter
