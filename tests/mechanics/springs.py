@@ -23,6 +23,7 @@ from foldyn.mechanics.blocks import SparseBlocks
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.threads import Team, team
+from foldyn.structures.discretized import Discretized
 
 
 class Springs(NamedTuple):
@@ -140,7 +141,7 @@ class NoOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Net:
+class Net(Discretized):
     """A structure of points and springs: what a case holds."""
 
     nodes: NDArray
@@ -149,17 +150,13 @@ class Net:
     node_mass: NDArray
     sheet = fd.Sheet(1.0, 0.0, 1.0)
     options = NoOptions()
+    kind = "springs"
     pattern = None
     folds = np.zeros((0, 4), np.int64)
     fold_rest = np.zeros(0)
     fold_law = hinge_law("linear")
     energy_groups = {"strain_springs": "strain energy of the springs"}  # noqa: RUF012
     fill = Fill(1000.0, 100, "net", "take fewer springs")
-    massless = ""
-
-    @cached_property
-    def bar_length(self) -> NDArray:
-        return np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
 
     @cached_property
     def mass(self) -> sparse.csr_array:

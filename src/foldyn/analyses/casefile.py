@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -78,6 +79,8 @@ class Analysis(ABC):
         Figures and animations that its page comes with.
     needs_density : str
         Beginning of a message, "a motion needs"; "" where it does without.
+    takes : sequence of str
+        Names of the arguments that may take the place of the file's.
     arguments : dict
         Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
     """
@@ -86,6 +89,7 @@ class Analysis(ABC):
     schema: ClassVar[type[CaseSchema]]
     files: ClassVar[tuple[str, ...]]
     needs_density: ClassVar[str]
+    takes: ClassVar[Sequence[str]]
 
     def __init__(self, arguments: dict[str, Any]) -> None:
         self.arguments = arguments
@@ -134,6 +138,12 @@ def driven_nodes(case: Case, groups: Sequence[tuple[str, Any]]) -> NDArray[np.in
     """Nodes of several selections, each with the key that names it."""
     found = [resolve_nodes(case.structure, nodes, key) for key, nodes in groups]
     return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
+
+
+def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Names of the arguments of an analysis' function, but for what `run` itself gives."""
+    own = {"case", "progress", "options"}
+    return tuple(name for name in signature(function).parameters if name not in own)
 
 
 def counted(number: int, what: str) -> str:
@@ -284,6 +294,8 @@ class Computation:
 
     def __init__(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> None:
         self.case_file, self.mass = case_file, mass
+        for name in changes:
+            choice("run: argument", name, case_file.analysis.takes)
         self.file = f"result-{mass}.nc" if len(case_file.masses) > 1 else "result.nc"
         with case_file.placing(mass):
             self.compute = case_file.analysis.prepare(case_file, mass, changes)

@@ -14,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, create_model, model_validator
 
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, driven_nodes, movable
+from foldyn.analyses.casefile import (
+    Analysis,
+    Begun,
+    CaseFile,
+    Compute,
+    arguments_of,
+    driven_nodes,
+    movable,
+)
 from foldyn.analyses.frf_page import frf_page
 from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
@@ -185,6 +193,7 @@ class FrfAnalysis(Analysis):
     kind = "frf"
     schema = FrfSchema
     needs_density = "a frequency response needs"
+    takes = (*arguments_of(frf), *OPTIONS)
     files = ("response.png", "nyquist.png")
 
     @classmethod

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from foldyn import plots
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
 from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
@@ -80,6 +80,7 @@ class ModesAnalysis(Analysis):
     kind = "modes"
     schema = ModesSchema
     needs_density = "modes need"
+    takes = arguments_of(modes)
     files = ("modes.png", "mac.png", "modes.gif", "modes.mp4")
 
     @classmethod

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
 from foldyn.analyses.sections import (
     AXES,
     Animation,
@@ -103,6 +103,7 @@ class MotionAnalysis(Analysis):
     kind = "dynamics"
     schema = MotionSchema
     needs_density = "a motion needs"
+    takes = arguments_of(prepare)
     files = ("load.png", "motion.png", "energies.png")
 
     @classmethod

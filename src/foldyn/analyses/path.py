@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.path_page import path_page
 from foldyn.analyses.sections import (
     DIRECTIONS,
@@ -177,6 +177,7 @@ class PathAnalysis(Analysis):
         "path.gif", "path.mp4",
     )  # fmt: skip
     needs_density = ""
+    takes = arguments_of(trace)
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:

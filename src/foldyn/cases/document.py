@@ -23,14 +23,13 @@ from foldyn.cases.decode import law_from
 from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.loads import load_from
-from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
+from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.part import Load
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
-from foldyn.shells import Shell
-from foldyn.structures import Sheet, Structure, discretize
+from foldyn.structures import Sheet, discretize
 from foldyn.values import plain
 
 LAWS: Mapping[str, Mapping[str, type]] = {
@@ -113,7 +112,7 @@ class _Writer:
                 for f in dataclasses.fields(structure.sheet)
                 if (value := getattr(structure.sheet, f.name)) is not None
             },
-            "model": self._model(structure.options) | _kind(structure),
+            "model": self._model(structure),
             "damping": dataclasses.asdict(case.damping),
             "supports": [self._part(support) for support in case.supports],
             "loads": [self._part(load) for load in case.loads],
@@ -144,8 +143,9 @@ class _Writer:
             "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
         }
 
-    def _model(self, options: Any) -> dict[str, Any]:
+    def _model(self, structure: Any) -> dict[str, Any]:
         section: dict[str, Any] = {}
+        options = structure.options
         for option in dataclasses.fields(options):
             name, value = option.name, getattr(options, option.name)
             if value is None:
@@ -157,6 +157,8 @@ class _Writer:
                 section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
             else:
                 section[name] = value
+        if structure.kind != BARS_AND_HINGES:
+            section["kind"] = structure.kind
         return section
 
     def _law(self, name: str, law: Any) -> Any:
@@ -222,10 +224,6 @@ def _read(sections: Mapping[str, Any]) -> Case:
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
 
 
-def _kind(structure: Any) -> dict[str, str]:
-    return {"kind": SHELL} if isinstance(structure, Shell) else {}
-
-
 def _structure(sections: Mapping[str, Any]) -> Any:
     table = sections["pattern"]
     flat = table["faces"].tolist()
@@ -241,8 +239,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
         sheet = Sheet(**sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
-        pieces = model.get("divisions", 1) if kind == SHELL else 1
-        least = len(pattern.vertices) + len(pattern.edges) * (pieces - 1)
+        least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
         if least > len(nodes):  # before a mesh of any size is made
             raise InputError(
                 f"the result holds rest positions of {len(nodes)} nodes, its structure has at "
@@ -254,9 +251,9 @@ def _structure(sections: Mapping[str, Any]) -> Any:
                 f"the result holds rest positions of shape {nodes.shape}, its structure has "
                 f"{structure.nodes.shape}: use the whole result, not a selection of its nodes"
             )
-        if isinstance(structure, Structure) and not np.array_equal(nodes, structure.nodes):
+        centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
+        if centers and not np.array_equal(nodes, structure.nodes):
             # panel centers given by hand, or found to other last digits on another machine
-            centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
 

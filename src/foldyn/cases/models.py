@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from foldyn.shells import ShellOptions, shell
+from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.shells.shell import MASSES
-from foldyn.structures import MASS_RULES, ModelOptions, discretize
+from foldyn.structures import MASS_RULES, ModelOptions, Structure, discretize
 
-BARS_AND_HINGES = "bars_and_hinges"
-SHELL = "shell"
+BARS_AND_HINGES, SHELL = Structure.kind, Shell.kind
 
 
 @dataclass(frozen=True)

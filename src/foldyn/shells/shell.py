@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -28,8 +28,8 @@ from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_scale, fold_stiffness
 from foldyn.structures.discretize import edge_lengths, per_crease
 from foldyn.structures.discretize import fold_rest as rest_of
-from foldyn.structures.mass import MASS_RULES, Surface
-from foldyn.structures.structure import HingeKind
+from foldyn.structures.discretized import Discretized, HingeKind
+from foldyn.structures.mass import MASS_RULES
 from foldyn.values import show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
@@ -52,7 +52,7 @@ class ShellOptions:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Shell:
+class Shell(Discretized):
     """A pattern as a thin shell; made by `shell`.
 
     Attributes
@@ -69,8 +69,6 @@ class Shell:
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `shell` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -82,15 +80,6 @@ class Shell:
     pattern: Pattern
     sheet: Sheet
     options: ShellOptions
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = np.array(value)
-                frozen.setflags(write=False)
-                object.__setattr__(self, item.name, frozen)
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -99,6 +88,7 @@ class Shell:
             f"{len(self.fold_stiffness)} folds, mass {self.options.mass}>"
         )
 
+    kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     massless: ClassVar[str] = "the rotations of a shell"
     bar_law: ClassVar[None] = None
@@ -113,6 +103,11 @@ class Shell:
         """Its folds, with their law."""
         ends = self.pattern.creases  # its hinges are pieces of creases
         return (HingeKind("fold", self.fold_law, ends, self.fold_stiffness, self.fold_rest),)
+
+    @cached_property
+    def centers(self) -> NDArray:
+        """No panel has a center node."""
+        return np.full(len(self.pattern.faces), -1)
 
     @cached_property
     def body(self) -> ShellBody:
@@ -160,13 +155,6 @@ class Shell:
         found = np.unique(np.sort(ends, axis=1), axis=0)
         found.setflags(write=False)
         return found
-
-    @cached_property
-    def bar_length(self) -> NDArray:
-        """Rest lengths of the sides (nb,), m."""
-        length = np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
-        length.setflags(write=False)
-        return length
 
     @cached_property
     def fold_rest(self) -> NDArray:
@@ -231,19 +219,7 @@ class Shell:
         InputError
             The sheet has no density.
         """
-        if self.sheet.density is None:
-            raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
-        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
-        surface = Surface(
-            nodes=self.nodes,
-            faces=self.pattern.faces,
-            centers=np.full(len(self.pattern.faces), -1),
-            triangles=self.triangles,
-            triangle_panel=self.triangle_panel,
-            triangle_area=0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1),
-            areal_density=self.sheet.density * self.sheet.thickness,
-        )
-        return MASS_RULES[MASSES[self.options.mass]](surface)
+        return MASS_RULES[MASSES[self.options.mass]](self.surface)
 
     def energies(self, u: ArrayLike, rotation: ArrayLike | None = None) -> Mapping[str, float]:
         """Strain energies (J) of membrane, bending and folds at displacement u (n, 3), m.
@@ -285,12 +261,7 @@ class Shell:
         return self.body.dofs(u)[u.size :] / self._reach
 
     def _state(self, u: ArrayLike, rotation: ArrayLike | None) -> tuple[NDArray, NDArray]:
-        array = np.ascontiguousarray(u, float)
-        if array.shape not in (self.nodes.shape, (self.nodes.size,)):
-            raise InputError(
-                f"displacement of shape {np.shape(u)}: give {self.nodes.shape} (nodes, axes)"
-            )
-        array = array.reshape(self.nodes.shape)
+        array = self._displacement(u)
         if rotation is None:
             return array, self.balanced(array)
         x = np.ascontiguousarray(rotation, float)
@@ -373,7 +344,7 @@ def shell(
         if (stiffness < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
     rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
-    made = Shell(
+    return Shell(
         nodes=x,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
@@ -383,9 +354,7 @@ def shell(
         pattern=pattern,
         sheet=sheet,
         options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
-    )
-    object.__setattr__(made, "as_made", True)
-    return made
+    ).marked()
 
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:

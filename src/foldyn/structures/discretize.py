@@ -109,7 +109,7 @@ def discretize(
         if (per_length < 0.0).any():
             raise InputError("crease_stiffness: must not be negative")
         fold_stiffness = per_length * crease_length
-    made = Structure(
+    return Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
         bar_area=area,
@@ -125,9 +125,7 @@ def discretize(
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,
-    )
-    object.__setattr__(made, "as_made", True)
-    return made
+    ).marked()
 
 
 def _check_laws(options: ModelOptions) -> None:

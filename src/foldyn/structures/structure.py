@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +13,11 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.algebra.fill import Fill
-from foldyn.errors import InputError
 from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
-from foldyn.structures.mass import MASS_RULES, Surface
+from foldyn.structures.discretized import Discretized, HingeKind
+from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.options import ModelOptions
 from foldyn.structures.sheet import Sheet
 
@@ -26,22 +26,12 @@ FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
 
 
-class HingeKind(NamedTuple):
-    """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle."""
-
-    name: str
-    law: HingeLaw
-    nodes: NDArray
-    stiffness: NDArray
-    rest: NDArray
-
-
 def _none(width: int, kind: type = np.int64) -> NDArray:
     return np.zeros((0, width), kind) if width > 1 else np.zeros(0, kind)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure:
+class Structure(Discretized):
     """A discretized pattern; usually made by `discretize`.
 
     Attributes
@@ -61,8 +51,6 @@ class Structure:
         Node number of each panel's center, -1 without one.
     pattern, sheet, options
         What it was made of.
-    as_made : bool
-        Whether `discretize` made it, so that it makes the same again of these.
     """
 
     nodes: NDArray
@@ -81,15 +69,6 @@ class Structure:
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
     node_mass: NDArray | None = None
-    as_made: bool = field(default=False, init=False)  # `replace` does not hand it on
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, np.ndarray):
-                frozen = np.array(value)
-                frozen.setflags(write=False)
-                object.__setattr__(self, item.name, frozen)
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -98,16 +77,9 @@ class Structure:
             f"{len(self.folds)} folds, {len(self.bends)} bends, mass {self.options.mass}>"
         )
 
+    kind: ClassVar[str] = "bars_and_hinges"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
     fill: ClassVar[Fill] = FILL
-    massless: ClassVar[str] = ""  # every dof has its mass
-
-    @cached_property
-    def bar_length(self) -> NDArray:
-        """Rest lengths of the bars (nb,), m."""
-        length = np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
-        length.setflags(write=False)
-        return length
 
     @cached_property
     def bar_law(self) -> BarLaw:
@@ -183,23 +155,6 @@ class Structure:
             array.setflags(write=False)
         return mass
 
-    @cached_property
-    def surface(self) -> Surface:
-        """Triangles with their masses: what a mass rule distributes."""
-        if self.sheet.density is None:
-            raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
-        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
-        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        return Surface(
-            nodes=self.nodes,
-            faces=self.pattern.faces if self.pattern is not None else (),
-            centers=self.centers,
-            triangles=self.triangles,
-            triangle_panel=self.triangle_panel,
-            triangle_area=area,
-            areal_density=self.sheet.density * self.sheet.thickness,
-        )
-
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
         energies = self.body.energies(self._displacement(u))
@@ -231,14 +186,6 @@ class Structure:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
-
-    def _displacement(self, u: ArrayLike) -> NDArray:
-        array = np.ascontiguousarray(u, float)
-        if array.shape not in (self.nodes.shape, (self.nodes.size,)):
-            raise InputError(
-                f"displacement of shape {np.shape(u)}: give {self.nodes.shape} (nodes, axes)"
-            )
-        return array.reshape(self.nodes.shape)
 
 
 def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
