@@ -39,7 +39,7 @@ def test_a_path_and_its_energies(workplace, edited) -> None:
     done = workplace.call("run", "case.toml", "--out", "r")
     assert (done.status, done.err) == (0, "")
     page = Path("r/report.html").read_text(encoding="utf-8")
-    assert "Strain energies of membrane, bending, folds, one upon the other" in page
+    assert "Strain energies of membrane, bending, folds, stacked" in page
     assert ">bending (%)<" in page and "bends" not in page
     for name in ("structure", "laws", "curve", "energies", "shapes"):
         assert base64.b64encode(Path(f"r/{name}.png").read_bytes()).decode() in page

@@ -183,7 +183,7 @@ def test_energies_are_stacked(path):
             assert (np.abs(corners - [x, y]).max(axis=1) < 1e-12).any()
     work = upper.get_lines()[0]
     np.testing.assert_allclose(work.get_ydata(), DOWN)
-    assert lower.get_xlabel() == "way that the nodes have come, on average (m)"
+    assert lower.get_xlabel() == "mean distance traveled by the nodes (m)"
     assert keys(figure) == ["folds", "bends", "bars", "at the start + work done"]
 
 

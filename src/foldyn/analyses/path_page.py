@@ -56,7 +56,7 @@ def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path) -> Path:
         sections.append(
             album.figure(
                 "energies",
-                f"Strain energies of {', '.join(plots.energy_shares(path))}, one upon the other, "
+                f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, "
                 "with the work that was done on the structure; below, their shares.",
                 lambda: plots.plot_path_energies(path, *_growing(path, moved)),
             )

@@ -45,7 +45,7 @@ def plot_path_energies(
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw the parts of the strain energy along a path, one upon the other: see `energy_shares`.
+    """Draw the parts of the strain energy along a path, stacked: see `energy_shares`.
 
     Parameters
     ----------
@@ -53,7 +53,8 @@ def plot_path_energies(
         A path of `foldyn.trace`.
     nodes : sequence of int, optional
         Nodes whose mean displacement is the horizontal axis, if it only grows along the path.
-        Without them it is the load factor, and where this turns, the way that the nodes have come.
+        Without them it is the load factor or, where this turns, the mean distance that the nodes
+        have traveled.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Direction of that displacement; by default that in which the nodes move farthest.
     title : str
@@ -113,4 +114,4 @@ def _abscissa(
     factor = path["load_factor"].values
     if (np.diff(factor) > 0.0).all():
         return factor, "load factor"
-    return way(path), "way that the nodes have come, on average (m)"
+    return way(path), "mean distance traveled by the nodes (m)"

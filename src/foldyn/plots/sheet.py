@@ -88,7 +88,7 @@ class DrawnSheet:
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     actuated : bool
-        Let actuated creases glow.
+        Highlight actuated creases.
     """
 
     def __init__(

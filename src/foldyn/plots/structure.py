@@ -53,7 +53,7 @@ def draw_structure(
         base.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
-        and one from the center of mass along gravity. Actuated creases glow.
+        and one from the center of mass along gravity. Actuated creases are highlighted.
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float

@@ -1,4 +1,4 @@
-"""Evaluations of the model of a fit: in processes, each kept, so that a fit can be gone on with."""
+"""Evaluations of the model of a fit: in processes, each kept, so that a fit can be resumed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks run in processes, each of which keeps its own result, so that they can be gone on with."""
+"""Tasks run in processes, each of which keeps its own result, so that they can be resumed."""
 
 from __future__ import annotations
 
