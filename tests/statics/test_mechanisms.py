@@ -110,6 +110,6 @@ def test_start_state_is_judged_where_it_is():
     """A flat truss is a mechanism; pressed down a little it is not."""
     u = np.zeros((3, 3))
     u[2, 2] = -0.05
-    path = trace(VonMises(h=0.0).case(), load_factors=[1.0], start=fd.State(u))
+    path = trace(VonMises(h=0.0).case(), load_factors=[1.0], initial=fd.State(u))
     v = -float(path.displacement[0, 2, 2])
     assert VonMises(h=0.0).load(v) == pytest.approx(1.0, rel=1e-8)

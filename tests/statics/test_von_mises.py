@@ -134,7 +134,7 @@ def test_starts_near_a_given_state():
     """Beyond the snap-through the truss hangs: v = 2 h at no load."""
     u = np.zeros((3, 3))
     u[APEX, 2] = -1.9 * TRUSS.h
-    path = trace(TRUSS.case(), load_factors=[0.0, 1.0], start=fd.State(u))
+    path = trace(TRUSS.case(), load_factors=[0.0, 1.0], initial=fd.State(u))
     assert apex(path)[0] == pytest.approx(-2 * TRUSS.h, rel=1e-9)
     assert apex(path)[1] < -2 * TRUSS.h
     assert path.attrs["started_from"] == "state"

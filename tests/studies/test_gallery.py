@@ -110,7 +110,7 @@ def tumbling(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         exec(compile(block, "gallery.md", "exec"), names)
-    return names["case"], names["motion"], folder
+    return names["case_file"].case(), names["motion"], folder
 
 
 def test_free_flight_keeps_the_momenta(tumbling):

@@ -192,7 +192,11 @@ class PathAnalysis(Analysis):
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`; bad input is refused before the first point, a mechanism for example."""
-        given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
+        own = dict(self.arguments)
+        for one, other in (("load_factors", "steps"), ("steps", "load_factors")):
+            if one in changes:
+                own[other] = None  # they say the same
+        given = {"initial": case_file.start(mass).state, **own, **changes}
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:

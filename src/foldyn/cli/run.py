@@ -65,8 +65,7 @@ def run(
         done = _computed(task, kept, introduction, not quiet and sys.stderr.isatty(), say)
         say(f"wrote {', '.join(kept.kept)}")
         if figures:
-            say("drawing figures")
-            page = _drawn(case_file, done, folder)
+            page = _drawn(case_file, done, folder, say)
             say(f"wrote figures and {page}")
     return folder
 
@@ -109,9 +108,15 @@ def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]
         say(f"  {name}: {text}")
 
 
-def _drawn(case_file: CaseFile, done: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+def _drawn(
+    case_file: CaseFile,
+    done: Mapping[str, xarray.Dataset],
+    folder: Path,
+    say: Callable[[str], None],
+) -> Path:
     """Draw the figures; whatever keeps them from being drawn, the results are there."""
     try:
+        say("drawing figures")
         return case_file.analysis.page(case_file, done, folder)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("interrupted while figures were drawn") from None

@@ -77,7 +77,9 @@ def _home(module: str, name: str) -> frozenset[Path]:
     if name and (place / f"{name}.py").is_file():
         return frozenset([place / f"{name}.py"])
     start = place / "__init__.py"
-    passed_on = [origin for origin, other in imports(start) if other == name and origin != module]
+    there = [(origin, other) for origin, other in imports(start) if origin != module]
+    passed_on = [origin for origin, other in there if other == name]
+    passed_on = passed_on or [origin for origin, other in there if other == "*"]
     if name and passed_on:
         return frozenset(path for origin in passed_on for path in _home(origin, name))
     return frozenset(place.rglob("*.py"))  # the folder as a whole, or nobody knows which file
