@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, create_model, model_validator
 
+from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import (
     Analysis,
     Begun,
@@ -217,13 +218,13 @@ class FrfAnalysis(Analysis):
             def tell(now: Progress) -> None:
                 nonlocal told
                 if not told:
-                    bar.clear()
+                    reached.clear()
                     begun()
                 told = True
-                bar.total = now.duration
-                bar.update(now.time - bar.n)
+                reached.total = now.duration
+                reached.update(now.time - reached.n)
 
-            with bar_closed(_bar(progress)) as bar:
+            with bar_closed(_bar(progress)) as reached:
                 return frf(case, progress=tell, **given)
 
         return compute
@@ -254,8 +255,6 @@ class FrfAnalysis(Analysis):
 
 def _bar(shown: bool) -> Any:
     """Bar of a response: what it counts depends on the method."""
-    from tqdm import tqdm
-
     layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
     text = "response (first use compiles kernels)"
-    return tqdm(total=1.0, desc=text, bar_format=layout, leave=False, disable=not shown)
+    return bar(shown, total=1.0, desc=text, bar_format=layout)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainValidator
 
 from foldyn import plots
+from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
 from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
@@ -95,10 +96,8 @@ class ModesAnalysis(Analysis):
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            from tqdm import tqdm
-
             text = f"modes with mass rule {mass} (first use compiles kernels)"
-            with bar_closed(tqdm(bar_format=text, leave=False, disable=not progress)):
+            with bar_closed(bar(progress, bar_format=text)):
                 result = modes(case, **given)
             begun()
             return result

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
+from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.path_page import path_page
 from foldyn.analyses.sections import (
@@ -200,22 +201,22 @@ class PathAnalysis(Analysis):
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            bar = _bar(progress)
+            points = _bar(progress)
             found = 0
 
             def tell(point: Point) -> None:
                 nonlocal found
                 if not found:
-                    bar.clear()
+                    points.clear()
                     begun()
                 found += 1
-                bar.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
-                bar.update()
+                points.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
+                points.update()
 
             try:
                 return trace(case, progress=tell, **given)
             finally:
-                bar.close()
+                points.close()
 
         return compute
 
@@ -248,9 +249,6 @@ class PathAnalysis(Analysis):
 
 def _bar(shown: bool) -> Any:
     """Bar of points: how many there will be is not known."""
-    from tqdm import tqdm
-
-    layout = "points: {n_fmt}{postfix} [{elapsed}]"
-    bar = tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=not shown)
-    bar.set_postfix_str("first use compiles kernels, up to half a minute")
-    return bar
+    made = bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
+    made.set_postfix_str("first use compiles kernels, up to half a minute")
+    return made

@@ -1,0 +1,28 @@
+"""Progress bars of analyses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class _Hidden:
+    """A bar that is not there."""
+
+    n = total = 0.0
+
+    def nothing(self, *_: Any, **__: Any) -> None:
+        """Do nothing."""
+
+    clear = close = update = set_postfix_str = nothing
+
+
+def bar(shown: bool, **options: Any) -> Any:
+    """Bar of tqdm, which is not imported for nothing.
+
+    Its lock stays behind where a process is killed, as the workers of a fit may be.
+    """
+    if not shown:
+        return _Hidden()
+    from tqdm import tqdm
+
+    return tqdm(leave=False, **options)
