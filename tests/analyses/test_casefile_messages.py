@@ -365,6 +365,11 @@ def test_all_faults_are_told_at_once(read, short) -> None:
     assert "pattern.kind = \"mura\": did you mean 'miura'?" in kind
     assert key.startswith("pattern.cell: unknown key; did you mean 'cells'?")
     assert nodes.startswith('supports[0].nodes = "xmn": xmn is not known; use xmin')
+    arguments = 'kind = "miura"\ndihedral = "flat"\nb = "wide"\na = "long"'
+    with pytest.raises(InputError) as caught:
+        read(short.replace('kind = "miura"', arguments))
+    keys = [line.split(" = ")[0] for line in str(caught.value).split("\n  also ")]
+    assert [key.split(".")[-1] for key in keys] == ["a", "b", "dihedral"]  # as declared
     text = short.replace('nodes = "xmin"', "nodes = [99]").replace("[7, 6]", "[77]")
     with pytest.raises(InputError) as caught:
         read(text)

@@ -4,26 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from casefile_checks import FOLD
 
 import foldyn as fd
 from foldyn.analyses import read_case
 from foldyn.plots import moved_supports
-
-FOLD = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[[supports]]
-nodes = [4, 5]
-[[supports]]
-nodes = [0, 1]
-axes = "z"
-"""
 
 
 @pytest.fixture

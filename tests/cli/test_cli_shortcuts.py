@@ -138,6 +138,8 @@ def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
         read(stored, "modes", state=str(tmp_path / "b.nc")).initial()
     drive = "[[drive]]\nnodes = 7\nforce = [1, 0, 0]\n"
     response = OWN + 'kind = "frf"\nmethod = "modal"\n' + drive  # without frequencies of its own
+    with pytest.raises(InputError, match=r"case\.toml: at which frequencies\?"):
+        read(response, "frf")
     found = read(response, "frf", frequencies=GRID, method="direct")
     assert found.analysis.arguments["method"] == "direct"
     assert len(found.analysis.arguments["frequencies"]) == 31

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.sections import CaseSchema
 from foldyn.analyses.start import Start, start_of
-from foldyn.cases import Case, State, resolve_nodes
+from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
 from foldyn.patterns import Pattern
@@ -134,12 +134,6 @@ def movable(case: Case) -> NDArray[np.int64]:
     return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
 
 
-def driven_nodes(case: Case, groups: Sequence[tuple[str, Any]]) -> NDArray[np.int64]:
-    """Nodes of several selections, each with the key that names it."""
-    found = [resolve_nodes(case.structure, nodes, key) for key, nodes in groups]
-    return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
-
-
 def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
     """Names of the arguments of an analysis' function, but for what `run` itself gives."""
     own = {"case", "progress", "options"}
@@ -216,7 +210,7 @@ class CaseFile:
     def start(self, mass: str | None = None) -> Start:
         """As `initial`, with the load factor of a stored state."""
         section = getattr(self._schema, "initial", None)
-        with within("initial: " if getattr(section, "file", "") is None else "initial.", self.path):
+        with within("initial", self.path):
             return start_of(section, self.case(mass), self.path.parent)
 
     def run(
@@ -262,13 +256,17 @@ class CaseFile:
     @contextmanager
     def placing(self, mass: str | None = None) -> Iterator[None]:
         """Put the file, the mass rule and the table of the key before bad input."""
-        rule = f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
         try:
             yield
         except InputError as error:
             if error.file is not None:
                 raise
-            raise error.within(rule + self._section(error.key), self.path) from None
+            place = self.named(mass) + self._section(error.key)
+            raise error.within(place, self.path) from None
+
+    def named(self, mass: str | None) -> str:
+        """A mass rule for the beginning of a message, where the file has several."""
+        return f'mass = "{mass}": ' if mass and len(self.masses) > 1 else ""
 
     def _section(self, key: str) -> str:
         """Table in which the file has a key, with a dot; "" for what is none."""
@@ -303,8 +301,7 @@ class Computation:
     @property
     def place(self) -> str:
         """Beginning of messages about it."""
-        several = len(self.case_file.masses) > 1
-        return f"{self.case_file.path}: " + (f'mass = "{self.mass}": ' if several else "")
+        return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
         """Compute it; `begun` is called when nothing is left to be refused."""

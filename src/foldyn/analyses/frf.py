@@ -21,13 +21,12 @@ from foldyn.analyses.casefile import (
     CaseFile,
     Compute,
     arguments_of,
-    driven_nodes,
     movable,
 )
 from foldyn.analyses.frf_page import frf_page
 from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
-from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys
 from foldyn.cases.models import SHELL
@@ -92,7 +91,7 @@ class FrfSection(_Options):
     frequencies: Annotated[Any, PlainValidator(_frequencies)]
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
-    secant: Annotated[float, Field(gt=0, le=180)] | None = None
+    secant: Secant = None
     amplitude: Positive = 1.0
 
     @model_validator(mode="after")
@@ -106,7 +105,7 @@ class FrfSection(_Options):
                     "out",
                     f".{key}",
                 )
-        if "secant" in given and not (method.linear and method.secant is None):
+        if "secant" in given and method.by_amplitude:
             raise InputError(
                 f" = {show(self.secant)}: the method {self.method} goes by the amplitude of the "
                 "drive; leave it out, and give amplitude",
@@ -240,11 +239,12 @@ class FrfAnalysis(Analysis):
 
     def shown(self, case: Case) -> NDArray[np.int64]:
         """Nodes with a driving force, else all that can move."""
-        parts = enumerate(self.arguments["drive"])
-        driven = driven_nodes(
-            case, [(f"drive[{i}].nodes", one.nodes) for i, one in parts if isinstance(one, Force)]
-        )
-        return driven if driven.size else movable(case)
+        forces = [
+            one.loaded(case.structure, f"drive[{i}]")
+            for i, one in enumerate(self.arguments["drive"])
+            if isinstance(one, Force)
+        ]
+        return np.unique(np.concatenate(forces)) if forces else movable(case)
 
     def page(
         self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path

@@ -16,7 +16,7 @@ from foldyn.linear.frf import METHODS
 from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.report.album import Album, shown_nodes
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Section, Table, Text
+from foldyn.report.sections import Heading, Section, Table, Text, cell
 
 if TYPE_CHECKING:
     import xarray
@@ -114,7 +114,7 @@ def _peaks(
             rows.append(
                 [
                     *row, peak.frequency, peak.height, _percent(peak.half_power),
-                    _percent(peak.textbook), _number(peak.natural_frequency),
+                    _percent(peak.textbook), cell(peak.natural_frequency),
                     _percent(peak.damping_ratio), _percent(peak.misfit),
                 ]
             )  # fmt: skip
@@ -144,7 +144,7 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
         "window_rate": "window (1/s)",
     }
     a = next(iter(results.values())).attrs
-    if METHODS[a["method"]].linear and METHODS[a["method"]].secant is None:
+    if not METHODS[a["method"]].by_amplitude:
         del keys["amplitude"]
     present = [key for key in keys if key in a]
     header = ["mass rule", "method", "state", *(keys[key] for key in present), "time (s)"]
@@ -202,10 +202,6 @@ def _reason(note: str) -> str:
     """What a note says, without what it would have a programmer do."""
     parts = [part for part in note.split("; ") if part.startswith(("half power", "circle fit"))]
     return "; ".join(parts or [note]).replace("magnitude: ", "")
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def _percent(ratio: float) -> float | None:

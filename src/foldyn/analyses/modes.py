@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator
+from pydantic import PlainValidator
 
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
-from foldyn.analyses.vibration import About, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.linear import character, mac, modes, pair_modes
@@ -56,7 +56,7 @@ class ModesSection(Section):
     kind: str
     count: Count = 6
     state: About = "rest"
-    secant: Annotated[float, Field(gt=0, le=180)] | None = None
+    secant: Secant = None
 
 
 class ModesOutput(Section):

@@ -15,11 +15,7 @@ from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.limits import check_values
 from foldyn.analyses.messages import describe
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.cases import (
-    Case,
-    Rayleigh,
-    resolve_nodes,
-)
+from foldyn.cases import Case, Rayleigh, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
@@ -94,7 +90,7 @@ def read_as(
     document = read_document(path)
     flags = {key: value for key, value in flags.items() if value is not None}
     own = schema_of(document) is ANALYSES[kind].schema
-    if not own or not flags:  # else flags may give what is missing
+    if not own:  # else flags may give what is missing
         validated(path, document)
     with within("", path):
         document = remodeled(document, model, divisions)

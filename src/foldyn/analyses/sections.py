@@ -52,15 +52,6 @@ def one_of(known: Iterable[str]) -> PlainValidator:
     return PlainValidator(lambda value: choice("", value, known))
 
 
-def refused(why: str) -> PlainValidator:
-    """Take nothing, and say why."""
-
-    def refuse(value: Any) -> None:
-        raise InputError(f" = {show(value)}: {why}")
-
-    return PlainValidator(refuse)
-
-
 def _pattern(value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise InputError(f" = {show(value)}: must be a table, written [pattern]")
@@ -92,10 +83,8 @@ def _check_generator(value: Mapping[str, Any]) -> None:
         choice(".kind", kind, GENERATORS)
     meant = nearest(kind, GENERATORS) if isinstance(kind, str) else None
     if meant is not None:
-        known = [*signature(GENERATORS[meant]).parameters, "kind"]
-        for key in value:
-            with faults.collected():
-                check_keys({key: None}, known)
+        with faults.collected():
+            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind"])
     faults.tell()
 
 

@@ -82,13 +82,13 @@ def start_of(section: MotionStart | StoredStart | None, case: Case, folder: Path
 
 
 def _stored(section: MotionStart | StoredStart, case: Case, folder: Path) -> Start:
-    said = f"file = {show(section.file)}: "
+    said = f".file = {show(section.file)}: "
     with within(said):
         result = load(folder / section.file)
     try:
         state = initial_state(result, section.at)
     except InputError as error:
-        raise error.within("" if error.key == "at" else said) from None
+        raise error.within("." if error.key == "at" else said) from None
     wanted = len(case.structure.nodes)
     for array in (state.displacement, state.velocity):
         if array is not None and len(np.asarray(array)) != wanted:
@@ -121,7 +121,7 @@ def _rigid_motion(case: Case, start: MotionStart) -> State:
             if value is not None
         )
         raise InputError(
-            f"{given}: moves node {node} along {AXES[axis]} with {velocity[node, axis]:.4g} m/s, "
+            f": {given}: moves node {node} along {AXES[axis]} with {velocity[node, axis]:.4g} m/s, "
             "where a support holds it; free this node, or start from another motion"
         )
     velocity[case.fixed] = 0.0

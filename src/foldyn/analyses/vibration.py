@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from foldyn.analyses.casefile import CaseFile
 from foldyn.analyses.sections import CaseSchema, one_of, part
@@ -24,6 +24,7 @@ from foldyn.values import show
 STATES = ("rest", "equilibrium")
 """States about which a case file may have its structure vibrate, beside a stored one."""
 About = Annotated[str, one_of(STATES)]
+Secant = Annotated[float, Field(gt=0, le=180)] | None
 TIMELESS = (
     "small vibrations are about one state, in which loads and displacements act in full; leave it "
     "out"

@@ -194,19 +194,19 @@ class Case:
     def actuation_terms(self) -> Terms:
         """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
         terms: list[tuple[NDArray[np.float64], History]] = []
-        first: dict[int, int] = {}  # the load that actuates a crease
-        for i, load in enumerate(self.loads):
-            actuated = load.rest_changes(self.structure, f"loads[{i}]")
+        first: dict[int, str] = {}  # the load that actuates a crease
+        for place, load in self._loads():
+            actuated = load.rest_changes(self.structure, place)
             if actuated is None:
                 continue
             creases, change = actuated
             for crease in creases.tolist():
                 if crease in first:
                     raise InputError(
-                        f"loads[{i}].creases: crease {crease} is actuated by loads[{first[crease]}]"
-                        " already; leave it out of one of the two"
+                        f"{place}.creases: crease {crease} is actuated by {first[crease]} already; "
+                        "leave it out of one of the two"
                     )
-                first[crease] = i
+                first[crease] = place
             vector = np.zeros(len(self.structure.folds))
             vector[creases] = change
             _add(terms, as_history(load.history), vector)

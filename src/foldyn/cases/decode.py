@@ -70,9 +70,8 @@ def call_from(
         if name not in skip
     }
     faults = Faults()
-    for key in arguments:
-        with faults.collected():
-            check_keys({key: None}, parameters)
+    with faults.collected():
+        check_keys(arguments, parameters)
     if not faults.found:  # a misspelled key is missing, too
         for name, parameter in parameters.items():
             if parameter.default is parameter.empty and name not in arguments:
@@ -81,20 +80,22 @@ def call_from(
     values = dict(arguments)
     if not checks_itself:
         hints = get_type_hints(function.__init__ if isinstance(function, type) else function)
-        for name in values.keys() & parameters.keys():
-            with faults.collected():
-                values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
+        for name in parameters:
+            if name in values:
+                with faults.collected():
+                    values[name] = _checked(f".{name}", values[name], hints.get(name, Any))
     faults.tell()
     with within("." if checks_itself else ": "):
         return function(**values)
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Refuse a key that is not known, with a suggestion and the keys that are."""
-    known = list(known)
+    """Refuse keys that are not known, with suggestions and the keys that are."""
+    known, faults = list(known), Faults()
     for key in table:
         if key not in known:
-            raise InputError(f": {unknown_key(key, known)}", f".{key}")
+            faults.add(InputError(f": {unknown_key(key, known)}", f".{key}"))
+    faults.tell()
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:

@@ -50,6 +50,11 @@ class ResponseMethod(NamedTuple):
     linear: bool
     secant: float | None = None
 
+    @property
+    def by_amplitude(self) -> bool:
+        """Whether the response depends on the amplitude of the drive."""
+        return not self.linear or self.secant is not None
+
 
 METHODS: Mapping[str, ResponseMethod] = {
     method.name: method

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -198,6 +199,11 @@ def _pixels(content: bytes) -> tuple[int, int]:
     if content.startswith(b"GIF") and len(content) >= 10:
         return int.from_bytes(content[6:8], "little"), int.from_bytes(content[8:10], "little")
     return 0, 0
+
+
+def cell(value: float) -> float | None:
+    """A number for a cell of a table; None, an empty cell, for what is not finite."""
+    return float(value) if math.isfinite(value) else None
 
 
 def _is_number(value: Any) -> bool:

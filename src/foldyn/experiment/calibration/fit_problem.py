@@ -239,7 +239,7 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
         path = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
         settings = replace(given["settings"], stability=False)
         return case_file.run(
-            method="newton", load_factors=path, steps=None, first_step=None, until=None,
+            method="newton", load_factors=path, first_step=None, until=None,
             settings=settings,
         )  # fmt: skip
 

@@ -79,7 +79,7 @@ rest, and resists the large turns of the panels.
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
     """Path of the specimen whose top is pressed down to fractions of 56 mm."""
-    at = {"method": "newton", "load_factors": list(factors), "steps": None}
+    at = {"method": "newton", "load_factors": list(factors)}
     return shipped("specimen", changes).run(settings=Settings(stability=False), **at)
 
 

@@ -12,6 +12,7 @@ from foldyn import plots
 from foldyn.cases import Force
 from foldyn.report import Heading, Section, Table
 from foldyn.report.album import Album
+from foldyn.report.sections import cell
 from foldyn.studies.herkal.figures import plot_statics
 from foldyn.studies.herkal.models import REFERENCE, label, model_of
 from foldyn.studies.herkal.partners import FAR, LEAST_MAC
@@ -19,11 +20,6 @@ from foldyn.studies.herkal.runs import SECANT
 from foldyn.studies.herkal.study import Study
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-
-
-def cell(value: float) -> float | None:
-    """A number of a table; none where there is none."""
-    return float(value) if math.isfinite(value) else None
 
 
 def sections(study: Study, case: str, album: Album) -> list[Section]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from foldyn.report import Heading, Section, Table, Text, write_report
 from foldyn.report.album import Album
+from foldyn.report.sections import cell
 from foldyn.studies.herkal import case_page, sensitivity_page, variations
-from foldyn.studies.herkal.case_page import NO_BREAK, cell
+from foldyn.studies.herkal.case_page import NO_BREAK
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import best
 from foldyn.studies.herkal.models import MODELS, REFERENCE, label, model_of

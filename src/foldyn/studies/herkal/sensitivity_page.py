@@ -7,8 +7,8 @@ from typing import Any
 
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.report.album import Album
+from foldyn.report.sections import cell
 from foldyn.studies.herkal import variations
-from foldyn.studies.herkal.case_page import cell
 from foldyn.studies.herkal.claims import paper_table
 from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.metric import best

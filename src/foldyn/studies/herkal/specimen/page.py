@@ -14,10 +14,11 @@ from foldyn import plots
 from foldyn.linear import character
 from foldyn.report import Heading, Picture, Section, Table, Text
 from foldyn.report.album import Album
+from foldyn.report.sections import cell
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.case_page import NO_BREAK, cell
+from foldyn.studies.herkal.case_page import NO_BREAK
 from foldyn.studies.herkal.specimen import agreement, figures, synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
 from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
