@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from foldyn import plots
 from foldyn.analyses import read_case
-from foldyn.analyses.frf_page import driven_axis
+from foldyn.analyses.frf_page import driven_direction
 from foldyn.analyses.modes import shown_modes
 from foldyn.linear import peaks_of
+from foldyn.plots.responses import curves_of
 
 SHEET = """
 [pattern]
@@ -73,10 +75,43 @@ def test_the_direction_is_that_of_the_drive_and_nodes_are_told(write):
     grid = "frequencies = { first = 0, last = 2, count = 21 }\n"
     output = f"[output]\nnodes = {list(range(3, 15))}\n"
     found, page = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n{output}')
-    assert driven_axis(found) == "z"
+    assert driven_direction(found) == "z"
     assert "of nodes 3, 4, 5, 6, 7, 8, 9, 10 (the first 8 of 12) along z" in page
     assert "displacement per newton of driving force, on all driven nodes together" in page
     assert "Computed with Foldyn" in page and "alpha 0.5 1/s, beta 0 s" in page
+
+
+def test_a_drive_backward_is_read_backward(write):
+    """The response of a driven point along its drive has a positive real mobility."""
+    grid = "frequencies = { first = 0.1, last = 2, count = 39 }\n"
+    drive = "[[drive]]\nnodes = 13\nforce = [0, 0, -1]\n"
+    found, page = write(drive + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n')
+    assert driven_direction(found) == "-z"
+    assert "of node 13 along -z" in page
+    (curve,), _ = curves_of({"": found}, [13], None, "mobility")
+    assert curve.axis == "-z" and (curve.values.real > 0.0).all()
+    (curve,), _ = curves_of({"": found}, [13], "z", "mobility")
+    assert (curve.values.real < 0.0).all()
+    assert peaks_of(found, 13, "-z") == peaks_of(found, 13, "z") != ()
+
+
+def test_what_the_picture_marks_is_in_the_table(write):
+    """A peak of 1 % of the highest one, which a logarithmic axis shows as well."""
+    found, _ = write(PUSH + '[analysis]\nkind = "frf"\nfrequencies = [0.5, 1, 2]\nsecant = 1\n')
+    f = np.linspace(1.0, 10.0, 901)
+    curve = sum(
+        size / (f0**2 - f**2 + 2j * 0.01 * f0 * f) for size, f0 in ((1.0, 3.0), (0.04, 6.0))
+    )
+    response = found.isel(frequency=[0] * len(f)).assign_coords(frequency=f)
+    response["receptance"][:] = 0.0
+    response["receptance"].loc[{"node": 13, "axis": "z"}] = curve
+    peaks = peaks_of(response, 13, "z")
+    assert [round(peak.frequency, 1) for peak in peaks] == [3.0, 6.0]
+    assert peaks[1].height < 0.02 * peaks[0].height
+    assert peaks[1].damping_ratio == pytest.approx(0.01, rel=0.05)
+    figure = plots.plot_frf({"": response}, [13], "z")
+    marked = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert [round(x, 1) for line in marked for x in line.get_xdata()] == [3.0, 6.0]
 
 
 def test_numbers_that_are_missing_are_explained(write):

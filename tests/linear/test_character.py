@@ -9,6 +9,7 @@ from bodies import TOP, body, paper_specimen
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.linear import character, modes
+from foldyn.linear.character import main_axis
 from foldyn.results import modes_dataset
 
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
@@ -129,6 +130,34 @@ def test_rigid_modes_are_called_so():
     names = character(found, "z").name.values.tolist()
     assert names[:2] == ["first rigid", "second rigid"] and names[5] == "sixth rigid"
     assert "rigid" not in names[6]
+
+
+def test_by_default_the_axis_leads_away_from_the_supports():
+    sheet = fd.Sheet(1.0, 0.25, 0.01, 1.0)
+    long = fd.discretize(fd.patterns.miura(cells=(4, 1)), sheet)
+    assert main_axis(fd.Case(long)) == "x"  # the longest
+    assert main_axis(fd.Case(long, [fd.Fix("xmin")])) == "x"
+    assert main_axis(fd.Case(long, [fd.Fix("ymin")])) == "x"  # it is much longer than wide
+    square = fd.discretize(fd.patterns.miura(cells=(2, 1)), sheet)
+    found = modes(fd.Case(square, [fd.Fix("ymax")]), 3, secant=1.0)
+    assert character(found).attrs["axis"] == "y"
+    for name in ("name", "share"):
+        np.testing.assert_array_equal(character(found)[name], character(found, "y")[name])
+
+
+def test_a_mode_without_a_leading_part_is_mixed():
+    """Three parts at 44, 33 and 23 % of the motion, and two at 52 and 48 %."""
+    s = tall()
+    weight = s.mass.diagonal()[:, None]
+    axial, sway, _, turned = (m / np.sqrt((weight * m**2).sum()) for m in beam(s))
+    shapes = [
+        np.sqrt(0.44) * axial + np.sqrt(0.33) * turned + np.sqrt(0.23) * sway,
+        np.sqrt(0.52) * axial + np.sqrt(0.48) * turned,
+    ]
+    found = character(given(s, shapes), "z")
+    assert found.kind_of.values.tolist() == ["mixed", "axial"]
+    assert found.name.values.tolist() == ["mixed: axial, torsion", "first axial"]
+    assert found.share.max("kind").values == pytest.approx([0.44, 0.52], abs=0.01)
 
 
 def test_one_dozen_of_nodes_has_two_stations():

@@ -11,7 +11,7 @@ import foldyn as fd
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
 from foldyn.plots import animate_modes, draw_modes, plot_mac
-from foldyn.plots.modes import chosen_modes, describe_mode, main_axis
+from foldyn.plots.modes import chosen_modes, describe_mode
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.results.modes import modes_dataset
@@ -161,20 +161,6 @@ def test_what_modes_do_is_told_with_its_share(cantilever):
         assert float(first.split()[2]) == pytest.approx(frequency, rel=1e-3)
         ratio = 0.1 / (4 * np.pi * frequency)  # alpha / (2 w)
         assert float(first.split()[5]) == pytest.approx(100 * ratio, rel=1e-2)
-
-
-def test_the_axis_of_names_leads_away_from_the_supports(cantilever, case):
-    long, _ = cantilever
-    structure = long.structure
-    assert main_axis(Sheet3D.of(long)) == "x"
-    assert main_axis(Sheet3D.of(structure)) == "x"  # the longest
-    sideways = cases.Case(structure, [cases.Fix("ymin")])
-    assert main_axis(Sheet3D.of(sideways)) == "x"  # the sheet is much longer than wide
-    square = structures.discretize(
-        patterns.miura(cells=(2, 1)), structures.Sheet(1.0, 0.25, 0.01, 1.0)
-    )
-    held = cases.Case(square, [cases.Fix("ymax")])
-    assert main_axis(Sheet3D.of(held)) == "y"
 
 
 def test_a_film_is_a_period_without_a_seam(case, modes, tmp_path, monkeypatch):

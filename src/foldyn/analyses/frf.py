@@ -25,13 +25,13 @@ from foldyn.analyses.casefile import (
 )
 from foldyn.analyses.frf_page import frf_page
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
+from foldyn.analyses.sections import Nodes, Positive, Section, one_of, part
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys
 from foldyn.cases.models import SHELL
 from foldyn.cases.part import given_keys
-from foldyn.cases.supports import check_axis
+from foldyn.cases.supports import DIRECTIONS, check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf
@@ -153,7 +153,7 @@ class FrfOutput(Section):
     """[output] of a frequency response: what is shown."""
 
     nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
+    axis: Annotated[Any, one_of(DIRECTIONS)] = None
     quantity: Annotated[Any, one_of(PER_FORCE)] = None
 
 

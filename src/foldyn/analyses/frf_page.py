@@ -29,15 +29,13 @@ MOST_REASONS = 6
 
 def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
     """Draw a case and its frequency responses into `folder`; returns the path of report.html."""
-    from foldyn.plots.frf import PROMINENCE
-
     album = Album(folder)
     first = next(iter(results))
     case, response = case_file.case(first), results[first]
     drive = case_file.analysis.arguments["drive"]
     most = max(1, MOST_CURVES // len(results))
     nodes, some = shown_nodes(case_file.output.nodes.tolist(), most)
-    axis = case_file.output.axis or driven_axis(response)
+    axis = case_file.output.axis or driven_direction(response)
     quantity = case_file.output.quantity or quantity_of(response)
     shown = quantity if quantity in PER_FORCE else None
     rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
@@ -53,7 +51,7 @@ def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder:
         ),
     ]
     found = {
-        (rule, node): peaks_of(result, node, axis, shown, PROMINENCE)
+        (rule, node): peaks_of(result, node, axis, shown)
         for rule, result in results.items()
         for node in nodes
     }
@@ -77,10 +75,12 @@ def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder:
     return write_report(album.folder / "report.html", case_file.heading, sections)
 
 
-def driven_axis(response: xarray.Dataset) -> str:
-    """Axis along which most of the drive acts."""
+def driven_direction(response: xarray.Dataset) -> str:
+    """Direction in which most of the drive acts."""
+    from foldyn.plots.responses import along_drive
+
     drive = response["drive"].transpose("node", "axis").values
-    return "xyz"[int(np.abs(drive).sum(axis=0).argmax())]
+    return along_drive(response)[int(np.abs(drive).sum(axis=0).argmax())]
 
 
 def _driven(case: Case, drive: list[Any]) -> Case:

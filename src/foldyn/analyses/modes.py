@@ -188,12 +188,8 @@ def _about(modes: xarray.Dataset) -> str:
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
     """What the modes do along the axis that the file names, or the main one."""
-    from foldyn.plots.modes import main_axis
-    from foldyn.plots.scene import Sheet3D
-
     chosen = case_file.output
-    axis = chosen.axis or main_axis(Sheet3D.of(case))
-    return character(modes, axis, chosen.nodes if chosen.named else None, case=case)
+    return character(modes, chosen.axis, chosen.nodes if chosen.named else None, case=case)
 
 
 def _judged(case_file: CaseFile, told: xarray.Dataset) -> str:

@@ -15,7 +15,6 @@ from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.path_page import path_page
 from foldyn.analyses.sections import (
-    DIRECTIONS,
     MOST_SHAPES,
     Animation,
     CaseSchema,
@@ -32,7 +31,7 @@ from foldyn.analyses.sections import (
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.loads import load_from
-from foldyn.cases.supports import AXES, check_axis, support_from
+from foldyn.cases.supports import AXES, DIRECTIONS, check_axis, support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.values import indices, number, show

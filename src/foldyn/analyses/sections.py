@@ -36,7 +36,6 @@ from foldyn.structures.options import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, nearest, number, numbers, show, vector
 
 AXES = ("x", "y", "z")
-DIRECTIONS = (*AXES, "-x", "-y", "-z")
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 

@@ -15,6 +15,7 @@ from foldyn.errors import InputError
 from foldyn.values import number, number_or_list, show
 
 AXES = "xyz"
+DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,13 @@ def check_axis(name: str, axis: Any) -> str:
     if not isinstance(axis, str) or axis not in tuple(AXES):
         raise InputError(f' = {show(axis)}: must be one of "x", "y" and "z"', name)
     return axis
+
+
+def signed(name: str, direction: Any) -> tuple[int, float]:
+    """Return the number of the axis and the sign of a direction: "-z" is (2, -1)."""
+    if not isinstance(direction, str) or direction not in DIRECTIONS:
+        raise InputError(f" = {show(direction)}: must be one of {', '.join(DIRECTIONS)}", name)
+    return AXES.index(direction[-1]), -1.0 if direction.startswith("-") else 1.0
 
 
 def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ...]:

@@ -12,7 +12,8 @@ t and w are found by least squares weighted by mass. The fitted motion is the su
     torsion      w_a             bending along c    t_c and w_b
 
 and phi' M (part) / phi' M phi is the share of each; what is left is distortion of the sections. The
-shares add up to 1; a small negative one can occur where sections are not symmetric.
+shares add up to 1; a small negative one can occur where sections are not symmetric. A mode is named
+for the part that has more than half of its motion; one that has none is mixed.
 """
 
 from __future__ import annotations
@@ -33,12 +34,13 @@ if TYPE_CHECKING:
 AXES = "xyz"
 NODES_PER_STATION = 12
 MOST_STATIONS = 9
+AWAY = 0.2  # from the supports to the middle, of the extent: as far as that is a direction
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 
 
 def character(
     modes: xarray.Dataset,
-    axis: str = "x",
+    axis: str | None = None,
     nodes: Any = None,
     *,
     stations: int | None = None,
@@ -50,8 +52,8 @@ def character(
     ----------
     modes : xarray.Dataset
         From `foldyn.modes`.
-    axis : {"x", "y", "z"}
-        Main axis of the structure.
+    axis : {"x", "y", "z"}, optional
+        Main axis of the structure; by default `main_axis` of the case.
     nodes : array_like of int, optional
         Judge the motion of these nodes alone, such as a loaded edge; all unless given.
     stations : int, optional
@@ -64,9 +66,10 @@ def character(
     -------
     xarray.Dataset
         `share` (mode, kind) with the kinds axial, bending along each of the other two axes,
-        torsion, distortion; `kind_of` (mode), the one with the largest share, or "rigid"; `order`
-        (mode), its number among the modes of that kind in this set; `name` (mode) in words, such
-        as "second bending along y".
+        torsion, distortion; `kind_of` (mode), the one with more than half of the motion, else
+        "mixed", or "rigid"; `order` (mode), its number among the modes of that kind in this set;
+        `name` (mode) in words, such as "second bending along y", or, with the two largest shares,
+        "mixed: torsion, bending along y".
 
     Raises
     ------
@@ -76,9 +79,10 @@ def character(
     check_result(modes, "modes: ")
     if modes.attrs["foldyn_result"] != "modes":
         raise InputError(f"modes: is a {modes.attrs['foldyn_result']}; give modes")
-    if axis not in tuple(AXES):
+    if axis not in (None, *AXES):
         raise InputError(f"axis = {axis!r}: give 'x', 'y' or 'z'")
-    structure = (case_of(modes) if case is None else case).structure
+    case = case_of(modes) if case is None else case
+    structure, axis = case.structure, axis or main_axis(case)
     chosen = np.arange(len(structure.nodes)) if nodes is None else _nodes(nodes, structure)
     count = _stations(stations, len(chosen))
     weight = np.asarray(structure.mass.sum(axis=1)).ravel()[chosen]
@@ -86,11 +90,29 @@ def character(
     parts = _beam_parts(x, weight, AXES.index(axis), count)
     share = _shares(modes["shape"].values[:, chosen], np.repeat(weight, 3), parts)
     kinds = np.array([*parts, "distortion"])
-    kind = kinds[np.argmax(share, axis=1)].astype("<U20")
+    ranked = kinds[np.argsort(-share, axis=1, kind="stable")]
+    kind = np.where(share.max(axis=1) > 0.5, ranked[:, 0], "mixed").astype("<U20")
     kind[modes["rigid"].values] = "rigid"
     order = np.array([int((kind[: k + 1] == kind[k]).sum()) for k in range(len(kind))])
-    names = np.array([f"{_ordinal(n)} {what}" for n, what in zip(order, kind, strict=True)])
+    names = np.array(
+        [
+            f"mixed: {first}, {second}" if what == "mixed" else f"{_ordinal(n)} {what}"
+            for n, what, (first, second, *_) in zip(order, kind, ranked, strict=True)
+        ]
+    )
     return _dataset(modes, kinds, share, kind, order, names, axis)
+
+
+def main_axis(case: Case) -> str:
+    """Axis along which a structure leads away from its supports, or else its longest one."""
+    nodes = case.structure.nodes
+    extent = np.ptp(nodes, axis=0)
+    held = case.fixed.sum(axis=1)
+    if held.any():
+        away = np.abs(nodes.mean(axis=0) - held @ nodes / held.sum())
+        if away.max() > AWAY * extent.max():
+            return AXES[int(away.argmax())]
+    return AXES[int(extent.argmax())]
 
 
 def _dataset(modes, kinds, share, kind, order, names, axis) -> xarray.Dataset:

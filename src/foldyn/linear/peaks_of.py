@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.supports import AXES, check_axis
+from foldyn.cases.supports import AXES, signed
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.linear.quantity import PER_FORCE, convert, quantity_of
 from foldyn.signals import (
     CircleFit,
+    Peaks,
     circle_fit,
     circle_fits,
     find_peaks,
@@ -26,6 +27,8 @@ from foldyn.values import choice
 if TYPE_CHECKING:
     import xarray
 
+PROMINENT = 0.05
+HALF_POWER = math.sqrt(2.0)
 SIDES = 1.5  # half-power widths on either side of a peak that a circle fit takes at most
 
 
@@ -70,7 +73,7 @@ def peaks_of(
     node: int,
     axis: str,
     quantity: str | None = None,
-    prominence: float = 0.05,
+    prominence: float | None = None,
     count: int | None = None,
 ) -> tuple[Peak, ...]:
     """Peaks of a frequency response at one node along one axis, by increasing frequency.
@@ -80,13 +83,16 @@ def peaks_of(
     response : xarray.Dataset
         A result of `frf`.
     node : int
-    axis : {"x", "y", "z"}
+    axis : {"x", "y", "z", "-x", "-y", "-z"}
+        The sign changes nothing.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         The curve whose peaks and half-power points are meant; by default what the response holds.
         A strongly damped mode peaks at the lowest frequency in the receptance, at its natural
         frequency in the mobility. The circle fit does not depend on it.
-    prominence : float
-        Least prominence of a peak, as a part of the curve's maximum.
+    prominence : float, optional
+        Least prominence of a peak, as a part of the curve's maximum. By default 0.05, and a lower
+        peak counts too if it falls to half its power on both sides, as a logarithmic axis shows
+        it; not in an estimate from random bursts, which scatters.
     count : int, optional
         Only the so many most prominent peaks.
 
@@ -103,7 +109,7 @@ def peaks_of(
         Not a frequency response; no such node, axis or quantity.
     """
     held = quantity_of(response)
-    column = AXES.index(check_axis("axis", axis))
+    column, _ = signed("axis", axis)
     if isinstance(node, bool) or node not in response["node"].values:
         raise InputError(f"node = {node!r}: the response has nodes 0 to {len(response.node) - 1}")
     shown = held
@@ -118,10 +124,10 @@ def peaks_of(
         return ()
     kind = shown if shown in PER_FORCE else "receptance"
     rate = float(response.attrs.get("window_rate", 0.0))
-    found = find_peaks(f, curve, prominence, count, kind)
+    found = resonances(f, curve, kind, prominence, count, "coherence" in response)
     halves = [_half_power(f, curve, float(peak), kind, rate) for peak in found.frequency]
     bands = _bands(f, np.abs(curve), found.index, [half.width for half in halves])
-    circles = _circles(f, _modal(response, f, curve, shown, axis, rate), bands, kind, rate)
+    circles = _circles(f, _modal(response, f, curve, shown, AXES[column], rate), bands, kind, rate)
     return tuple(
         Peak(
             frequency=float(found.frequency[k]),
@@ -138,6 +144,19 @@ def peaks_of(
         )
         for k, (half, circle) in enumerate(zip(halves, circles, strict=True))
     )
+
+
+def resonances(
+    f: NDArray, curve: NDArray, kind: str, prominence: float | None, count: int | None,
+    scatters: bool,
+) -> Peaks:  # fmt: skip
+    """Peaks of a finite curve that figures mark and tables list; see `peaks_of`.
+
+    scatters : whether the curve is an estimate from random records, where low peaks mean nothing.
+    """
+    if prominence is not None:
+        return find_peaks(f, curve, prominence, count, kind)
+    return find_peaks(f, curve, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
 
 
 class _Half(NamedTuple):

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.cases.supports import signed
 from foldyn.errors import InputError
 from foldyn.plots.chosen import AXES, check_nodes_of
 
-DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 CRITICAL = ("limit", "bifurcation")
 """Kinds of points that figures mark."""
 
@@ -72,16 +72,9 @@ def runs(path: xr.Dataset) -> list[Run]:
     ]
 
 
-def signed(direction: str) -> tuple[int, float]:
-    """Axis number and sign of a direction: "-z" is (2, -1)."""
-    if direction not in DIRECTIONS:
-        raise InputError(f"direction: {direction!r}; use one of {', '.join(DIRECTIONS)}")
-    return AXES.index(direction[-1]), -1.0 if direction.startswith("-") else 1.0
-
-
 def along(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:
     """Mean displacement (m) of nodes in a direction at each point."""
-    axis, sign = signed(direction)
+    axis, sign = signed("direction", direction)
     moved = path["displacement"].sel(node=list(nodes), axis=AXES[axis])
     return sign * moved.mean("node").values + 0.0  # no -0
 

@@ -29,7 +29,12 @@ def check_nodes_of(results: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> l
     return numbers
 
 
-def directions(axes: str | Sequence[str] | None, count: int, moved: Iterable[NDArray]) -> list[str]:
+def directions(
+    axes: str | Sequence[str] | None,
+    count: int,
+    moved: Iterable[NDArray],
+    known: Sequence[str] = AXES,
+) -> list[str]:
     """One direction for each node, by default the one in which it moves most.
 
     Parameters
@@ -46,8 +51,9 @@ def directions(axes: str | Sequence[str] | None, count: int, moved: Iterable[NDA
         return [AXES[k] for k in largest.argmax(axis=1)]
     chosen = [axes] if isinstance(axes, str) else list(axes)
     for direction in chosen:
-        if direction not in AXES:
-            raise InputError(f'axes: {direction!r} is no direction; use "x", "y" or "z"')
+        if direction not in known:
+            listed = ", ".join(f'"{name}"' for name in known)
+            raise InputError(f"axes: {direction!r} is no direction; use one of {listed}")
     if len(chosen) == 1:
         return chosen * count
     if len(chosen) != count:

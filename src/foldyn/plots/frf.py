@@ -13,13 +13,11 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 from foldyn.plots.responses import Curve, curves_of, unit_of
-from foldyn.signals import find_peaks
 
-PROMINENCE = 0.05
-"""Least prominence of a peak that is marked, as a part of the curve's maximum."""
 _APART = 0.07  # of the frequency axis: peaks nearer than that share one label
 _FEW = 60  # frequencies that are drawn as dots, too
 _DECADES = 5.0  # below the highest value that the magnitude shows at least
@@ -30,7 +28,7 @@ def plot_frf(
     nodes: Sequence[int],
     axes: str | Sequence[str] | None = None,
     quantity: str | None = None,
-    prominence: float = PROMINENCE,
+    prominence: float | None = None,
     title: str = "",
 ) -> Figure:
     """Draw frequency responses of chosen nodes: magnitude, phase, and coherence if there is one.
@@ -42,13 +40,13 @@ def plot_frf(
     nodes : sequence of int
         Nodes to show, a curve each.
     axes : str, sequence of str, or None
-        Direction shown: one of "x", "y", "z" for all nodes, or one for each node. None: the
-        direction in which each node responds most.
+        Direction shown: one of "x", "y", "z", "-x", "-y", "-z" for all nodes, or one for each
+        node. None: the axis along which each node responds most, in the direction of the drive.
     quantity : {"receptance", "mobility", "accelerance"}, optional
         What is drawn of a response to forces; by default the receptance. A response to a moving
         base is drawn as transmissibility.
-    prominence : float
-        Least prominence of the peaks that are marked, as a part of the curve's maximum.
+    prominence : float, optional
+        Which peaks are marked; see `foldyn.linear.peaks_of`.
     title : str
         Title of the figure.
 
@@ -64,7 +62,7 @@ def plot_frf(
         No response or node, a node, direction or quantity that a response does not have.
     """
     curves, shown = curves_of(responses, nodes, axes, quantity)
-    if not 0.0 <= prominence < 1.0:
+    if prominence is not None and not 0.0 <= prominence < 1.0:
         raise InputError(f"prominence: {prominence!r}; give a part of the maximum, 0 to below 1")
     coherent = any(curve.coherence is not None for curve in curves)
     heights = [2.6, 1.3, 1.0][: 3 if coherent else 2]
@@ -130,13 +128,14 @@ def _label(curve: Curve, models: bool, nodes: bool, axes: bool) -> str:
     return ", ".join(parts) or "response"
 
 
-def _peaks(curve: Curve, quantity: str, prominence: float) -> NDArray[np.float64]:
+def _peaks(curve: Curve, quantity: str, prominence: float | None) -> NDArray[np.float64]:
     """Frequency and height of the peaks of a curve, shape (p, 2)."""
     usable = np.isfinite(curve.values)
     if usable.sum() < 3 or not curve.values[usable].any():
         return np.zeros((0, 2))
     kind = "receptance" if quantity == "transmissibility" else quantity
-    peaks = find_peaks(curve.frequency[usable], curve.values[usable], prominence, quantity=kind)
+    f, scatters = curve.frequency[usable], curve.coherence is not None
+    peaks = resonances(f, curve.values[usable], kind, prominence, None, scatters)
     return np.column_stack([peaks.frequency, peaks.height])
 
 

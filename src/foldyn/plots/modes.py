@@ -23,7 +23,6 @@ MOST_MODES = 12
 """Modes that one figure shows at most."""
 _AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
 _STRETCH = 0.4  # largest displacement of a bar's ends against each other, as a part of its length
-_AWAY = 0.2  # distance of the supports' center from the sheet's, as a part of its extent
 _NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
 
 
@@ -151,7 +150,7 @@ def mode_names(
         from foldyn.linear import character
 
         try:
-            names = character(modes, main_axis(sheet), case=sheet.case)
+            names = character(modes, case=sheet.case)
         except InputError:  # of a structure alone, with laws that the result does not hold
             return {}
     if not hasattr(names, "data_vars"):
@@ -165,17 +164,6 @@ def mode_names(
         strict=True,
     )
     return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in told if not rigid}
-
-
-def main_axis(sheet: Sheet3D) -> str:
-    """Axis along which a structure leads away from its supports, or else its longest one."""
-    extent = np.ptp(sheet.nodes, axis=0)
-    if sheet.case is not None and sheet.case.fixed.any():
-        held = np.asarray(sheet.case.fixed).sum(axis=1)
-        away = np.abs(sheet.nodes.mean(axis=0) - held @ sheet.nodes / held.sum())
-        if away.max() > _AWAY * extent.max():
-            return "xyz"[int(away.argmax())]
-    return "xyz"[int(extent.argmax())]
 
 
 def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:

@@ -63,8 +63,8 @@ def plot_nyquist(
     response : xarray.Dataset
         A response of `foldyn.frf` to forces.
     node : int
-    axis : {"x", "y", "z"}, optional
-        By default the direction in which the node responds most.
+    axis : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        By default the axis along which the node responds most, in the direction of the drive.
     peaks : sequence of Peak, optional
         Its peaks, of `foldyn.linear.peaks_of`, by default all of them: natural frequency and
         damping ratio of the circles are theirs. The first 6 that have a circle are drawn.

@@ -13,9 +13,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.cases.supports import signed
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import CRITICAL, along, asked, check_paths, runs, signed
+from foldyn.plots.along import CRITICAL, along, asked, check_paths, runs
 from foldyn.plots.chosen import AXES
 
 _UNSTABLE = (0, (4, 2))
@@ -143,7 +144,7 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
     InputError
         A node is not supported along the direction.
     """
-    axis, sign = signed(direction)
+    axis, sign = signed("direction", direction)
     chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == AXES[axis])
     held = path["support_node"].values[chosen.values]
     loose = sorted(set(nodes) - set(held.tolist()))

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.cases.supports import DIRECTIONS, signed
 from foldyn.errors import InputError
 from foldyn.linear import convert
 from foldyn.linear.quantity import PER_FORCE, quantity_of
@@ -26,6 +27,7 @@ class Curve:
         Of the model.
     node : int
     axis : str
+        Direction: one of "x", "y", "z", "-x", "-y", "-z".
     frequency : ndarray, shape (m,)
         Frequencies (Hz).
     values : ndarray, shape (m,), complex
@@ -67,16 +69,30 @@ def curves_of(
         responses = {label: convert(response, shown) for label, response in responses.items()}
     numbers = check_nodes_of(responses, nodes)
     seen = (r[shown].sel(node=numbers, axis=list(AXES)).values for r in responses.values())
-    chosen = directions(axes, len(numbers), map(np.nan_to_num, seen))
+    drives = [along_drive(response) for response in responses.values()]
+    if axes is None:
+        axes = [
+            drives[0][AXES.index(axis)]
+            for axis in directions(None, len(numbers), map(np.nan_to_num, seen))
+        ]
+    chosen = directions(axes, len(numbers), (), DIRECTIONS)
     curves = []
     for label, response in responses.items():
         frequency = response["frequency"].values.astype(np.float64)
         for node, axis in zip(numbers, chosen, strict=True):
-            here = response.sel(node=node, axis=axis)
-            values = here[shown].values.astype(np.complex128)
+            column, sign = signed("axes", axis)
+            here = response.sel(node=node, axis=AXES[column])
+            values = sign * here[shown].values.astype(np.complex128)
             coherence = here["coherence"].values if "coherence" in response else None
             curves.append(Curve(label, node, axis, frequency, values, coherence))
     return curves, shown
+
+
+def along_drive(response: xr.Dataset) -> list[str]:
+    """Each axis in the direction in which forces drive along it; as it is where none does."""
+    forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
+    backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
+    return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]
 
 
 def unit_of(quantity: str) -> str:

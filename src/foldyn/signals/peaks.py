@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.signals import records
 
+LOWEST = 1e-4  # of the maximum: what lies below may be the error of a simulation
+
 
 @dataclass(frozen=True)
 class Peaks:
@@ -40,6 +42,7 @@ def find_peaks(
     prominence: float = 0.05,
     count: int | None = None,
     quantity: str = "receptance",
+    rise: float | None = None,
 ) -> Peaks:
     """Find the peaks of a magnitude curve: a frequency response, or an amplitude spectrum.
 
@@ -59,6 +62,9 @@ def find_peaks(
         Keep only the so many most prominent ones.
     quantity : {"receptance", "mobility", "accelerance"}
         What the curve is; for the spectrum of a displacement "receptance".
+    rise : float or None
+        Also keep lower peaks that stand out by this factor from the lowest points on the way to
+        higher ground: on a logarithmic axis they are as good as high ones.
 
     Returns
     -------
@@ -87,11 +93,16 @@ def find_peaks(
     f, size = magnitude_curve(frequency, magnitude)
     share = records.checked_number("prominence", prominence, least=0.0, below=1.0)
     from scipy.signal import find_peaks as search  # slow to import
+    from scipy.signal import peak_prominences
 
     # an absolute floor of 0 would keep rounding on flat stretches
     least = max(share, np.finfo(np.float64).eps) * size.max()
-    index, properties = search(size, prominence=least)
-    height = properties["prominences"]
+    index, _ = search(size, prominence=least)
+    if rise is not None and size.any():
+        factor = records.checked_number("rise", rise, above=1.0)
+        decibel = np.log(np.maximum(size, LOWEST * size.max()))
+        index = np.union1d(index, search(decibel, prominence=np.log(factor))[0])
+    height = peak_prominences(size, index)[0]
     if count is not None:
         most = np.argsort(height, kind="stable")[::-1][: records.checked_count("count", count)]
         keep = np.sort(most)
