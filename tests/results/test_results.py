@@ -368,6 +368,10 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch) -> None:
         save(ds, tmp_path / "none" / "run.nc")
     with pytest.raises(InputError, match="is a folder"):
         save(ds, tmp_path)
+    with pytest.raises(
+        InputError, match=r"run\.csv: only NetCDF is written; name the file run\.nc"
+    ):
+        save(ds, tmp_path / "run.csv")
     with pytest.raises(InputError, match="is not a Foldyn result"):
         save(xr.Dataset(), tmp_path / "run.nc")
     save(ds, tmp_path / "run.nc")

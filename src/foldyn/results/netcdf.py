@@ -20,6 +20,7 @@ from foldyn.results.sink import Sink
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
+SUFFIXES = ("", ".nc", ".nc4", ".netcdf", ".cdf", ".h5", ".hdf5")
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 LEAST_MEMORY = 2**29
@@ -34,13 +35,18 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        The path cannot be written.
+        The path cannot be written, or its name is that of another kind of file.
     OSError
         The disk is full, or fails.
     """
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"{path}: only NetCDF is written; name the file {path.stem}.nc, or write a table "
+            'yourself, as ds["displacement"].to_series().to_csv(path)'
+        )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:

@@ -32,12 +32,13 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     ds : xarray.Dataset
         A result.
     path : path
-        The file, usually ``*.nc``; its folder must exist.
+        The file, as ``run.nc``; its folder must exist.
 
     Raises
     ------
     InputError
-        Not a result, or the path cannot be written.
+        Not a result, the path cannot be written, or its name is that of another kind of file, as
+        ``run.csv``.
     """
     check_result(ds, "cannot save: the dataset ")
     netcdf.write(_split(ds), path)
