@@ -158,3 +158,33 @@ def test_inertia_table_knows_the_rhombus():
     for rule, corner, center in (("panel", 1 / 5, 1 / 5), ("circumcenter", 1 / 8, 1 / 2)):
         by_hand = 3 * (2 * corner + center / 4) - 1
         assert script["errors"](rule, rhombus, "n5b8") == pytest.approx([by_hand] * 4)
+
+
+def test_what_a_swinging_panel_and_a_twisting_one_make_of_a_rule():
+    """A square panel on a hinge, by `modes`; the twist by hand: integral of (x y)^2 is 1/9."""
+    page = (DOCS / "mass-rules.md").read_text("utf-8")
+    square = fd.Pattern(
+        [[0, -1, 0], [0, 0, 0], [-1, 0, 0], [-1, -1, 0], [1, 0, 0], [1, -1, 0]],
+        [[0, 1, 2, 3], [0, 5, 4, 1]],
+    )
+    sheet = fd.Sheet(1e9, 0.25, 0.01, 1.0)
+
+    def swing(rule: str) -> float:
+        s = fd.discretize(
+            square, sheet, mass=rule, fold_law="linear", bend_law="linear", crease_stiffness=1e-6
+        )
+        held = [node for node in range(len(s.nodes)) if s.nodes[node, 0] < 1e-9]
+        return float(fd.modes(fd.Case(s, [fd.Fix(held, "xyz")]), 1).frequency[0])
+
+    true = np.sqrt(1e-6 / (0.01 / 3.0)) / (2 * np.pi)  # a panel of 0.01 kg and 1 m
+    rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ([\d.]+) % \|$", page, re.M)
+    assert len(rows) == 5
+    for names, percent in rows:
+        for rule in re.findall(r"\w+", names):
+            assert 100 * swing(rule) / true == pytest.approx(float(percent), abs=0.06), rule
+    corners = fd.Pattern([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
+    for rule, twist in (("consistent", 6), ("inertia_exact", 3)):
+        mass = fd.discretize(corners, sheet, mass=rule).mass
+        w = np.array([1.0, -1.0, 1.0, -1.0, 0.0])
+        assert w @ (mass @ w) == pytest.approx(mass.sum() / twist)
+        assert f"m w^2/{twist}$" in page
