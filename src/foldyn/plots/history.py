@@ -7,11 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
+
+VISIBLE = 0.02
+"""Part of a curve's height that can be seen."""
+ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 def plot_history(
@@ -38,7 +43,8 @@ def plot_history(
         Direction shown: one of "x", "y", "z" for all nodes, or one for each node (a sequence of
         length one serves all). None: the direction in which each node moves most.
     max_frequency : float or None
-        Upper end of the frequency axis (Hz). None: half the smallest sampling frequency.
+        Upper end of the frequency axis (Hz). None: a round number above the last frequency at
+        which a curve has 2 % of its height, at most half the smallest sampling frequency.
     title : str
         Title of the figure.
     window, detrend : str or None
@@ -66,10 +72,18 @@ def plot_history(
     intervals = {
         label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
     }
-    if max_frequency is None:
-        max_frequency = 0.5 / max(intervals.values())
-    elif not (np.isfinite(max_frequency) and max_frequency > 0.0):
+    if max_frequency is not None and not (np.isfinite(max_frequency) and max_frequency > 0.0):
         raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
+    contents = {
+        (label, row): spectrum(
+            moved[label][:, row, AXES.index(direction)], intervals[label], window=window,
+            detrend=detrend,
+        )
+        for label in trajectories
+        for row, direction in enumerate(chosen)
+    }  # fmt: skip
+    nyquist = 0.5 / max(intervals.values())
+    highest = max_frequency or min(nyquist, max(map(_reach, contents.values()))) or nyquist
 
     rows = len(numbers)
     figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
@@ -90,17 +104,15 @@ def plot_history(
         for index, (label, dataset) in enumerate(trajectories.items()):
             time = dataset["time"].values
             motion = moved[label][:, row, AXES.index(direction)]
-            frequencies, amplitude = spectrum(
-                motion, intervals[label], window=window, detrend=detrend
-            )
-            shown = frequencies <= max_frequency * (1.0 + 1e-9)
+            frequencies, amplitude = contents[label, row]
+            shown = frequencies <= highest * (1.0 + 1e-9)
             look = style.line_style(index) | {"label": label}
             (line,) = left.plot(time, motion, **look)
             right.plot(frequencies[shown], amplitude[shown], **look)
             if row == 0:
                 handles.append(line)
         left.margins(x=0.0)
-        right.set_xlim(0.0, max_frequency)
+        right.set_xlim(0.0, highest)
         right.set_ylim(bottom=0.0)
         for frame in (left, right):
             style.exponents(frame, ticks=5)
@@ -108,3 +120,13 @@ def plot_history(
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
     return style.finish(figure)
+
+
+def _reach(content: tuple[NDArray[np.float64], NDArray[np.float64]]) -> float:
+    """A round number (Hz) above the frequencies at which an amplitude can be seen; or 0."""
+    frequencies, amplitude = (part[1:] for part in content)
+    if not amplitude.any():
+        return 0.0
+    end = frequencies[np.flatnonzero(amplitude >= VISIBLE * amplitude.max())[-1]]
+    decade = 10.0 ** np.floor(np.log10(end))
+    return float(decade * next(step for step in ROUND if step * decade >= end))
