@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 import struct
 import zlib
 from html.parser import HTMLParser
@@ -12,6 +13,7 @@ import pytest
 
 from foldyn.errors import InputError
 from foldyn.report import Heading, Picture, Table, Text, write_report
+from foldyn.report.sections import rounded
 
 _VOID = {"meta", "img", "br", "link"}
 
@@ -150,6 +152,33 @@ def test_table_cells(tmp_path):
     aligned = [attrs.get("class") for tag, attrs in page.tags if tag == "th"]
     assert aligned == [None, "number", "number", None]
     assert page.texts["caption"] == ["Errors"]
+
+
+def test_points_of_a_column_stand_below_each_other():
+    """Unseen digits fill up what follows the point."""
+    html = Table(["a", "b"], [[0.25, 71300.0], [12.0, 4.5e-7], [1.125, None]], digits=4).html()
+    cells = re.findall(r'<td class="number">(.*?)</td>', html)
+    seen = [re.sub(r"<span.*</span>", "", cell) for cell in cells]
+    assert seen == ["0.25", "71300", "12", "4.5e-07", "1.125", ""]
+    whole = [re.sub(r"<span[^>]*>|</span>", "", cell) for cell in cells]
+    assert whole[::2] == ["0.255", "12.125", "1.125"]  # "5" and ".125" are not seen
+    behind = [len(cell) - cell.index(".") for cell in whole[::2]]
+    assert len(set(behind)) == 1
+    assert 'class="unseen" aria-hidden="true">5</span>' in cells[0]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (71300.4, "71300"),
+        (999999.0, "1000000"),
+        (-0.000123456, "-0.000123"),
+        (1e-9, "1e-09"),
+        (2.5e7, "2.5e+07"),
+    ],
+)
+def test_exponents_are_for_numbers_far_from_one(value, text):
+    assert rounded(value, 3) == text
 
 
 def test_everything_is_escaped(tmp_path):

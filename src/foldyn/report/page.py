@@ -29,12 +29,15 @@ img, video { display: block; max-width: 100%; height: auto; margin: 0 auto; }
 figcaption, caption { color: #444; font-size: 0.92rem; text-align: left; }
 figcaption { margin-top: 0.4rem; max-width: 46rem; }
 caption { padding-bottom: 0.4rem; max-width: min(46rem, 100vw - 2rem); }
-.table { overflow-x: auto; margin: 1.25rem 0; }
-table { border-collapse: collapse; font-size: 0.95rem; }
-th, td { padding: 0.35rem 0.8rem; text-align: left; vertical-align: top; }
-th { border-bottom: 2px solid #1a1a1a; }
+.table { overflow-x: auto; margin: 1.25rem min(0px, 50% - 50vw + 1rem) 1.25rem 0; }
+table { border-collapse: collapse; font-size: 0.92rem; }
+th, td { padding: 0.3rem 0.6rem; text-align: left; vertical-align: top; }
+th:first-child, td:first-child { padding-left: 0.2rem; }
+th { border-bottom: 2px solid #1a1a1a; vertical-align: bottom; text-wrap: balance; }
 td { border-bottom: 1px solid #e2e2e2; }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.number { text-align: right; font-variant-numeric: tabular-nums; }
+td.number { white-space: nowrap; }
+.unseen { visibility: hidden; user-select: none; }
 @media (max-width: 40rem) {
   body { padding: 1rem 0.8rem 3rem; }
   h1 { font-size: 1.5rem; }

@@ -100,17 +100,19 @@ class Table:
             for k in range(len(self.header))
         ]
         kind = [' class="number"' if right else "" for right in numeric]
+        columns = []
+        for k, right in enumerate(numeric):
+            cells = [escape(self._cell(row[k])) for row in self.rows]
+            columns.append(_aligned(cells) if right else cells)
         titles = "".join(
             f'<th scope="col"{k}>{escape(title)}</th>'
             for title, k in zip(self.header, kind, strict=True)
         )
         body = "\n".join(
             "<tr>"
-            + "".join(
-                f"<td{k}>{escape(self._cell(cell))}</td>" for cell, k in zip(row, kind, strict=True)
-            )
+            + "".join(f"<td{k}>{cell}</td>" for cell, k in zip(cells, kind, strict=True))
             + "</tr>"
-            for row in self.rows
+            for cells in zip(*columns, strict=True)
         )
         return (
             f'<div class="table"><table>{caption}\n<thead><tr>{titles}</tr></thead>\n'
@@ -125,7 +127,7 @@ class Table:
         if isinstance(value, Integral):
             return str(int(value))
         if isinstance(value, Real):
-            return f"{float(value):.{self.digits}g}"
+            return rounded(float(value), self.digits)
         return str(value)
 
 
@@ -199,6 +201,30 @@ def _pixels(content: bytes) -> tuple[int, int]:
     if content.startswith(b"GIF") and len(content) >= 10:
         return int.from_bytes(content[6:8], "little"), int.from_bytes(content[8:10], "little")
     return 0, 0
+
+
+def rounded(value: float, digits: int) -> str:
+    """Write a number with some significant digits, with an exponent only where it is far from 1."""
+    text = f"{value:.{digits}g}"
+    if 1e-4 <= abs(value) < 1e6 and "e" in text:
+        return f"{float(text):.0f}"
+    return text
+
+
+def _aligned(cells: Sequence[str]) -> list[str]:
+    """Numbers as HTML with unseen digits behind, so that their points stand below each other.
+
+    An exponent counts as what follows the point.
+    """
+    tails = [re.search(r"[.e].*", text) for text in cells]
+    found = ["" if tail is None else tail[0] for tail in tails]
+    longest = max(found, key=len, default="")
+    return [
+        f'{text}<span class="unseen" aria-hidden="true">{longest[len(tail) :]}</span>'
+        if text and len(tail) < len(longest)
+        else text
+        for text, tail in zip(cells, found, strict=True)
+    ]
 
 
 def cell(value: float) -> float | None:
