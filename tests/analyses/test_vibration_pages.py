@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import foldyn as fd
 from foldyn import plots
 from foldyn.analyses import read_case
 from foldyn.analyses.frf_page import driven_direction
@@ -78,7 +79,7 @@ def test_the_direction_is_that_of_the_drive_and_nodes_are_told(write):
     assert driven_direction(found) == "z"
     assert "of nodes 3, 4, 5, 6, 7, 8, 9, 10 (the first 8 of 12) along z" in page
     assert "displacement per newton of driving force, on all driven nodes together" in page
-    assert "Computed with Foldyn" in page and "alpha 0.5 1/s, beta 0 s" in page
+    assert f"Foldyn {fd.__version__}" in page and "alpha 0.5 1/s, beta 0 s" in page
 
 
 def test_a_drive_backward_is_read_backward(write):

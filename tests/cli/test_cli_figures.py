@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+from html import escape
 from pathlib import Path
 
 import pytest
 
+import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
 
@@ -32,6 +34,13 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     assert "<h1>Miura &amp; &lt;co&gt;</h1>" in page
     for rule in ("panel", "circumcenter"):
         assert f"<td>{rule}</td>" in page
+    for told in (
+        "youngs modulus 1e+06 Pa; ", "scheme n5b8; mass panel, circumcenter; ",
+        "calibration standard", "alpha 0.0628; beta 0", f"Foldyn {fd.__version__}</td>",
+        "<td>foldyn run case.toml --out r</td>", "<summary>The case file case.toml</summary>",
+        escape(Path("case.toml").read_text("utf-8")),
+    ):  # fmt: skip
+        assert told in page, told
     assert f"figures and {Path('r/report.html')}" in done.out
 
 

@@ -112,9 +112,13 @@ class Analysis(ABC):
 
     @abstractmethod
     def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
-        """Draw results, by mass rule, into an existing folder; returns the path of report.html."""
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
+        command: str = "",
+    ) -> Path:  # fmt: skip
+        """Draw results, by mass rule, into an existing folder; returns the path of report.html.
+
+        command : what was typed to compute them, for the page.
+        """
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse what the computations of all mass rules cannot do together."""

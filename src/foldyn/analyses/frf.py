@@ -247,10 +247,11 @@ class FrfAnalysis(Analysis):
         return np.unique(np.concatenate(forces)) if forces else movable(case)
 
     def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
+        command: str = "",
+    ) -> Path:  # fmt: skip
         """Draw the responses; see `Analysis`."""
-        return frf_page(case_file, results, folder)
+        return frf_page(case_file, results, folder, command)
 
 
 def _bar(shown: bool) -> Any:

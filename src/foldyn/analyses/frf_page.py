@@ -10,6 +10,7 @@ import numpy as np
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
+from foldyn.analyses.provenance import provenance
 from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import METHODS
@@ -27,7 +28,9 @@ MOST_REASONS = 6
 """Peaks of which the page says why a number is missing, at most."""
 
 
-def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+def frf_page(
+    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path, command: str = ""
+) -> Path:
     """Draw a case and its frequency responses into `folder`; returns the path of report.html."""
     album = Album(folder)
     first = next(iter(results))
@@ -71,6 +74,7 @@ def frf_page(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder:
         _peaks(found, quantity, axis, len(results) > 1),
         _run(case_file, results),
         Text(_notes(response, case, found)),
+        *provenance(case_file, results, command),
     ]
     return write_report(album.folder / "report.html", case_file.heading, sections)
 
@@ -161,9 +165,8 @@ def _notes(
 ) -> str:
     """What a reader has to know about the numbers."""
     told = [
-        f"Computed with Foldyn {response.attrs['foldyn_version']}. Damping: alpha "
-        f"{case.damping.alpha:g} 1/s, beta {case.damping.beta:g} s. The result carries its own "
-        "case."
+        f"Damping: alpha {case.damping.alpha:g} 1/s, beta {case.damping.beta:g} s. The result "
+        "carries its own case."
     ]
     soft = int(response.attrs.get("soft", 0))
     if soft:

@@ -13,6 +13,7 @@ from pydantic import PlainValidator
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
+from foldyn.analyses.provenance import provenance
 from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
@@ -121,13 +122,16 @@ class ModesAnalysis(Analysis):
         )
 
     def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
+        command: str = "",
+    ) -> Path:  # fmt: skip
         """Draw the modes; see `Analysis`."""
-        return _draw(case_file, results, folder)
+        return _draw(case_file, results, folder, command)
 
 
-def _draw(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path) -> Path:
+def _draw(
+    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path, command: str
+) -> Path:
     album = Album(folder)
     first = next(iter(results))
     case, modes = case_file.case(first), results[first]
@@ -166,6 +170,7 @@ def _draw(case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Pa
     sections += [Heading("The numbers"), _table(modes, told, rule)]
     sections += [_compared(results, same)] if others else []
     sections += [_run(case_file, results), Text(_notes(modes, case))]
+    sections += provenance(case_file, results, command)
     return write_report(album.folder / "report.html", case_file.heading, sections)
 
 
@@ -283,8 +288,8 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
 def _notes(modes: xarray.Dataset, case: Case) -> str:
     """What a reader has to know about the numbers."""
     told = [
-        f"Computed with Foldyn {modes.attrs['foldyn_version']}. Modes are small vibrations about "
-        f"{_about(modes)}, shapes of the modal mass 1. The result carries its own case."
+        f"Modes are small vibrations about {_about(modes)}, shapes of the modal mass 1. The result "
+        "carries its own case."
     ]
     if case.damping.alpha or case.damping.beta:
         told.append(

@@ -11,6 +11,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
+from foldyn.analyses.provenance import provenance
 from foldyn.analyses.sections import (
     AXES,
     Animation,
@@ -162,8 +163,9 @@ class MotionAnalysis(Analysis):
         )
 
     def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
+        command: str = "",
+    ) -> Path:  # fmt: skip
         """Draw the motions; see `Analysis`."""
         album = Album(folder)
         first = next(iter(results))
@@ -205,11 +207,11 @@ class MotionAnalysis(Analysis):
             Heading("The numbers"),
             _table(case_file, results, nodes),
             Text(
-                f"Computed with Foldyn {trajectory.attrs['foldyn_version']}. The energy error is "
-                "the largest imbalance of kinetic + strain + dissipated energy - work, relative to "
-                "the largest of them. The results carry their own case and can be run again from "
-                "it."
+                "The energy error is the largest imbalance of kinetic + strain + dissipated energy "
+                "- work, relative to the largest of them. The results carry their own case and can "
+                "be run again from it."
             ),
+            *provenance(case_file, results, command),
         ]
         return write_report(album.folder / "report.html", case_file.heading, sections)
 

@@ -239,11 +239,12 @@ class PathAnalysis(Analysis):
         return super().shown(case)
 
     def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
+        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
+        command: str = "",
+    ) -> Path:  # fmt: skip
         """Draw the path; see `Analysis`."""
         (path,) = results.values()
-        return path_page(case_file, path, folder)
+        return path_page(case_file, path, folder, command)
 
 
 def _bar(shown: bool) -> Any:

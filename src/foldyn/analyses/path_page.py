@@ -9,6 +9,7 @@ import numpy as np
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
+from foldyn.analyses.provenance import provenance
 from foldyn.plots.along import along, evenly, main_direction
 from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
 from foldyn.report.page import write_report
@@ -26,7 +27,7 @@ MOST_COLUMNS = 4
 """Nodes whose displacements the table shows at most."""
 
 
-def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path) -> Path:
+def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path, command: str = "") -> Path:
     """Draw a case and its path into `folder`; returns the path of report.html."""
     album, case = Album(folder), case_file.case()
     moved = plots.moved_supports(case)
@@ -78,12 +79,12 @@ def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path) -> Path:
         _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved),
         _run(case_file, path),
         Text(
-            f"Computed with Foldyn {path.attrs['foldyn_version']}. Stable means that the tangent "
-            "stiffness of the free nodes has no negative eigenvalue: nodes that supports move stay "
-            "where they are. At every point the out-of-balance force is below the tolerance times "
+            "Stable means that the tangent stiffness of the free nodes has no negative eigenvalue: "
+            "nodes that supports move stay where they are. At every point the out-of-balance force is below the tolerance times "
             "the forces at play, or rounding. The result carries its own case, can be run again "
             "from it, and motions can start from its points."
         ),
+        *provenance(case_file, {case_file.masses[0]: path}, command),
     ]
     return write_report(album.folder / "report.html", case_file.heading, sections)
 

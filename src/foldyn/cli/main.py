@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
@@ -161,7 +162,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
     """Run the command, and say what ended it early."""
     try:
+        arguments = sys.argv[1:] if arguments is None else arguments
         given = parser().parse_args(arguments)
+        given.typed = shlex.join(["foldyn", *arguments])
         for name, level in SILENT.items():
             os.environ.setdefault(name, level)
         os.environ["MPLBACKEND"] = "Agg"  # figures go to files alone
@@ -219,7 +222,7 @@ def _call(given: argparse.Namespace) -> None:
 
     model = given.model, given.divisions
     how: dict[str, Any] = {"figures": not given.no_figures, "quiet": given.quiet}
-    how |= {"command": given.command, "replace": given.replace}
+    how |= {"command": given.command, "replace": given.replace, "typed": given.typed}
     if given.command == "run":
         how |= {"read": lambda path: read_case(path, *model), "results": "results"}
     else:

@@ -40,12 +40,13 @@ def run(
     results: str = "results",
     command: str = "run",
     replace: bool = False,
+    typed: str = "",
 ) -> Path:
     """Run a case file and write its results; returns their folder, by default NAME-`results`.
 
     Everything is checked before the first step is computed and before anything is written. The
     folder is stamped with the command and the case file: others' results in it are refused, or
-    replaced where that is asked for.
+    replaced where that is asked for. The page shows what was `typed`.
     """
     path = find_case(case)
     folder = Path(f"{path.stem}-{results}" if out is None else out)
@@ -65,7 +66,7 @@ def run(
         done = _computed(task, kept, introduction, not quiet and sys.stderr.isatty(), say)
         say(f"wrote {', '.join(kept.kept)}")
         if figures:
-            page = _drawn(case_file, done, folder, say)
+            page = _drawn(case_file, done, folder, typed, say)
             say(f"wrote figures and {page}")
     return folder
 
@@ -112,12 +113,13 @@ def _drawn(
     case_file: CaseFile,
     done: Mapping[str, xarray.Dataset],
     folder: Path,
+    typed: str,
     say: Callable[[str], None],
 ) -> Path:
     """Draw the figures; whatever keeps them from being drawn, the results are there."""
     try:
         say("drawing figures")
-        return case_file.analysis.page(case_file, done, folder)
+        return case_file.analysis.page(case_file, done, folder, typed)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("interrupted while figures were drawn") from None
     except Exception as error:

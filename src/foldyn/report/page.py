@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.report.sections import Heading, Section
 from foldyn.writing import write_text
 
 _CSS = """
@@ -37,6 +37,9 @@ th { border-bottom: 2px solid #1a1a1a; vertical-align: bottom; text-wrap: balanc
 td { border-bottom: 1px solid #e2e2e2; }
 .number { text-align: right; font-variant-numeric: tabular-nums; }
 td.number { white-space: nowrap; }
+summary { cursor: pointer; color: #0072b2; }
+pre { overflow-x: auto; padding: 0.8rem 1rem; background: #f6f6f6; font-size: 0.85rem;
+  line-height: 1.4; }
 .unseen { visibility: hidden; user-select: none; }
 @media (max-width: 40rem) {
   body { padding: 1rem 0.8rem 3rem; }
@@ -59,7 +62,7 @@ def write_report(path: str | PathLike[str], title: str, sections: Iterable[Secti
         File to write, in an existing directory.
     title : str
         Title of the page.
-    sections : iterable of Heading, Text, Table or Picture
+    sections : iterable of Heading, Text, Table, Listing or Picture
         In the order of the page. With two or more headings of level 2 the page begins with a list
         of them.
 
@@ -81,11 +84,12 @@ def write_report(path: str | PathLike[str], title: str, sections: Iterable[Secti
         if isinstance(section, Heading) and section.level == 2:
             contents.append((f"part-{len(contents) + 1}", section.text))
             body.append(section.html(contents[-1][0]))
-        elif isinstance(section, Heading | Text | Table | Picture):
+        elif isinstance(section, Section):
             body.append(section.html())
         else:
             raise InputError(
-                f"sections[{number}]: {type(section).__name__}; use Heading, Text, Table or Picture"
+                f"sections[{number}]: {type(section).__name__}; use Heading, Text, Table, Listing "
+                "or Picture"
             )
     listed = ""
     if len(contents) > 1:

@@ -132,6 +132,21 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Listing:
+    """A text as it is, such as an input file; it is shown when its title is clicked."""
+
+    title: str
+    text: str
+
+    def html(self) -> str:
+        """Write as HTML."""
+        return (
+            f"<details><summary>{escape(self.title)}</summary>"
+            f"<pre>{escape(self.text)}</pre></details>"
+        )
+
+
+@dataclass(frozen=True)
 class Picture:
     """A figure, an animation or a film, stored inside the page.
 
@@ -191,7 +206,7 @@ class Picture:
         return str(self.source) if is_path else f"an object of type {type(self.source).__name__}"
 
 
-Section = Heading | Text | Table | Picture
+Section = Heading | Text | Table | Listing | Picture
 
 
 def _pixels(content: bytes) -> tuple[int, int]:

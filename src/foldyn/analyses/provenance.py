@@ -1,0 +1,63 @@
+"""The last part of every page: what was computed, with what, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from foldyn.analyses.casefile import CaseFile
+from foldyn.report.sections import Heading, Listing, Section, Table
+from foldyn.values import plain
+
+if TYPE_CHECKING:
+    import xarray
+
+UNITS: Mapping[str, str] = {"youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3"}
+MOST = 200  # characters of a value
+
+
+def provenance(
+    case_file: CaseFile, results: Mapping[str, xarray.Dataset], command: str = ""
+) -> list[Section]:
+    """Sheet, model and damping in a table, and the case file itself.
+
+    command : what was typed to compute it.
+    """
+    first = next(iter(results))
+    case, path = case_file.case(first), case_file.path
+    model = _given(case.structure.options) | {"mass": ", ".join(results)}
+    version = results[first].attrs["foldyn_version"]
+    rows = [
+        ["sheet", _listed(_given(case_file.sheet))],
+        ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
+        ["damping", _listed(_given(case.damping))],
+        ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
+    ]
+    if command:
+        rows.append(["command", command])
+    return [
+        Heading("How it was computed"),
+        Table(["part", "as computed"], rows),
+        Listing(f"The case file {path.name}", path.read_text("utf-8")),
+    ]
+
+
+def _given(choices: Any) -> dict[str, Any]:
+    """Fields of a data class."""
+    return {item.name: getattr(choices, item.name) for item in fields(choices)}
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    """Names and values with their units; what was not given is left out."""
+    return "; ".join(
+        f"{name.replace('_', ' ')} {_written(value)} {UNITS.get(name, '')}".rstrip()
+        for name, value in values.items()
+        if value is not None and value != ()
+    )
+
+
+def _written(value: Any) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(plain(value))
+    return text if len(text) <= MOST else f"{text[: MOST - 4]} ..."
