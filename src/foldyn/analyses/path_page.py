@@ -80,7 +80,8 @@ def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path, command: 
         _run(case_file, path),
         Text(
             "Stable means that the tangent stiffness of the free nodes has no negative eigenvalue: "
-            "nodes that supports move stay where they are. At every point the out-of-balance force is below the tolerance times "
+            "nodes that supports move stay where they are. At every point the out-of-balance "
+            "force is below the tolerance times "
             "the forces at play, or rounding. The result carries its own case, can be run again "
             "from it, and motions can start from its points."
         ),
