@@ -11,6 +11,7 @@ from foldyn.linear.modal import Modal
 from foldyn.linear.modes import modes
 from foldyn.linear.peaks_of import Peak, peaks_of
 from foldyn.linear.quantity import convert
+from foldyn.linear.refinement import Refinement, refinement
 from foldyn.linear.secant import equivalent_slope
 from foldyn.linear.stepped_sine import SteppedSine
 
@@ -23,6 +24,7 @@ __all__ = [
     "Modal",
     "Pairs",
     "Peak",
+    "Refinement",
     "SteppedSine",
     "character",
     "convert",
@@ -33,4 +35,5 @@ __all__ = [
     "modes",
     "pair_modes",
     "peaks_of",
+    "refinement",
 ]

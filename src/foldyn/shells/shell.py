@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,6 +87,15 @@ class Shell(Discretized):
             f"<Shell: {len(self.nodes)} nodes, {len(self.triangles)} triangles, "
             f"{len(self.fold_stiffness)} folds, mass {self.options.mass}>"
         )
+
+    @property
+    def coarser(self) -> Shell | None:
+        """The same with half as many pieces of every edge; None of one piece."""
+        half = self.options.divisions // 2
+        given: dict[str, Any] = {
+            item.name: getattr(self.options, item.name) for item in fields(self.options)
+        }
+        return shell(self.pattern, self.sheet, **{**given, "divisions": half}) if half else None
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS

@@ -80,6 +80,11 @@ class Discretized(Made):
         length.setflags(write=False)
         return length
 
+    @property
+    def coarser(self) -> Discretized | None:
+        """The same with a coarser mesh, for those that have one."""
+        return None
+
     @cached_property
     def surface(self) -> Surface:
         """Triangles with their masses: what a mass rule distributes.

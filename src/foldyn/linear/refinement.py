@@ -1,0 +1,75 @@
+"""How far a mesh is from what finer ones tend to, from it and a coarser one.
+
+An error of the order h^2, h the size of the pieces, is told by two meshes: with N and M < N pieces
+of every edge, f_N + (f_N - f_M) / ((N/M)^2 - 1) is the limit (Richardson's extrapolation).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.modes import modes
+
+MODES = 3
+
+
+class Refinement(NamedTuple):
+    """Lowest frequencies of a structure with a mesh, and what finer meshes tend to."""
+
+    divisions: int
+    frequency: NDArray[np.float64]  # (k,) Hz
+    extrapolated: NDArray[np.float64]  # (k,) Hz
+
+    @property
+    def error(self) -> float:
+        """The largest error of these frequencies; negative where the mesh is too soft."""
+        errors = self.frequency / self.extrapolated - 1.0
+        return float(errors[np.abs(errors).argmax()])
+
+
+def refinement(case: Case, count: int = MODES) -> Refinement | None:
+    """Judge the mesh of a case by its lowest elastic frequencies at rest.
+
+    Parameters
+    ----------
+    case : Case
+        Its supports count, its loads do not. The sheet needs no density here.
+    count : int
+        How many frequencies.
+
+    Returns
+    -------
+    Refinement or None
+        None where the structure has no mesh that could be finer, where its mesh is the coarsest
+        there is, or where supports are given by nodes that a coarser mesh does not have.
+    """
+    structure = case.structure
+    coarser = structure.coarser
+    if coarser is None:
+        return None
+    try:
+        fine, coarse = (_frequencies(case, one, count) for one in (structure, coarser))
+    except InputError:  # nodes beyond the vertices
+        return None
+    if len(fine) != len(coarse) or not len(fine):
+        return None
+    ratio = structure.options.divisions / coarser.options.divisions
+    return Refinement(structure.options.divisions, fine, fine + (fine - coarse) / (ratio**2 - 1.0))
+
+
+def _frequencies(case: Case, structure: Any, count: int) -> NDArray[np.float64]:
+    if structure.sheet.density is None:
+        structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
+    bare = Case(structure, case.supports)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        found = modes(bare, count + 6)
+    elastic = found["frequency"].values[found["eigenvalue"].values > 0.0]
+    return elastic[:count]
