@@ -4,7 +4,7 @@ Where the count of negative eigenvalues of the tangent changes along a step, an 
 passed through zero. The step is halved until one crossing remains, and the crossing is then found
 as the zero of the tangent's determinant, each point an equilibrium in the plane across the step.
 
-A crossing that cannot be located is left out: the counts on both sides tell of it all the same.
+A crossing that cannot be located is left out: the counts on both sides still show it.
 
 At a limit point the load factor turns: the response to the factor points along the step on one
 side and against it on the other. At a bifurcation it does not, and another path crosses.
@@ -12,6 +12,7 @@ side and against it on the other. At a bifurcation it does not, and another path
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from foldyn.statics.newton import Attempt, Solver
-from foldyn.statics.station import Station, arrive
+from foldyn.statics.newton import Attempt, Solver, plane
+from foldyn.statics.stepping import Station, arrive
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
@@ -39,13 +40,18 @@ class Mark(NamedTuple):
         return self.station.point.negative
 
 
+class LostError(Exception):
+    """An equilibrium on a section of the path was not found."""
+
+
 class Section:
     """Equilibria in planes across a step from one station to another."""
 
     def __init__(self, solver: Solver, start: Station, end: Station) -> None:
-        self.solver, self.start, self.end = solver, start, end
+        self.solver, self.start = solver, start
         self.chord = end.point.u - start.point.u
         self.whole = float(self.chord @ self.chord)
+        self.ends = Mark(0.0, start), Mark(1.0, end)
 
     def at(self, share: float, low: Mark, high: Mark) -> Mark | None:
         """Station at a share of the step, sought from between two marks; None if not found."""
@@ -54,12 +60,8 @@ class Section:
         factor = one.factor + weight * (other.factor - one.factor)
         u = one.u + weight * (other.u - one.u)
         u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
-        goal = share * self.whole
-
-        def plane(moved: NDArray, step: NDArray, response: NDArray) -> float:
-            return (goal - float(self.chord @ (moved + step))) / float(self.chord @ response)
-
-        attempt = self.solver.correct(u, factor, plane, origin=self.start.point.u)
+        rule = plane(self.chord, share * self.whole)
+        attempt = self.solver.correct(u, factor, rule, origin=self.start.point.u)
         if attempt.failure or self._strays(attempt):
             return None
         return Mark(share, arrive(self.solver, attempt))
@@ -67,6 +69,35 @@ class Section:
     def _strays(self, attempt: Attempt) -> bool:
         """Whether a point lies farther from the start than twice the length of the step."""
         return bool(np.linalg.norm(attempt.u - self.start.point.u) > 2.0 * np.sqrt(self.whole))
+
+    def zero(
+        self, function: Callable[[Mark], float], xtol: float,
+        ends: tuple[Mark, Mark] | None = None, nearest: bool = False,
+    ) -> Mark:  # fmt: skip
+        """Mark between two others at which a function of marks vanishes, or `LostError`.
+
+        xtol : share of the step to which it is located.
+        ends : the two; those of the section unless given.
+        nearest : whether equilibria are sought from between the nearest marks known.
+        """
+        low, high = ends or self.ends
+        marks = {low.share: low, high.share: high}
+
+        def value(share: float) -> float:
+            if share not in marks:
+                one, other = low, high
+                if nearest:
+                    one = marks[max(known for known in marks if known < share)]
+                    other = marks[min(known for known in marks if known > share)]
+                mark = self.at(share, one, other)
+                if mark is None:
+                    raise LostError
+                marks[share] = mark
+            return function(marks[share])
+
+        root = float(brentq(value, low.share, high.share, xtol=xtol))
+        value(root)
+        return marks[root]
 
     def climbs(self, mark: Mark) -> bool:
         """Whether the load factor grows along the step there."""
@@ -78,7 +109,7 @@ def critical_points(solver: Solver, start: Station, end: Station) -> list[Statio
     if start.point.negative == end.point.negative:
         return []
     section = Section(solver, start, end)
-    return _crossings(section, Mark(0.0, start), Mark(1.0, end))
+    return _crossings(section, *section.ends)
 
 
 def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
@@ -109,29 +140,15 @@ def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
 
 def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | None:
     scale = _log_determinant(low)
-    best = {low.share: low, high.share: high}
 
-    def determinant(share: float) -> float:
-        if share not in best:
-            left = max((m for m in best.values() if m.share < share), key=lambda m: m.share)
-            right = min((m for m in best.values() if m.share > share), key=lambda m: m.share)
-            found = section.at(share, left, right)
-            if found is None:
-                raise _LostError
-            best[share] = found
-        mark = best[share]
+    def determinant(mark: Mark) -> float:
         sign = 1.0 if (mark.negative - low.negative) % 2 == 0 else -1.0
         return sign * float(np.exp(min(_log_determinant(mark) - scale, 600.0)))
 
     try:
-        root = brentq(determinant, low.share, high.share, xtol=SHARP, rtol=4 * np.finfo(float).eps)
-    except _LostError:
+        return section.zero(determinant, SHARP, (low, high), nearest=True).station
+    except LostError:
         return _bisected(section, low, high)
-    return best[min(best, key=lambda share: abs(share - root))].station
-
-
-class _LostError(Exception):
-    """A section of the path was not found."""
 
 
 def _log_determinant(mark: Mark) -> float:
@@ -150,7 +167,7 @@ def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
 
 
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
-    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their shapes (m, k)."""
+    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
     problem, size = solver.problem, len(solver.problem.free)
     matrix = solver.reduced(station.stiffness)
     if size <= 300 or count >= size - 1:
@@ -162,4 +179,14 @@ def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[ND
     nearest = np.argsort(np.abs(values))[:count]
     shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))
     shapes[problem.free] = vectors[:, nearest]
-    return values[nearest], shapes
+    return values[nearest], oriented(shapes)
+
+
+def oriented(shapes: NDArray) -> NDArray:
+    """Shapes (m, k), the largest entry of each positive: their sign depends on no solver.
+
+    Of entries equal to rounding the first one counts.
+    """
+    size = np.abs(shapes)
+    first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
+    return shapes * np.sign(shapes[first, np.arange(shapes.shape[1])])

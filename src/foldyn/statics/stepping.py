@@ -1,23 +1,100 @@
-"""Paths driven by the load factor: load stepping with Newton's method.
+"""Load stepping: equilibria one after the other, driven by the load factor.
 
 A step that does not converge, or that snaps to somewhere else, is tried again with a line search
 and then halved; after a success steps grow again. So a path ends where no equilibrium follows it:
 at a limit point, which only the methods with a moving load factor pass.
+
+The first point of a path is an equilibrium near a given state. A state that is not in equilibrium
+(under loads that are constant along the path, with folds that have a moment at rest, or simply a
+guess) is held by its own out-of-balance force, which is then released little by little: the same
+load stepping as along a path leads to the equilibrium that belongs to the state, instead of
+wherever one big step of Newton's method lands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from foldyn.statics.newton import COLLIDES, Attempt, Solver
-from foldyn.statics.station import PathStoppedError, Station, Walk, arrive, snapped
+import numpy as np
+from numpy.typing import NDArray
 
+from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
+from foldyn.statics.problem import Problem, balance
+
+NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
 SNAPS = "the structure snaps to a state off its path"
 REMEDY_LIMIT = (
     "a limit point may lie ahead: method 'arc_length' follows the path through it "
     "(or take smaller steps)"
 )
 REMEDY_COLLISION = "let the folds lock before panels meet (fold_law 'enhanced')"
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium on a path.
+
+    Attributes
+    ----------
+    u : (m,)
+        All dofs.
+    factor : float
+        Load factor.
+    iterations : int
+        Newton iterations that it took.
+    residual : float
+        Residual as a fraction of the forces at play.
+    negative : int
+        Negative eigenvalues of the tangent on the free dofs; -1 if they were not counted.
+    kind : str
+        "regular", "limit" or "bifurcation".
+    """
+
+    u: NDArray
+    factor: float
+    iterations: int
+    residual: float
+    negative: int = -1
+    kind: str = "regular"
+
+
+class Station(NamedTuple):
+    """A point with the tangent there and the response to the load factor (m,)."""
+
+    point: Point
+    stiffness: Stiffness
+    response: NDArray
+
+
+class PathStoppedError(Exception):
+    """A path cannot go on; says why and what to do."""
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__(f"{reason}; {remedy}")
+        self.reason, self.remedy = reason, remedy
+
+
+Walk = Iterator[Station]
+
+
+def arrive(solver: Solver, attempt: Attempt) -> Station:
+    """Station at the equilibrium that a correction found."""
+    stiffness = solver.stiffness(attempt.u, attempt.factor)
+    negative = stiffness.factors.negative() if solver.settings.stability else -1
+    relative = attempt.balance.relative
+    point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
+    return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
+
+
+def snapped(solver: Solver, start: Station, attempt: Attempt) -> bool:
+    """Whether a step of the load factor went much farther than its linear prediction."""
+    climb = abs(attempt.factor - start.point.factor)
+    predicted = climb * float(np.linalg.norm(start.response))
+    went = float(np.linalg.norm(attempt.u - start.point.u))
+    negligible = NEGLIGIBLE * solver.problem.length
+    return went > solver.settings.jump * predicted + negligible
 
 
 def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
@@ -76,3 +153,76 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
 
 def _sign(value: float) -> float:
     return 1.0 if value >= 0.0 else -1.0
+
+
+class Released:
+    """A problem at one load factor; its out-of-balance force fades as this one's factor grows."""
+
+    def __init__(self, problem: Problem, u: NDArray, factor: float) -> None:
+        self.problem, self.factor = problem, factor
+        self.free, self.held = problem.free, problem.held
+        self.force_rounding, self.length = problem.force_rounding, problem.length
+        self._from = u[problem.held]
+        self._to = problem.prescribed(factor)
+        self._out = problem.residual(u, factor)
+        self._out[problem.held] = 0.0
+
+    def prescribed(self, factor: float) -> NDArray:
+        """From where the held dofs stood to where they belong."""
+        return self._from + factor * (self._to - self._from)
+
+    def residual(self, u: NDArray, factor: float) -> NDArray:
+        """Residual less what is still held."""
+        return self.problem.residual(u, self.factor) - (1.0 - factor) * self._out
+
+    def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
+        """Tangent of the problem."""
+        return self.problem.tangent(u, self.factor, before)
+
+    def rate(self, u: NDArray, factor: float) -> NDArray:
+        """Derivative of the residual."""
+        return self._out
+
+    def reference(self, u: NDArray, factor: float) -> float:
+        """Forces at play in the problem."""
+        return self.problem.reference(u, self.factor)
+
+    def turn(self, u: NDArray, v: NDArray) -> float:
+        """Turn in the problem."""
+        return self.problem.turn(u, v)
+
+
+def settle(solver: Solver, u: NDArray, factor: float) -> Station:
+    """Station at the equilibrium at a load factor that belongs to a state (m,).
+
+    Raises
+    ------
+    PathStoppedError
+        None was found.
+    """
+    problem = solver.problem
+    moved = not np.array_equal(u[problem.held], problem.prescribed(factor))
+    found = balance(problem, u, factor, problem.residual(u, factor))
+    still = found.residual <= max(
+        problem.force_rounding, solver.settings.tolerance * found.reference
+    )
+    if still and not moved:
+        return arrive(solver, Attempt(u, factor, 0, found))
+    released = Solver(Released(problem, u, factor), solver.settings)
+    released.tally = solver.tally
+    at_rest = balance(released.problem, u, 0.0, released.problem.residual(u, 0.0))
+    try:
+        *_, last = walk(released, arrive(released, Attempt(u, 0.0, 0, at_rest)), [1.0], False)
+    except PathStoppedError as stop:
+        raise PathStoppedError(
+            f"no equilibrium was found at the load factor {factor:.6g} from the state given",
+            "start from a state nearer to it, or apply what is constant along the path in "
+            f"smaller steps ({stop.reason})",
+        ) from None
+    attempt = solver.correct(last.point.u, factor)
+    if attempt.failure:
+        raise PathStoppedError(
+            f"the first point at the load factor {factor:.6g} did not settle ({attempt.failure})",
+            "start from another state",
+        )
+    return arrive(solver, attempt)
