@@ -15,8 +15,7 @@ import numpy as np
 
 import foldyn as fd
 from foldyn.linear import linearize
-from foldyn.linear.eigen import lowest
-from foldyn.linear.pencil import Pencil
+from foldyn.linear.eigen import Pencil, lowest
 from foldyn.linear.rigid_modes import rigid_space, unresisted
 
 

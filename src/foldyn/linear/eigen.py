@@ -3,8 +3,13 @@
 Few dofs are solved in full. Others by shift-invert Lanczos (ARPACK) with one factorization of
 K - s M, the shift s below every eigenvalue: there K - s M is positive definite however singular or
 unstable K is, and the modes nearest to the shift are the lowest. How many eigenvalues lie below
-the shift, and below a gap behind the last mode, is counted (`Pencil.below`); modes that Lanczos
-missed, as it may where many coincide, are sought again beside those found.
+the shift, and below a gap behind the last mode, is counted; modes that Lanczos missed, as it may
+where many coincide, are sought again beside those found.
+
+A factorization of K - s M has as many negative eigenvalues as the problem has eigenvalues below s
+(Sylvester's law of inertia). Two counts, below and above a set of computed modes, prove that none
+between was missed. M is positive definite, but for dofs without mass that follow the others (edge
+rotations of shells): they have no modes, and, K being positive definite on them, no count.
 
 Modes known beforehand (rigid ones) are taken out of the search, so that they come out pure.
 """
@@ -15,12 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from foldyn.algebra.choice import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import ComputationError, InputError
-from foldyn.linear.pencil import EPS, Pencil
 
 MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
 DENSE = 60  # dofs up to which all modes are found at once (the other way is as quick)
@@ -30,6 +36,66 @@ LOWERINGS = 12
 GUARD = 3  # modes beyond those asked for, among which a gap is sought
 GAP = 1e-6  # relative distance of eigenvalues that a count can tell apart
 ROUNDS = 12  # of searches for missed modes
+EPS = float(np.finfo(float).eps)
+ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: how far from zero rounding may move an eigenvalue
+NUDGES = 4  # of a shift that hits an eigenvalue
+NUDGE = 1e-7
+
+
+class Pencil:
+    """Stiffness and mass (n, n) of free dofs, with the solver that factorizes K - s M."""
+
+    def __init__(
+        self, stiffness: sparse.csc_array, mass: sparse.csc_array, solver: str = "auto"
+    ) -> None:
+        self.stiffness, self.mass = stiffness, mass
+        self.size = stiffness.shape[0]
+        self.backend, self._factorize = factorizer(solver, self.size)
+        self.factorizations = 0
+        self.heavy = mass.diagonal() > 0.0
+        self.finite = int(self.heavy.sum())  # number of modes
+        self._sizes = abs(stiffness)
+
+    @property
+    def scale(self) -> float:
+        """Mean of the diagonal of K over that of M, rad2/s2: large against the lowest modes."""
+        stiffness = np.abs(self.stiffness.diagonal())[self.heavy]
+        return float(stiffness.sum() / self.mass.diagonal().sum())
+
+    def factorize(self, shift: float) -> Factorization:
+        """Factors of K - s M; s is moved a little where that is singular."""
+        for attempt in range(NUDGES):
+            moved = shift + NUDGE * attempt * (abs(shift) or self.scale * EPS)
+            self.factorizations += 1
+            try:
+                factors = self._factorize(sparse.csc_array(self.stiffness - moved * self.mass))
+                factors.negative()
+                return factors
+            except SingularTangentError:
+                if attempt == NUDGES - 1:
+                    raise
+        raise AssertionError("unreachable")
+
+    def below(self, shift: float) -> int:
+        """How many eigenvalues lie below s."""
+        return self.factorize(shift).negative()
+
+    def noise(self, shapes: NDArray) -> NDArray:
+        """What rounding leaves undetermined (k,) in the eigenvalues of shapes (n, k)."""
+        size = np.abs(shapes)
+        modal = np.einsum("ik,ik->k", shapes, self.mass @ shapes)
+        return ROUNDING * np.einsum("ik,ik->k", size, self._sizes @ size) / modal
+
+    def quotients(self, shapes: NDArray) -> NDArray:
+        """Rayleigh quotients (k,) of shapes (n, k)."""
+        modal = np.einsum("ik,ik->k", shapes, self.mass @ shapes)
+        return np.einsum("ik,ik->k", shapes, self.stiffness @ shapes) / modal
+
+    def residuals(self, values: NDArray, shapes: NDArray) -> NDArray:
+        """|K phi - lambda M phi| over what its terms amount to (k,); nan for shapes of zeros."""
+        inertia = (self.mass @ shapes) * values
+        terms = np.linalg.norm(self._sizes @ np.abs(shapes), axis=0)
+        return np.linalg.norm(self.stiffness @ shapes - inertia, axis=0) / terms
 
 
 @dataclass(frozen=True)
@@ -60,10 +126,12 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     Raises
     ------
     InputError
-        More than half of the modes of many dofs.
+        More modes than there are, or more than half of those of many dofs.
     ComputationError
         Lanczos did not converge; the pencil cannot be factorized.
     """
+    if count > pencil.finite:
+        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     if not np.isfinite(pencil.stiffness.data).all():
         raise ComputationError("modes: the tangent in this state is not finite")
     if pencil.size <= DENSE or count + GUARD >= pencil.finite // 2:

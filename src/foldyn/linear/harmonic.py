@@ -12,7 +12,6 @@ Problems, 2019). Displacements are taken as small against the structure, but for
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,13 +21,10 @@ from scipy import sparse
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.answer import Answer
-from foldyn.linear.direct import dynamic_stiffness, warn_of_resonances
-from foldyn.linear.excitation import Drive
-from foldyn.linear.linearized import Linearized
-from foldyn.linear.secant import equivalent_slope
-from foldyn.linear.transmissibility import drive_factor, drive_shape
+from foldyn.errors import InputError
+from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
+from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness
+from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
 
@@ -38,7 +34,6 @@ PATIENCE = 25  # accelerated iterations before slow ones are tried
 RELAXED = 0.3  # of the way in a slow iteration
 FURTHEST = 1.5  # times: how far slopes are extrapolated from one frequency to the next
 LEAST = 1e-12  # rad: a swing is never taken as smaller
-_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -102,7 +97,7 @@ def harmonic(
     response = np.full((len(frequency), len(shape)), np.nan, np.complex128)
     swing, spent = np.full(len(frequency), np.nan), 0
     done: list[tuple[float, NDArray]] = []
-    failed: list[int] = []
+    converged = np.ones(len(frequency), bool)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = shape * (drive.value * drive_factor(system, drive, omega))
@@ -110,14 +105,19 @@ def harmonic(
         motion, slope = found.solution(_ahead(done, float(f), hinges.reference))
         spent += found.iterations
         if motion is None:
-            failed.append(k)
+            converged[k] = False
         else:
             done = [*done[-1:], (float(f), slope)]
             response[k] = motion / drive.value
             swing[k] = np.degrees(np.abs(hinges.gradient @ motion).max(initial=0.0))
         report(Progress(k + 1.0, float(len(frequency)), spent, 0.0))
-    _warn_of(frequency[failed], options)
-    warn_of_resonances(np.delete(frequency, failed), np.delete(response, failed, axis=0))
+    warn_at(
+        frequency[~converged],
+        "the harmonic balance does not converge at {} (nan) within "
+        f"{options.iterations} iterations; give more iterations, closer frequencies or more "
+        "damping",
+    )
+    warn_at(frequency[converged & np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {"swing": swing}, {"iterations": spent})
 
 
@@ -211,32 +211,21 @@ class _Balance:
         plain = slopes[-1] + misses[-1]
         if len(slopes) == 1:
             return plain
-        moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
-        turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
+        moved, turned = _steps(slopes), _steps(misses)
         weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
         ahead = plain - (moved + turned) @ weight
         return np.where(ahead > 0.0, ahead, 0.5 * plain)
 
 
+def _steps(values: list[NDArray]) -> NDArray:
+    """Changes (nh, k) in the last few iterations."""
+    return np.diff(np.array(values[-DEPTH - 1 :]).T, axis=1)
+
+
 def _repels(slopes: list[NDArray], misses: list[NDArray]) -> bool:
     """Whether plain iterations would leave the solution: a multiplier above 1, of those seen."""
-    moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
+    moved, turned = _steps(slopes), _steps(misses)
     if not moved.size:
         return False
-    turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
     seen = np.linalg.lstsq(moved, moved + turned, rcond=1e-8)[0]
     return bool(np.linalg.eigvals(seen).real.max() > 1.0)
-
-
-def _warn_of(failed: NDArray, options: HarmonicBalance) -> None:
-    if not failed.size:
-        return
-    shown = ", ".join(f"{f:.6g}" for f in failed[:_NAMED])
-    more = " and others" if failed.size > _NAMED else ""
-    warnings.warn(
-        f"frequencies: the harmonic balance does not converge at {shown} Hz{more} (nan) within "
-        f"{options.iterations} iterations; give more iterations, closer frequencies or more "
-        "damping",
-        FoldynWarning,
-        stacklevel=5,
-    )

@@ -44,7 +44,7 @@ def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float
         The sets have different nodes, or the mass does not belong to them.
     """
     first, second = _chosen(_shapes("a", a), _shapes("b", b), nodes)
-    left, right = _flat(first), _flat(second)
+    left, right = (shapes.reshape(len(shapes), -1) for shapes in (first, second))
     weight = _weight(mass, first.shape[1], first.shape[2])
     heavy_left, heavy_right = weight(left), weight(right)
     cross = np.abs(left.conj() @ heavy_right.T) ** 2
@@ -130,10 +130,6 @@ def _at(shapes: NDArray, nodes: Any) -> NDArray:
     if beyond.size:
         raise InputError(f"nodes: there is no node {beyond[0]}; there are {shapes.shape[1]}")
     return shapes[:, numbers]
-
-
-def _flat(shapes: NDArray) -> NDArray:
-    return shapes.reshape(len(shapes), -1)
 
 
 def _weight(mass: Any, nodes: int, components: int) -> Any:

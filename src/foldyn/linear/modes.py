@@ -1,4 +1,10 @@
-"""`modes`: natural frequencies and shapes of a case about a state."""
+"""`modes`: natural frequencies and shapes of a case about a state.
+
+What a mode means for motions of the base: with shapes of the modal mass 1, the participation
+factor along an axis is phi' M r, r the unit translation of the free dofs along it, and its square
+the effective mass. Over all modes effective masses add up to r' M r, the mass that is free to move
+along the axis.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.eigen import Spectrum, lowest
+from foldyn.errors import FoldynWarning
+from foldyn.linear.eigen import Pencil, Spectrum, lowest
 from foldyn.linear.linearized import Linearized, linearize
-from foldyn.linear.participation import free_mass, participation_factors
-from foldyn.linear.pencil import Pencil
 from foldyn.linear.rigid_modes import rigid_share, rigid_space, unresisted
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
+from foldyn.statics.stability import oriented
 from foldyn.values import whole
 
 if TYPE_CHECKING:
@@ -95,39 +100,39 @@ def modes(
     began = time.perf_counter()
     linear = linearize(case, state, secant, load_factor)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
-    if count > pencil.finite:
-        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
-    space = rigid_space(linear)
-    found = lowest(pencil, count, unresisted(linear, space), verify)
-    _warn(found)
+    space, along = rigid_space(linear), _unit_translations(linear)
+    spectrum = lowest(pencil, count, unresisted(linear, space), verify)
+    _warn(spectrum)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
         "free_dofs": pencil.finite,
-        "free_mass": free_mass(linear),
+        "free_mass": np.einsum("ia,ia->a", along, linear.mass @ along),
         "residual": linear.residual,
         "soft_hinges": linear.soft,
-        "complete": found.checked,
-        "shift": None if np.isnan(found.shift) else found.shift,
+        "complete": spectrum.checked,
+        "shift": None if np.isnan(spectrum.shift) else spectrum.shift,
         "solver": pencil.backend if pencil.factorizations else "dense",
         "factorizations": pencil.factorizations,
-        "largest_residual": float(pencil.residuals(found.values, found.shapes).max()),
-        "rounding": _rounding(pencil, found),
+        "largest_residual": float(pencil.residuals(spectrum.values, spectrum.shapes).max()),
+        "rounding": _rounding(pencil, spectrum),
         "wall_seconds": time.perf_counter() - began,
     }
-    return modes_dataset(case, _variables(linear, found, space), statistics)
+    return modes_dataset(case, _variables(linear, spectrum, space, along), statistics)
 
 
-def _variables(linear: Linearized, found: Spectrum, space: NDArray) -> dict[str, Any]:
-    values, shapes = found.values, _oriented(found.shapes)
+def _variables(
+    linear: Linearized, spectrum: Spectrum, space: NDArray, along: NDArray
+) -> dict[str, Any]:
+    values, shapes = spectrum.values, oriented(spectrum.shapes)
     with np.errstate(invalid="ignore"):
         omega = np.sqrt(values)
     modal = np.einsum("ik,ik->k", shapes, linear.damping @ shapes)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(omega > 0.0, modal / (2.0 * omega), np.nan)
     share = rigid_share(linear, space, shapes)
-    factors = participation_factors(linear, shapes)
+    factors = shapes.T @ (linear.mass @ along)
     full = np.zeros((len(values), linear.displacement.size))
     on_nodes = linear.free < full.shape[1]
     full[:, linear.free[on_nodes]] = shapes[on_nodes].T
@@ -144,32 +149,32 @@ def _variables(linear: Linearized, found: Spectrum, space: NDArray) -> dict[str,
     }
 
 
-def _rounding(pencil: Pencil, found: Spectrum) -> float:
+def _unit_translations(linear: Linearized) -> NDArray:
+    """Unit translations (nf, 3) of the free dofs along x, y, z."""
+    on_nodes = linear.free < linear.displacement.size
+    return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)
+
+
+def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
     """Largest bound on the rounding of the eigenvalues that are not zero, as a fraction of each."""
-    finite = found.values != 0.0
-    noise = pencil.noise(found.shapes[:, finite])
-    return float((noise / np.abs(found.values[finite])).max(initial=0.0))
+    finite = spectrum.values != 0.0
+    noise = pencil.noise(spectrum.shapes[:, finite])
+    return float((noise / np.abs(spectrum.values[finite])).max(initial=0.0))
 
 
-def _oriented(shapes: NDArray) -> NDArray:
-    """Shapes (n, k) with the entry of largest size positive; the first of equal ones counts."""
-    size = np.abs(shapes)
-    first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
-    return shapes * np.sign(shapes[first, np.arange(shapes.shape[1])])
-
-
-def _warn(found: Spectrum) -> None:
-    unstable = int((found.values < 0.0).sum())
-    messages = []
+def _warn(spectrum: Spectrum) -> None:
+    unstable = int((spectrum.values < 0.0).sum())
     if unstable:
-        messages.append(
-            f"the state is an unstable equilibrium: {unstable} of the {len(found.values)} modes "
-            "have a negative eigenvalue and no frequency (nan)"
+        warnings.warn(
+            f"the state is an unstable equilibrium: {unstable} of the {len(spectrum.values)} modes "
+            "have a negative eigenvalue and no frequency (nan)",
+            FoldynWarning,
+            stacklevel=3,
         )
-    if found.missed:
-        messages.append(
-            f"the count of eigenvalues differs by {abs(found.missed)} from the modes found: "
-            "frequencies may be missing; ask for another count of modes"
+    if spectrum.missed:
+        warnings.warn(
+            f"the count of eigenvalues differs by {abs(spectrum.missed)} from the modes found: "
+            "frequencies may be missing; ask for another count of modes",
+            FoldynWarning,
+            stacklevel=3,
         )
-    for message in messages:
-        warnings.warn(message, FoldynWarning, stacklevel=3)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from foldyn.linear.eigen import EPS
 from foldyn.linear.linearized import Linearized
-from foldyn.linear.pencil import EPS
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 
 ROUNDING = 1e3 * EPS  # of |K| |r|: what counts as no force

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
+from foldyn.values import whole
 
 _FEWEST = 4
 
@@ -33,7 +34,7 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
         A longer gap, or one at an end: cut the record there.
     """
     values = records.real_numbers("x", x)
-    most = records.checked_count("longest", longest)
+    most = whole("longest", longest, least=1)
     known = np.isfinite(values)
     if values.ndim != 1 or known.sum() < _FEWEST:
         raise InputError(

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
+from foldyn.values import whole
 
 MINIMUM_SAMPLES = 4
 
@@ -16,7 +17,7 @@ def spectrum(
     x: ArrayLike,
     dt: float,
     axis: int = 0,
-    window: str | tuple | ArrayLike | None = None,
+    window: records.Window = None,
     detrend: str | None = None,
     pad: int = 1,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -60,14 +61,14 @@ def spectrum(
     samples = _checked_samples(x, axis)
     n = samples.shape[0]
     interval = records.checked_interval(dt)
-    length = n * records.checked_count("pad", pad)
+    length = n * whole("pad", pad, least=1)
 
     samples = records.detrended(samples, detrend)
     gain = float(n)
     if window is not None:
         weights = records.checked_window(window, n)
         gain = float(weights.sum())
-        samples = samples * weights.reshape((n,) + (1,) * (samples.ndim - 1))
+        samples = samples * records.beside(weights, samples)
 
     amplitude = np.abs(scipy.fft.rfft(samples, n=length, axis=0)) / gain
     doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)

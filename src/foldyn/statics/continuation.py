@@ -115,7 +115,11 @@ def follow(
         if arrived is None or failure:
             solver.tally.cuts += 1
             if not pace.cut():
-                raise _stopped(station, failure)
+                raise PathStoppedError(
+                    "the path could not be followed beyond the load factor "
+                    f"{station.point.factor:.6g} ({failure})",
+                    REMEDY,
+                )
             continue
         pace.accept(station, arrived)
         station = arrived
@@ -197,11 +201,3 @@ def _advance(
 def _cosine(one: NDArray, other: NDArray) -> float:
     sizes = float(np.linalg.norm(one)) * float(np.linalg.norm(other))
     return float(one @ other) / sizes if sizes > 0.0 else 0.0
-
-
-def _stopped(station: Station, failure: str) -> PathStoppedError:
-    return PathStoppedError(
-        f"the path could not be followed beyond the load factor {station.point.factor:.6g} "
-        f"({failure})",
-        REMEDY,
-    )

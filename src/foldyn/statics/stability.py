@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from foldyn.algebra.superlu import Factorization
 from foldyn.statics.newton import Attempt, Solver, plane
 from foldyn.statics.stepping import Station, arrive
 
@@ -168,18 +169,28 @@ def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
 
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
     """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
-    problem, size = solver.problem, len(solver.problem.free)
+    problem = solver.problem
     matrix = solver.reduced(station.stiffness)
-    if size <= 300 or count >= size - 1:
-        values, vectors = np.linalg.eigh(matrix.toarray())
-    else:
-        inverse = LinearOperator((size, size), matvec=station.stiffness.factors.solve)
-        start = np.random.default_rng(0).standard_normal(size)
-        values, vectors = eigsh(matrix, k=count, sigma=0.0, OPinv=inverse, v0=start)
+    values, vectors = softest_modes(matrix, station.stiffness.factors, count, dense=300)
     nearest = np.argsort(np.abs(values))[:count]
     shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))
     shapes[problem.free] = vectors[:, nearest]
     return values[nearest], oriented(shapes)
+
+
+def softest_modes(
+    matrix: Any, factors: Factorization, count: int, dense: int, shift: float = 0.0
+) -> tuple[NDArray, NDArray]:
+    """Eigenvalues of a symmetric matrix nearest to a shift, and their vectors.
+
+    All of them up to a number of rows `dense`; else by Lanczos with the factors at the shift.
+    """
+    size = matrix.shape[0]
+    if size <= dense or count >= size - 1:
+        return np.linalg.eigh(matrix.toarray())
+    inverse = LinearOperator((size, size), matvec=factors.solve)
+    start = np.random.default_rng(0).standard_normal(size)
+    return eigsh(matrix, k=count, sigma=shift, OPinv=inverse, v0=start)
 
 
 def oriented(shapes: NDArray) -> NDArray:

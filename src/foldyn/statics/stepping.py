@@ -13,6 +13,7 @@ wherever one big step of Newton's method lands.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -127,7 +128,8 @@ def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool
             left = goal - station.point.factor
             # no crumbs: the rest is taken in one or in two equal steps
             length = abs(left) if abs(left) <= 1.01 * step else min(step, 0.5 * abs(left))
-            target = goal if length == abs(left) else station.point.factor + length * _sign(left)
+            end = station.point.factor + math.copysign(length, left)
+            target = goal if length == abs(left) else end
             attempt = step_to(solver, station, target)
             if attempt.failure:
                 solver.tally.cuts += 1
@@ -149,10 +151,6 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
         f"({attempt.failure})",
         REMEDY_COLLISION if attempt.failure == COLLIDES else REMEDY_LIMIT,
     )
-
-
-def _sign(value: float) -> float:
-    return 1.0 if value >= 0.0 else -1.0
 
 
 class Released:
