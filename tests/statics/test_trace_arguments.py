@@ -28,7 +28,7 @@ def case():
         ({"load_factors": [0.5, 0.5]}, "number 1 repeats"),
         ({"steps": 0}, "steps = 0: must be a whole number, at least 1"),
         ({"steps": True}, "whole number, at least 1"),
-        ({"first_step": 0.1}, "method 'newton' goes by load_factors"),
+        ({"first_step": 0.1}, "method 'newton' is driven by load_factors"),
         ({"method": "mgdcm", "load_factors": [0, 1, 2]}, "two numbers"),
         ({"method": "mgdcm", "load_factors": [1, 1]}, "begin and end must differ"),
         ({"method": "mgdcm", "first_step": 0.0}, "not zero"),
@@ -61,7 +61,7 @@ def test_no_case():
     ("values", "message"),
     [
         ({"tolerance": 0.0}, "greater than 0"),
-        ({"tolerance": 0.5}, "between 1e-14 and 0.01"),
+        ({"tolerance": 0.5}, "must be at most 0.01"),
         ({"iterations": 0}, "whole number, at least 1"),
         ({"target": 2.5}, "whole number, at least 1"),
         ({"jump": 1.0}, "above 1"),

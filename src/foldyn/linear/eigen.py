@@ -106,7 +106,7 @@ class Spectrum:
     shapes: NDArray
     shift: float  # below which there is no eigenvalue; nan where all were computed
     checked: int  # lowest modes that a count has shown to be complete
-    missed: int  # modes that the count tells of and that were not found
+    missed: int  # modes that the count shows but that were not found
 
 
 def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
@@ -163,10 +163,10 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
         carried = mass @ known[heavy]
         far = 4.0 * np.abs(stiffness).sum(axis=1).max() / mass.diagonal().min()
         stiffness = stiffness + far * (carried @ carried.T)
-    _, found = eigh(stiffness, mass)
-    found = found[:, : len(heavy) - known.shape[1]]
-    shapes = np.zeros((pencil.size, found.shape[1]))
-    shapes[heavy], shapes[light] = found, follow @ found
+    _, vectors = eigh(stiffness, mass)
+    vectors = vectors[:, : len(heavy) - known.shape[1]]
+    shapes = np.zeros((pencil.size, vectors.shape[1]))
+    shapes[heavy], shapes[light] = vectors, follow @ vectors
     return pencil.quotients(shapes), shapes  # more exact than the values of a full matrix
 
 

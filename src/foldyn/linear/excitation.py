@@ -128,13 +128,13 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
 
 def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
     """A drive by forces; those on held axes reach the supports, not the structure."""
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FoldynWarning)
         try:
             driven = Case(case.structure, case.supports, parts)
         except InputError as error:
             raise InputError(str(error).replace("loads[", "drive[", 1)) from None
-    for warning in told:
+    for warning in caught:
         text = str(warning.message).replace("loads[", "drive[", 1)
         warnings.warn(text, FoldynWarning, stacklevel=4)
     vector = amplitude * driven.force_terms[0][0]

@@ -18,7 +18,7 @@ from foldyn.errors import InputError
 from foldyn.linear.eigen import Pencil, Spectrum, lowest
 from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
 from foldyn.linear.linearized import Linearized
-from foldyn.linear.rigid_modes import rigid_space, unresisted
+from foldyn.linear.modes import rigid_space, unresisted
 from foldyn.values import whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding

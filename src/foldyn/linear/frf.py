@@ -123,7 +123,7 @@ def frf(
         displacement over that of the base. Complex, for the time dependence exp(+i w t): a lag is
         a negative phase; nan where there is none. `displacement` of the state and `drive`, its
         amplitudes. `coherence` (burst_random), `unsteadiness` (stepped_sine) or `swing` (harmonic).
-        Attributes tell the method, its options and facts about the run.
+        Attributes hold the method, its options and facts about the run.
 
     Raises
     ------

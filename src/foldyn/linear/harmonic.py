@@ -58,11 +58,7 @@ class HarmonicBalance:
 
 
 def harmonic(
-    system: Linearized,
-    drive: Drive,
-    frequency: NDArray,
-    options: HarmonicBalance,
-    report: Reporter,
+    system: Linearized, drive: Drive, frequency: NDArray, options: HarmonicBalance, report: Reporter
 ) -> Answer:
     """Balance one harmonic at each frequency, starting from the slopes of the one before.
 
@@ -101,9 +97,9 @@ def harmonic(
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = shape * (drive.value * drive_factor(system, drive, omega))
-        found = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
-        motion, slope = found.solution(_ahead(done, float(f), hinges.reference))
-        spent += found.iterations
+        iteration = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
+        motion, slope = iteration.solution(_ahead(done, float(f), hinges.reference))
+        spent += iteration.iterations
         if motion is None:
             converged[k] = False
         else:
@@ -139,9 +135,9 @@ class _Hinges:
 
     def __init__(self, system: Linearized) -> None:
         body = system.case.structure.body
-        found = body.soft_hinges(body.dofs(system.displacement))
-        self.gradient = sparse.csr_array(found.gradient[:, system.free])
-        self.offset, self.stiffness = found.offset, found.stiffness
+        hinges = body.soft_hinges(body.dofs(system.displacement))
+        self.gradient = sparse.csr_array(hinges.gradient[:, system.free])
+        self.offset, self.stiffness = hinges.offset, hinges.stiffness
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 
     def slope(self, motion: NDArray) -> NDArray[np.float64]:
@@ -171,19 +167,19 @@ class _Balance:
         the branch between two others, where the motion does not stay; then slowly, which converges
         to the others only.
         """
-        quick, slow = (PATIENCE, self._anderson), (self.options.iterations, self._relaxed)
-        for most, step in (quick, slow):
-            motion, slope = self._iterate(start, step, most)
+        for accelerated in (True, False):
+            motion, slope = self._iterate(start, accelerated)
             if motion is not None:
                 return motion, slope
         return None, start
 
-    def _iterate(self, slope: NDArray, step, most: int) -> tuple[NDArray | None, NDArray]:
+    def _iterate(self, slope: NDArray, accelerated: bool) -> tuple[NDArray | None, NDArray]:
+        most = PATIENCE if accelerated else self.options.iterations
         slopes: list[NDArray] = []
         misses: list[NDArray] = []
         before = None
         # a slow step changes less than what is left to go
-        tolerance = self.options.tolerance * (1.0 if step == self._anderson else RELAXED)
+        tolerance = self.options.tolerance * (1.0 if accelerated else RELAXED)
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
             matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
@@ -193,28 +189,24 @@ class _Balance:
             if before is not None:
                 change = np.abs(motion - before).max()
                 if change <= tolerance * np.abs(motion).max():
-                    between = step == self._anderson and _repels(slopes, misses)
+                    between = accelerated and _repels(slopes, misses)
                     return (None if between else motion), slope
             before = motion
             slopes.append(slope)
             misses.append(self.hinges.slope(motion) - slope)
-            slope = step(slopes, misses)
+            slope = _anderson(slopes, misses) if accelerated else slope + RELAXED * misses[-1]
         return None, slope
 
-    @staticmethod
-    def _relaxed(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
-        return slopes[-1] + RELAXED * misses[-1]
 
-    @staticmethod
-    def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
-        """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
-        plain = slopes[-1] + misses[-1]
-        if len(slopes) == 1:
-            return plain
-        moved, turned = _steps(slopes), _steps(misses)
-        weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
-        ahead = plain - (moved + turned) @ weight
-        return np.where(ahead > 0.0, ahead, 0.5 * plain)
+def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
+    """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
+    plain = slopes[-1] + misses[-1]
+    if len(slopes) == 1:
+        return plain
+    moved, turned = _steps(slopes), _steps(misses)
+    weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
+    ahead = plain - (moved + turned) @ weight
+    return np.where(ahead > 0.0, ahead, 0.5 * plain)
 
 
 def _steps(values: list[NDArray]) -> NDArray:

@@ -120,11 +120,11 @@ def linearize(
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
     check_mass(case.structure.mass, case.fixed)
     check_fill(case.structure.fill, case.structure.body.size)
-    where = operating_point(case, state, load_factor)
-    body = where.body
+    point = operating_point(case, state, load_factor)
+    body = point.body
     free = np.concatenate([case.free_dofs, body.hidden])
-    exact = body.tangent(where.dofs)
-    change, soft = _slope_change(body, where.dofs, amplitude)
+    exact = body.tangent(point.dofs)
+    change, soft = _slope_change(body, point.dofs, amplitude)
     if soft:
         warnings.warn(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
@@ -138,15 +138,15 @@ def linearize(
     mass = _all_mass(case, len(body.hidden))
     return Linearized(
         case=case,
-        displacement=where.displacement,
+        displacement=point.displacement,
         free=free,
         stiffness=_block(stiffness, free),
         mass=_block(mass, free),
         damping=_block(case.damping.matrix(mass, _reference(case, exact)), free),
         soft=soft,
         secant=None if secant is None else float(secant),
-        residual=where.relative,
-        unbalanced=where.residual,
+        residual=point.relative,
+        unbalanced=point.balance.residual,
     )
 
 

@@ -13,6 +13,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.body import Body
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.origami import drives, is_actuated, with_loads
+from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import check_movable, displacement_of
 
@@ -28,16 +29,15 @@ class OperatingPoint(NamedTuple):
     factor: float  # of actuated folds there
     body: Body  # with its folds as they are actuated
     dofs: NDArray  # (m,) the state on all dofs of the body
-    residual: float  # norm on the free dofs, N
-    reference: float  # norm of the forces at play, N
+    balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
 
     @property
     def relative(self) -> float:
         """Residual as a fraction of the forces at play; 0 below their rounding."""
-        if self.residual <= self.problem.force_rounding:
+        if self.balance.residual <= self.problem.force_rounding:
             return 0.0
-        return self.residual / max(self.reference, self.residual)
+        return self.balance.residual / max(self.balance.residual, self.balance.reference)
 
 
 def operating_point(
@@ -82,7 +82,7 @@ def _equilibrium(case: Case) -> NDArray:
 def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
     """A state with its residual.
 
-    Forces that keep their direction have no part in the tangent, and a state does not tell by
+    Forces that keep their direction have no part in the tangent, and a state does not say by
     which factor they act in it: each may have its own, the one that leaves the least residual.
     """
     problem = OrigamiProblem(case, (), displacement)
@@ -95,10 +95,8 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
-    held = float(np.linalg.norm(residual[problem.held]))
-    reference = max(problem.reference(u, factor), held)
-    size = float(np.linalg.norm(residual[free]))
-    return OperatingPoint(displacement, problem, factor, body, u, size, reference, kind)
+    reached = balance(problem, u, factor, residual)
+    return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
 
 
 def _load_vectors(case: Case, body: Body) -> NDArray:

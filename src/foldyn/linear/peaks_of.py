@@ -31,7 +31,7 @@ SIDES = 1.5  # half-power widths on either side of a peak that a circle fit take
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of a frequency response; nan where something cannot be found.
+    """A peak of a frequency response; nan where something cannot be curve_peaks.
 
     Attributes
     ----------
@@ -118,15 +118,15 @@ def peaks_of(
         return ()
     kind = shown if shown in PER_FORCE else "receptance"
     rate = float(response.attrs.get("window_rate", 0.0))
-    found = find_peaks(f, curve, prominence, count, kind)
-    if not found.index.size:
+    curve_peaks = find_peaks(f, curve, prominence, count, kind)
+    if not curve_peaks.index.size:
         return ()
     peaks, widths = [], []
-    for frequency, height in zip(found.frequency, found.height, strict=True):
+    for frequency, height in zip(curve_peaks.frequency, curve_peaks.height, strict=True):
         peak, width = _with_half_power(Peak(float(frequency), float(height)), f, curve, kind, rate)
         peaks.append(peak)
         widths.append(width)
-    bands = _bands(f, np.abs(curve), found.index, widths)
+    bands = _bands(f, np.abs(curve), curve_peaks.index, widths)
     circled = _modal(response, f, curve, shown, axis, rate)
     return tuple(_with_circles(peaks, f, circled, bands, kind, rate))
 
@@ -134,7 +134,7 @@ def peaks_of(
 def _with_half_power(
     peak: Peak, f: NDArray, curve: NDArray, kind: str, rate: float
 ) -> tuple[Peak, float]:
-    """The peak with what its half-power points tell, and the distance of these (Hz)."""
+    """The peak with its half-power damping, and the distance (Hz) of the half-power points."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
         try:
@@ -145,8 +145,8 @@ def _with_half_power(
     if rate > 0.0:
         ratio = float(without_window(points.natural_frequency, ratio, rate)[1])
     textbook, asymmetry = points.textbook_damping_ratio, points.asymmetry
-    judged = replace(peak, half_power=ratio, textbook=textbook, asymmetry=asymmetry)
-    return judged, points.upper - points.lower
+    damped = replace(peak, half_power=ratio, textbook=textbook, asymmetry=asymmetry)
+    return damped, points.upper - points.lower
 
 
 def _bands(
@@ -185,7 +185,7 @@ def _with_circles(
     peaks: list[Peak], f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str,
     rate: float,
 ) -> list[Peak]:  # fmt: skip
-    """The peaks with what circle fits tell: of all together, or else of each alone."""
+    """The peaks with their circle fits: of all together, or else of each alone."""
     try:
         fits = circle_fits(f, curve, bands, kind)
         return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]

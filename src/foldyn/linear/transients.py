@@ -248,7 +248,13 @@ def record_of(
     whole = math.ceil(duration * spacing * (1.0 - 1e-9)) / spacing
     length = math.ceil(whole / every * (1.0 - 1e-9))
     every = whole / length
-    check_resolved(frequency, every)
+    if frequency[-1] * every * FEWEST > 1.0 + 1e-9:
+        raise InputError(
+            f" = {every:g} s: {frequency[-1]:g} Hz has only "
+            f"{1.0 / (frequency[-1] * every):.3g} samples in a cycle, and at least {FEWEST} are "
+            "needed; sample faster, or leave every out",
+            "every",
+        )
     samples = min(math.ceil(duration / every * (1.0 - 1e-9)), length)
     return Record(every, samples, length, np.rint(frequency * whole).astype(np.int64))
 
@@ -257,17 +263,6 @@ def check_records(field: str, record: Record, count: int, nodes: int) -> None:
     """Refuse records that memory cannot hold."""
     what = f"{float(count):.3g} records of {float(record.length):.3g} samples of {nodes} nodes"
     check_memory(field, what, 8.0 * COPIES * count * record.length * 3 * nodes, "take fewer")
-
-
-def check_resolved(frequency: NDArray, every: float) -> None:
-    """Refuse frequencies that the sampling does not resolve."""
-    if frequency[-1] * every * FEWEST > 1.0 + 1e-9:
-        raise InputError(
-            f" = {every:g} s: {frequency[-1]:g} Hz has only "
-            f"{1.0 / (frequency[-1] * every):.3g} samples in a cycle, and at least {FEWEST} are "
-            "needed; sample faster, or leave every out",
-            "every",
-        )
 
 
 def common_spacing(frequency: NDArray) -> float:

@@ -153,16 +153,15 @@ def circle_fits(
         raise InputError("bands: empty; give one band (Hz) for each mode")
     f, Y = _mobility(frequency, response, quantity)
     parts = [_in_band(f, Y, band) for band in bands]
-    fits: list[CircleFit | None] = [None] * len(parts)
+    fits: dict[int, CircleFit] = {}
     before = np.full((len(parts), 2), np.inf)
     for _ in range(_SWEEPS):
         for k, (points, values) in enumerate(parts):
-            others = [fit for j, fit in enumerate(fits) if j != k and fit is not None]
+            others = [fit for j, fit in fits.items() if j != k]
             fits[k] = _fit(points, values - sum(fit.mobility(points) for fit in others))
-        found = [fit for fit in fits if fit is not None]
-        now = np.array([(fit.natural_frequency, fit.damping_ratio) for fit in found])
+        now = np.array([(fit.natural_frequency, fit.damping_ratio) for fit in fits.values()])
         if (np.abs(now - before) <= _SETTLED * now).all():
-            return tuple(_certain(fit) for fit in found)
+            return tuple(_certain(fit) for fit in fits.values())
         before = now
     raise ComputationError(
         f"circle fits: they still change after {_SWEEPS} sweeps (natural frequencies "

@@ -29,7 +29,7 @@ def convert_response(
     Returns
     -------
     ndarray, shape (m, ...), complex
-        NaN at 0 Hz where a division by i w would be needed: the record does not tell.
+        NaN at 0 Hz where a division by i w would be needed.
 
     Raises
     ------

@@ -166,7 +166,7 @@ def magnitude_curve(frequency: ArrayLike, magnitude: ArrayLike, quantity: str) -
 
 @dataclass(frozen=True)
 class HalfPower:
-    """Half-power points of a peak and the damping that they tell.
+    """Half-power points of a peak and the damping from them.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ degrees off the step before or the tangent at its own end: there it may have lef
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,20 +20,15 @@ from foldyn.statics.newton import COLLIDES, Attempt, Rule, Solver
 from foldyn.statics.problem import UNKNOWN
 from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, step_to, stopped
 
+# rule of one step from its length and its prediction (m,)
+ArcRule = Callable[[float, NDArray], Rule]
+
 ALIGNED = 0.5  # cosine of the largest angle to the step before and to the tangent at its end
 BEND = np.radians(12.0)  # of the path within a step, aimed at
 REMEDY = (
     "take smaller steps (first_step, or settings with a smaller largest_turn), or start from a "
     "state that is less symmetric"
 )
-
-
-class ArcRule(Protocol):
-    """Makes the rule of one step of a length with a prediction (m,)."""
-
-    def __call__(self, length: float, prediction: NDArray) -> Rule:
-        """Rule of the step."""
-        ...
 
 
 class Plane:
@@ -63,8 +58,8 @@ class Cylinder:
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
-    for df (Crisfield, Computers and Structures 13, 1981). Of its roots the one is taken that goes
-    on in the direction of the step.
+    for df (Crisfield, Computers and Structures 13, 1981). The root taken is the one that
+    continues in the direction of the step.
     """
 
     def __init__(self, length: float, prediction: NDArray) -> None:
@@ -97,7 +92,7 @@ def follow(
     solver, start
         Where the path begins.
     rule : ArcRule
-        That of a method, such as `arc_rules.Cylinder`.
+        That of a method, such as `Cylinder`.
     first_step : float
         Change of the load factor in the first step; the next steps are as long.
     direction : (m,) or None
@@ -134,8 +129,7 @@ class _Pace:
         self.length = float(np.linalg.norm(moved))
         self.shortest = self.length * 2.0**-self.settings.cuts
         self.largest = float(np.radians(self.settings.largest_turn))
-        size = float(np.linalg.norm(station.response))
-        climb = np.copysign(self.length / size, station.response @ moved)
+        climb = _climb(station, self.length, moved)
         self.scale = self.length / abs(climb) if climb != 0.0 else 1.0
         self.slope = np.arctan2(self.scale * climb, self.length)
 
@@ -143,7 +137,7 @@ class _Pace:
         """Why a converged step is not taken; empty if it is.
 
         The tangent at its end must lie along the step as well: otherwise the direction in which
-        the path goes on would be anybody's guess.
+        the path continues would be arbitrary.
         """
         moved = arrived.point.u - station.point.u
         along = _cosine(moved, self.moved), abs(_cosine(moved, arrived.response))
@@ -186,8 +180,7 @@ def _advance(
     solver: Solver, station: Station, rule: ArcRule, length: float, moved: NDArray
 ) -> Attempt:
     """One step of a length along the path in the direction in which it `moved`."""
-    size = float(np.linalg.norm(station.response))
-    climb = float(np.copysign(length / size, station.response @ moved))
+    climb = _climb(station, length, moved)
     prediction = climb * station.response
     point = station.point
     factor = point.factor + climb
@@ -196,6 +189,12 @@ def _advance(
     if not np.isfinite(solver.problem.turn(point.u, u)):
         return Attempt(u, factor, 0, UNKNOWN, COLLIDES)
     return solver.correct(u, factor, rule(length, prediction), origin=point.u)
+
+
+def _climb(station: Station, length: float, moved: NDArray) -> float:
+    """Change of the load factor over a length along the tangent, continuing a motion."""
+    size = float(np.linalg.norm(station.response))
+    return float(np.copysign(length / size, station.response @ moved))
 
 
 def _cosine(one: NDArray, other: NDArray) -> float:

@@ -25,9 +25,7 @@ from foldyn.statics.rigid import AXES, name_rigid_motions
 from foldyn.statics.stability import softest_modes
 
 SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
-SUSPICIOUS = (
-    1e-11  # eigenvalues of the matrix scaled to a unit diagonal that call for a closer look
-)
+SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, that asks for a closer look
 INVERSE_ITERATIONS = 4
 MOST_MODES = 12
 BAR_STRAIN = 1e-9  # elongations, as a fraction of what the motion of their ends could cause

@@ -82,14 +82,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("tolerance", "largest_turn", "jump"):
-            number(f"settings: {name}", getattr(self, name), above=0.0)
-        if not 1e-14 <= self.tolerance <= 1e-2:
-            raise InputError(
-                f"settings: tolerance = {self.tolerance:g}: give one between 1e-14 and 0.01"
-            )
-        if self.jump <= 1.0:
-            raise InputError(f"settings: jump = {self.jump:g}: give a number above 1")
+        number("settings: tolerance", self.tolerance, least=1e-14, most=1e-2)
+        number("settings: largest_turn", self.largest_turn, above=0.0)
+        number("settings: jump", self.jump, above=1.0)
         for name in ("iterations", "target", "cuts"):
             whole(f"settings: {name}", getattr(self, name), least=1)
         for name in ("stability", "locate"):
@@ -105,7 +100,7 @@ def plane(normal: NDArray, reach: float) -> Rule:
 
 
 class Attempt(NamedTuple):
-    """What a correction came to; an equilibrium unless `failure` says why not."""
+    """Outcome of a correction: an equilibrium, unless `failure` says why not."""
 
     u: NDArray
     factor: float
@@ -154,7 +149,7 @@ class Solver:
         self.problem = problem
         self.settings = settings or Settings()
         self.tally = Tally()
-        self._reduce = Reduction(problem.free)
+        self.reduce = Reduction(problem.free)  # the block of the free dofs
         self.backend, self._factorize = factorizer(self.settings.solver, len(problem.free))
 
     def stiffness(self, u: NDArray, factor: float, before: NDArray | None = None) -> Stiffness:
@@ -164,7 +159,7 @@ class Solver:
         below any stiffness lets the iteration go on.
         """
         matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
-        block = self._reduce(matrix)
+        block = self.reduce(matrix)
         self.tally.factorizations += 1
         try:
             factors = self._factorize(block)
@@ -176,10 +171,6 @@ class Solver:
             shifted = block + shift * sparse.eye_array(block.shape[0], format="csc")
             factors = self._factorize(sparse.csc_array(shifted))
         return Stiffness(self.problem, matrix, factors)
-
-    def reduced(self, stiffness: Stiffness) -> sparse.csc_array:
-        """The tangent's block of the free dofs."""
-        return self._reduce(stiffness.matrix)
 
     def correct(
         self, u: NDArray, factor: float, rule: Rule | None = None,
@@ -194,16 +185,16 @@ class Solver:
         before = origin
         u, origin = u.copy(), u.copy() if origin is None else origin
         residual = problem.residual(u, factor)
-        found = balance(problem, u, factor, residual)
+        reached = balance(problem, u, factor, residual)
         least, since = np.inf, 0
         for iteration in range(1, settings.iterations + 1):
-            if not np.isfinite(found.residual):
-                return Attempt(u, factor, iteration - 1, found, "the forces are no longer finite")
+            if not np.isfinite(reached.residual):
+                return Attempt(u, factor, iteration - 1, reached, "the forces are no longer finite")
             self.tally.iterations += 1
             try:
                 tangent = stiffness or self.stiffness(u, factor, before)
             except SingularTangentError as error:
-                return Attempt(u, factor, iteration, found, str(error))
+                return Attempt(u, factor, iteration, reached, str(error))
             stiffness = None
             gap = problem.prescribed(factor) - u[problem.held]
             step, climb = tangent.solve(-residual, gap), 0.0
@@ -212,10 +203,10 @@ class Solver:
                 climb = rule(u - origin, step, response)
                 step = step + climb * response
             if not np.isfinite(step).all():
-                return Attempt(u, factor, iteration, found, "no step meets the path")
+                return Attempt(u, factor, iteration, reached, "no step meets the path")
             share = self._share(u, step)
             if share == 0.0:
-                return Attempt(u, factor, iteration, found, COLLIDES)
+                return Attempt(u, factor, iteration, reached, COLLIDES)
             if search and rule is None and share == 1.0 and not gap.any():
                 share = self._search(u, factor, step, residual)
             before, u = u, u + share * step
@@ -223,15 +214,15 @@ class Solver:
             if share == 1.0:
                 u[problem.held] = problem.prescribed(factor)
             residual = problem.residual(u, factor)
-            found = balance(problem, u, factor, residual)
+            reached = balance(problem, u, factor, residual)
             length = float(np.linalg.norm(step))
-            least, since = (found.residual, 0) if found.residual < least else (least, since + 1)
-            if share == 1.0 and converged(problem, found, u, length, settings.tolerance):
-                return Attempt(u, factor, iteration, found)
+            least, since = (reached.residual, 0) if reached.residual < least else (least, since + 1)
+            if share == 1.0 and converged(problem, reached, u, length, settings.tolerance):
+                return Attempt(u, factor, iteration, reached)
             if since == STALL:
-                return Attempt(u, factor, iteration, found, "no progress of the iteration")
+                return Attempt(u, factor, iteration, reached, "no progress of the iteration")
         failure = f"no convergence in {settings.iterations} iterations"
-        return Attempt(u, factor, settings.iterations, found, failure)
+        return Attempt(u, factor, settings.iterations, reached, failure)
 
     def _share(self, u: NDArray, step: NDArray) -> float:
         """Share of a step within which nothing turns too far and nothing collides."""

@@ -70,8 +70,6 @@ class OrigamiProblem:
         Displacements (m) imposed per unit of the factor.
     actuation : Actuation
         The body at each factor.
-    supported : ndarray of int
-        The case's supported dofs: those held, but for the pins of inertia relief.
     """
 
     def __init__(
@@ -100,7 +98,6 @@ class OrigamiProblem:
         pins = self._relief.pins if self._relief else np.zeros(0, np.int64)
         self.free = np.concatenate([np.setdiff1d(case.free_dofs, pins), body.hidden])
         self.held = np.union1d(case.supported_dofs, pins)
-        self.supported = case.supported_dofs
         self.length = float(np.linalg.norm(structure.nodes - structure.nodes.mean(axis=0)))
         self.force_rounding = EPS * float(np.linalg.norm(body.scale()[self.free]))
 
@@ -124,28 +121,21 @@ class OrigamiProblem:
         """External forces (m,), N."""
         force = self.constant + factor * self.growing
         if self._adaptive is not None:
-            force = force + self._adapted(u, factor)
+            added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
+            if added.shape != self._shape:
+                raise InputError(
+                    f"adaptive_load: returned forces of shape {added.shape}, give {self._shape}"
+                )
+            force = force + self._extended(added)
         if self._relief is not None:
             nodal = u.size - self._hidden
             force[:nodal] = force[:nodal] - self._relief.inertia(u[:nodal], force[:nodal])
         return force
 
-    def _adapted(self, u: NDArray, factor: float) -> NDArray:
-        assert self._adaptive is not None
-        added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
-        if added.shape != self._shape:
-            raise InputError(
-                f"adaptive_load: returned forces of shape {added.shape}, give {self._shape}"
-            )
-        return self._extended(added)
-
-    def internal(self, u: NDArray, factor: float) -> NDArray:
-        """Internal forces (m,), N."""
-        return self.actuation.body(factor).internal(u, self._work)
-
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
-        return self.internal(u, factor) - self.external(u, factor)
+        internal = self.actuation.body(factor).internal(u, self._work)
+        return internal - self.external(u, factor)
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""

@@ -59,10 +59,17 @@ def plan_path(
 ) -> PathPlan:
     """Check the arguments that say where a path leads."""
     method = METHODS[choice("method", name, METHODS)]
-    factors = None if load_factors is None else _factors(load_factors)
+    factors = None
+    if load_factors is not None:
+        array = numbers("load_factors", load_factors)
+        if array.ndim != 1 or not array.size:
+            raise InputError(
+                f" = {show(load_factors)}: give a list of numbers, at least one", "load_factors"
+            )
+        factors = array.tolist()
     if first_step is not None and method.rule is None:
         raise InputError(
-            f": method {name!r} goes by load_factors or steps; leave it out", "first_step"
+            f": method {name!r} is driven by load_factors or steps; leave it out", "first_step"
         )
     if method.rule is None:
         return _driven(method, factors, steps)
@@ -98,13 +105,6 @@ def _driven(method: PathMethod, factors: list[float] | None, steps: int | None) 
         if one == other:
             raise InputError(f": number {i + 1} repeats the one before, {one:g}", "load_factors")
     return PathPlan(method, factors[0], factors[1:], None, len(factors) - 1, 0.0)
-
-
-def _factors(given: Any) -> list[float]:
-    array = numbers("load_factors", given)
-    if array.ndim != 1 or not array.size:
-        raise InputError(f" = {show(given)}: give a list of numbers, at least one", "load_factors")
-    return array.tolist()
 
 
 def along(

@@ -98,11 +98,11 @@ def balance(problem: Problem, u: NDArray, factor: float, residual: NDArray) -> B
     return Balance(float(np.linalg.norm(residual[problem.free])), reference)
 
 
-def converged(problem: Problem, found: Balance, u: NDArray, step: float, tolerance: float) -> bool:
-    """Whether a state u reached by a last step of norm `step` is an equilibrium."""
-    if not found.residual < np.inf:  # false for nan
+def converged(problem: Problem, state: Balance, u: NDArray, step: float, tolerance: float) -> bool:
+    """Whether a state u state by a last step of norm `step` is an equilibrium."""
+    if not state.residual < np.inf:  # false for nan
         return False
-    if found.residual <= problem.force_rounding:
+    if state.residual <= problem.force_rounding:
         return True
     size = max(float(np.linalg.norm(u)), EPS * problem.length / tolerance)
-    return found.residual <= tolerance * found.reference and step <= tolerance * size
+    return state.residual <= tolerance * state.reference and step <= tolerance * size

@@ -68,10 +68,10 @@ class Change(NamedTuple):
 def stability_changes(points: Sequence[Point], from_rest: bool) -> list[Change]:
     """Changes of the count along a path; `from_rest`, where there were none, included."""
     counted = [point for point in points if point.negative >= 0]
-    found = [Change(a, b) for a, b in pairwise(counted) if a.negative != b.negative]
+    changes = [Change(a, b) for a, b in pairwise(counted) if a.negative != b.negative]
     if from_rest and counted and counted[0].negative:
-        found.insert(0, Change(None, counted[0]))
-    return found
+        changes.insert(0, Change(None, counted[0]))
+    return changes
 
 
 def stability_facts(points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
@@ -178,7 +178,7 @@ def _dataset(
         problem.case,
         [p.factor for p in points],
         [problem.displacement(p.u) for p in points],
-        np.reshape([r[problem.supported] for r in residuals], (len(points), -1)),
+        np.reshape([r[problem.case.supported_dofs] for r in residuals], (len(points), -1)),
         {
             **dict(zip(problem.groups, energies.T, strict=True)),
             "work": _work(problem, points, residuals),

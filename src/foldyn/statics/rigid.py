@@ -57,24 +57,14 @@ def name_rigid_motions(x: NDArray, held: NDArray) -> list[str]:
     space = _free_space(motions, held)
     if not space.size:
         return []
-    # rotations last: those that remain once the translations are taken out
-    still = space @ _null_directions(space[3:])
-    names = [f"translation along {_direction(t)}" for t in _tidy(still[:3])]
-    turning = _tidy(_range_directions(space[3:]))
-    names += [f"rotation about {_direction(w)}" for w in turning]
-    return names
-
-
-def _null_directions(block: NDArray) -> NDArray:
-    """Combinations of the columns of a (3, r) block that vanish."""
-    _, values, right = np.linalg.svd(block, full_matrices=True)
+    left, values, right = np.linalg.svd(space[3:])
     rank = int((values > 1e-8).sum())
-    return right[rank:].T
-
-
-def _range_directions(block: NDArray) -> NDArray:
-    left, values, _ = np.linalg.svd(block)
-    return left[:, : int((values > 1e-8).sum())]
+    # rotations last: those that remain once the translations are taken out
+    translations, rotations = (space @ right[rank:].T)[:3], left[:, :rank]
+    return [
+        *(f"translation along {_direction(t)}" for t in _tidy(translations)),
+        *(f"rotation about {_direction(w)}" for w in _tidy(rotations)),
+    ]
 
 
 def _tidy(directions: NDArray) -> list[NDArray]:
@@ -129,6 +119,6 @@ class Relief:
         """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""
         motions = self._motions(u)
         if motions.shape[1] != self._count:
-            return np.full(len(force), np.nan)  # the supports have come to hold a turned body
+            return np.full(len(force), np.nan)  # the supports now hold the turned body
         carried = (self._mass @ motions.reshape(-1, 3 * self._count)).reshape(motions.shape)
         return carried @ np.linalg.solve(motions.T @ carried, motions.T @ force)

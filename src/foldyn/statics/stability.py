@@ -1,4 +1,4 @@
-"""Critical points between the points of a path: located and told apart.
+"""Critical points between the points of a path: located and classified.
 
 Where the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has
 passed through zero. The step is halved until one crossing remains, and the crossing is then found
@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import Factorization
-from foldyn.statics.newton import Attempt, Solver, plane
+from foldyn.statics.newton import Solver, plane
 from foldyn.statics.stepping import Station, arrive
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
@@ -63,13 +63,10 @@ class Section:
         u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
         rule = plane(self.chord, share * self.whole)
         attempt = self.solver.correct(u, factor, rule, origin=self.start.point.u)
-        if attempt.failure or self._strays(attempt):
+        farthest = 2.0 * np.sqrt(self.whole)  # from the start: twice the length of the step
+        if attempt.failure or np.linalg.norm(attempt.u - self.start.point.u) > farthest:
             return None
         return Mark(share, arrive(self.solver, attempt))
-
-    def _strays(self, attempt: Attempt) -> bool:
-        """Whether a point lies farther from the start than twice the length of the step."""
-        return bool(np.linalg.norm(attempt.u - self.start.point.u) > 2.0 * np.sqrt(self.whole))
 
     def zero(
         self, function: Callable[[Mark], float], xtol: float,
@@ -121,8 +118,8 @@ def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
         middle = section.at(0.5 * (low.share + high.share), low, high)
         if middle is not None:
             return _crossings(section, low, middle) + _crossings(section, middle, high)
-    found = _crossing(section, low, high)
-    return [] if found is None else [found]
+    critical = _crossing(section, low, high)
+    return [] if critical is None else [critical]
 
 
 def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
@@ -131,12 +128,12 @@ def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
     count = min(low.negative, high.negative)
     single = abs(high.negative - low.negative) == 1
     if single and low.station.stiffness.factors.pivots() is not None:
-        found = _zero_of_determinant(section, low, high)
+        critical = _zero_of_determinant(section, low, high)
     else:
-        found = _bisected(section, low, high)
-    if found is None:
+        critical = _bisected(section, low, high)
+    if critical is None:
         return None
-    return found._replace(point=replace(found.point, negative=count, kind=kind))
+    return critical._replace(point=replace(critical.point, negative=count, kind=kind))
 
 
 def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | None:
@@ -170,7 +167,7 @@ def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
     """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
     problem = solver.problem
-    matrix = solver.reduced(station.stiffness)
+    matrix = solver.reduce(station.stiffness.matrix)
     values, vectors = softest_modes(matrix, station.stiffness.factors, count, dense=300)
     nearest = np.argsort(np.abs(values))[:count]
     shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))

@@ -70,7 +70,7 @@ class Station(NamedTuple):
 
 
 class PathStoppedError(Exception):
-    """A path cannot go on; says why and what to do."""
+    """A path cannot be continued; with the reason and a remedy."""
 
     def __init__(self, reason: str, remedy: str) -> None:
         super().__init__(f"{reason}; {remedy}")
@@ -89,30 +89,24 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
     return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
 
 
-def snapped(solver: Solver, start: Station, attempt: Attempt) -> bool:
-    """Whether a step of the load factor went much farther than its linear prediction."""
-    climb = abs(attempt.factor - start.point.factor)
-    predicted = climb * float(np.linalg.norm(start.response))
-    went = float(np.linalg.norm(attempt.u - start.point.u))
-    negligible = NEGLIGIBLE * solver.problem.length
-    return went > solver.settings.jump * predicted + negligible
-
-
 def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
     """Equilibrium at another load factor, on the path on which `start` lies."""
-    plain = _guarded(solver, start, solver.correct(start.point.u, factor, None, start.stiffness))
+    plain = _step(solver, start, factor, False)
     if not plain.failure or plain.failure == SNAPS:
         return plain
-    searched = solver.correct(start.point.u, factor, None, start.stiffness, search=True)
-    searched = _guarded(solver, start, searched)
+    searched = _step(solver, start, factor, True)
     return plain if searched.failure else searched
 
 
-def _guarded(solver: Solver, start: Station, attempt: Attempt) -> Attempt:
-    """The attempt, refused if it has snapped to a state off its path."""
-    if not attempt.failure and snapped(solver, start, attempt):
-        return attempt._replace(failure=SNAPS)
-    return attempt
+def _step(solver: Solver, start: Station, factor: float, search: bool) -> Attempt:
+    """One attempt; it has snapped if it goes much farther than its linear prediction."""
+    attempt = solver.correct(start.point.u, factor, None, start.stiffness, search)
+    if attempt.failure:
+        return attempt
+    predicted = abs(factor - start.point.factor) * float(np.linalg.norm(start.response))
+    length = float(np.linalg.norm(attempt.u - start.point.u))
+    limit = solver.settings.jump * predicted + NEGLIGIBLE * solver.problem.length
+    return attempt._replace(failure=SNAPS) if length > limit else attempt
 
 
 def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool) -> Walk:
@@ -200,12 +194,10 @@ def settle(solver: Solver, u: NDArray, factor: float) -> Station:
     """
     problem = solver.problem
     moved = not np.array_equal(u[problem.held], problem.prescribed(factor))
-    found = balance(problem, u, factor, problem.residual(u, factor))
-    still = found.residual <= max(
-        problem.force_rounding, solver.settings.tolerance * found.reference
-    )
-    if still and not moved:
-        return arrive(solver, Attempt(u, factor, 0, found))
+    given = balance(problem, u, factor, problem.residual(u, factor))
+    negligible = max(problem.force_rounding, solver.settings.tolerance * given.reference)
+    if given.residual <= negligible and not moved:
+        return arrive(solver, Attempt(u, factor, 0, given))
     released = Solver(Released(problem, u, factor), solver.settings)
     released.tally = solver.tally
     at_rest = balance(released.problem, u, 0.0, released.problem.residual(u, 0.0))

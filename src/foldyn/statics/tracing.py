@@ -51,7 +51,7 @@ def trace(
     ----------
     case : Case
     method : {"newton", "displacement", "mgdcm", "arc_length"}
-        "newton" goes by the load factor and returns the given factors, nothing else;
+        "newton" steps the load factor and returns the points at the given ones only;
         "displacement" does so where supports or folds are moved, and returns every point on the
         way; "mgdcm" and "arc_length" let the factor move freely, through limit points.
     load_factors : sequence of float, optional
