@@ -227,7 +227,7 @@ def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
     return way.options(**given)
 
 
-def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray[np.float64]:
+def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
     frequency = np.atleast_1d(numbers("frequencies", given))
     if frequency.ndim != 1 or not frequency.size:
         raise InputError(

@@ -117,9 +117,7 @@ def harmonic(
     return Answer(response, {"swing": swing}, {"iterations": spent})
 
 
-def _ahead(
-    done: list[tuple[float, NDArray]], frequency: float, first: NDArray
-) -> NDArray[np.float64]:
+def _ahead(done: list[tuple[float, NDArray]], frequency: float, first: NDArray) -> NDArray:
     """Slopes to begin with: on the straight line through those of the last two frequencies."""
     if not done:
         return first
@@ -140,7 +138,7 @@ class _Hinges:
         self.offset, self.stiffness = hinges.offset, hinges.stiffness
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 
-    def slope(self, motion: NDArray) -> NDArray[np.float64]:
+    def slope(self, motion: NDArray) -> NDArray:
         """Equivalent slopes / k (nh,) in a motion (nf,)."""
         swing = np.maximum(np.abs(self.gradient @ motion), LEAST)
         return equivalent_slope(self.offset, swing)

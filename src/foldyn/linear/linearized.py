@@ -135,7 +135,11 @@ def linearize(
             stacklevel=3,
         )
     stiffness = exact if change is None else sparse.csr_array(exact + change)
-    mass = _all_mass(case, len(body.hidden))
+    mass = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
+    if len(body.hidden):
+        massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
+        mass = sparse.block_diag([mass, massless], format="csr")
+    mass = sparse.csr_array(mass)
     return Linearized(
         case=case,
         displacement=point.displacement,
@@ -162,14 +166,6 @@ def _slope_change(
         at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
         change, soft = np.where(at_rest, -slope, 0.0), int(at_rest.sum())
     return (body.soft_tangent(q, change) if change.any() else None), soft
-
-
-def _all_mass(case: Case, hidden: int) -> sparse.csr_array:
-    """Mass (m, m) of all dofs."""
-    nodal = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
-    if hidden:
-        nodal = sparse.block_diag([nodal, sparse.csr_array((hidden, hidden))], format="csr")
-    return sparse.csr_array(nodal)
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:

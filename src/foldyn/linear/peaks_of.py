@@ -167,7 +167,7 @@ def _bands(
 
 def _modal(
     response: xarray.Dataset, f: NDArray, curve: NDArray, shown: str, axis: str, rate: float
-) -> NDArray[np.complex128]:
+) -> NDArray:
     """The curve as one in which a mode makes a circle.
 
     A transmissibility is 1 - (s^2 + alpha s) times the receptance of what the base accelerates,

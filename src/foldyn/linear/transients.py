@@ -128,7 +128,7 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     return Answer(answer.response, {}, {"pulse": width, **answer.facts})
 
 
-def _pulse(highest: float, pulse: float, record: Record) -> NDArray[np.float64]:
+def _pulse(highest: float, pulse: float, record: Record) -> NDArray:
     """Samples of the pulse between two of rest."""
     if highest * pulse > WEAK:
         raise InputError(
@@ -173,9 +173,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     return answer._replace(facts={**own, **answer.facts})
 
 
-def _burst(
-    random: np.random.Generator, count: int, every: float, frequency: NDArray
-) -> NDArray[np.float64]:
+def _burst(random: np.random.Generator, count: int, every: float, frequency: NDArray) -> NDArray:
     """Samples of random numbers within the band wanted, of root mean square 1, tapered to 0."""
     if count < 32:
         raise InputError(

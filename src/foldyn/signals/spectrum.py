@@ -58,8 +58,16 @@ def spectrum(
         Fewer than 4 samples, NaN or infinity in the record, complex samples, an interval that is
         not positive, an unknown window or detrend, or a padding factor below 1.
     """
-    samples = _checked_samples(x, axis)
+    samples = records.real_numbers("x", x)
+    if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
+        raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
+    samples = records.finite("x", np.moveaxis(samples, axis, 0))
     n = samples.shape[0]
+    if n < MINIMUM_SAMPLES:
+        raise InputError(
+            f"x: {n} samples along axis {axis}; a spectrum needs at least {MINIMUM_SAMPLES}: run "
+            "longer or store more often"
+        )
     interval = records.checked_interval(dt)
     length = n * whole("pad", pad, least=1)
 
@@ -74,17 +82,3 @@ def spectrum(
     doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)
     amplitude[doubled] *= 2.0
     return scipy.fft.rfftfreq(length, interval), np.moveaxis(amplitude, 0, axis)
-
-
-def _checked_samples(x: ArrayLike, axis: int) -> NDArray[np.float64]:
-    """Return the samples as float64 with time along axis 0."""
-    samples = records.real_numbers("x", x)
-    if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
-        raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
-    samples = records.finite("x", np.moveaxis(samples, axis, 0))
-    if samples.shape[0] < MINIMUM_SAMPLES:
-        raise InputError(
-            f"x: {samples.shape[0]} samples along axis {axis}; a spectrum needs at least "
-            f"{MINIMUM_SAMPLES}: run longer or store more often"
-        )
-    return samples
