@@ -60,11 +60,11 @@ def test_no_case():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"tolerance": 0.0}, "greater than 0"),
+        ({"tolerance": 0.0}, "at least 1e-14"),
         ({"tolerance": 0.5}, "must be at most 0.01"),
         ({"iterations": 0}, "whole number, at least 1"),
         ({"target": 2.5}, "whole number, at least 1"),
-        ({"jump": 1.0}, "above 1"),
+        ({"jump": 1.0}, "greater than 1"),
         ({"largest_turn": -3}, "greater than 0"),
         ({"locate": 1}, "True or False"),
     ],

@@ -92,7 +92,7 @@ class Pencil:
         return np.einsum("ik,ik->k", shapes, self.stiffness @ shapes) / modal
 
     def residuals(self, values: NDArray, shapes: NDArray) -> NDArray:
-        """|K phi - lambda M phi| over what its terms amount to (k,); nan for shapes of zeros."""
+        """|K phi - lambda M phi| relative to its terms (k,); nan for shapes of zeros."""
         inertia = (self.mass @ shapes) * values
         terms = np.linalg.norm(self._sizes @ np.abs(shapes), axis=0)
         return np.linalg.norm(self.stiffness @ shapes - inertia, axis=0) / terms
@@ -155,7 +155,7 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     mass = pencil.mass[heavy][:, heavy].toarray()
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
     follow = np.zeros((0, len(heavy)))
-    if len(light):  # what has no mass follows statically
+    if len(light):  # massless dofs follow statically
         across = pencil.stiffness[light][:, heavy].toarray()
         follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
         stiffness = stiffness + across.T @ follow
@@ -227,7 +227,7 @@ def _lanczos(
             f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "
             "more if many frequencies coincide"
         ) from error
-    if pencil.finite < size:  # M does not see what is without mass
+    if pencil.finite < size:  # M does not act on massless dofs
         shapes = np.stack([inverse(force) for force in (mass @ shapes).T], axis=1)
     shapes = shapes / np.sqrt(np.einsum("ik,ik->k", shapes, mass @ shapes))
     return pencil.quotients(shapes), shapes
@@ -236,7 +236,7 @@ def _lanczos(
 def _sorted(
     pencil: Pencil, values: NDArray, shapes: NDArray, known: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """All modes by eigenvalue; what is zero to rounding is zero, and known modes lead there."""
+    """All modes by eigenvalue; those zero to rounding are set to zero, known modes first there."""
     rounding = pencil.noise(shapes) + EPS * SHIFT * pencil.scale
     values = np.where(np.abs(values) <= rounding, 0.0, values)
     values = np.r_[np.zeros(known.shape[1]), values]

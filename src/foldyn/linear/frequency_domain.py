@@ -1,6 +1,6 @@
 """Frequency responses of linearized cases: one solution for each frequency, or modes superposed.
 
-Modes go with what those left out add statically.
+The static response of the modes left out completes those superposed.
 """
 
 from __future__ import annotations

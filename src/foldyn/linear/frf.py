@@ -1,4 +1,4 @@
-"""`frf`: the frequency response of a case; as receptance, mobility or accelerance."""
+"""`frf`: the frequency response of a case, as receptance, mobility or accelerance."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
 
 
 def _pulse(highest: float, pulse: float, record: Record) -> NDArray:
-    """Samples of the pulse between two of rest."""
+    """Samples of the pulse, with samples of rest on either side."""
     if highest * pulse > WEAK:
         raise InputError(
             f"pulse = {pulse:g} s: has no strength left at {highest:g} Hz; take at most "
@@ -174,7 +174,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
 
 
 def _burst(random: np.random.Generator, count: int, every: float, frequency: NDArray) -> NDArray:
-    """Samples of random numbers within the band wanted, of root mean square 1, tapered to 0."""
+    """Samples of random numbers within the band, of root mean square 1, tapered to 0."""
     if count < 32:
         raise InputError(
             f"burst: {count} samples are too few; give a longer duration, or a larger part of it"

@@ -45,7 +45,7 @@ class Equilibrium:
     energy : float
         Energy (J) above that of the landscape's first point.
     stable : bool
-        Whether it stays there when let go.
+        Whether it stays there when released.
     """
 
     displacement: NDArray

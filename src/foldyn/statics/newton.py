@@ -125,7 +125,7 @@ class Stiffness:
         self.problem, self.matrix, self.factors = problem, matrix, factors
 
     def solve(self, force: NDArray, motion: NDArray) -> NDArray:
-        """Motion (m,) of all dofs under a force (m,) on the free ones as the held move."""
+        """Motion (m,) of all dofs under a force (m,) on the free ones while the held ones move."""
         problem = self.problem
         full = np.zeros(len(force))
         full[problem.held] = motion

@@ -27,7 +27,7 @@ class PathMethod(NamedTuple):
     """How a path is followed.
 
     `rule` is None where the load factor drives the path; `between` says whether points between
-    the given load factors belong to the path, too.
+    the given load factors belong to the path too.
     """
 
     name: str

@@ -35,7 +35,7 @@ class Problem(Protocol):
     Attributes
     ----------
     free, held : ndarray of int
-        Dofs that are solved for, and the others; together all, each increasing.
+        The dofs solved for, and the others; together all of them, each increasing.
     force_rounding : float
         Norm (N) of the residual's rounding errors on the free dofs.
     length : float
@@ -98,11 +98,11 @@ def balance(problem: Problem, u: NDArray, factor: float, residual: NDArray) -> B
     return Balance(float(np.linalg.norm(residual[problem.free])), reference)
 
 
-def converged(problem: Problem, state: Balance, u: NDArray, step: float, tolerance: float) -> bool:
-    """Whether a state u state by a last step of norm `step` is an equilibrium."""
-    if not state.residual < np.inf:  # false for nan
+def converged(problem: Problem, forces: Balance, u: NDArray, step: float, tolerance: float) -> bool:
+    """Whether a state u reached by a last step of norm `step` is an equilibrium."""
+    if not forces.residual < np.inf:  # false for nan
         return False
-    if state.residual <= problem.force_rounding:
+    if forces.residual <= problem.force_rounding:
         return True
     size = max(float(np.linalg.norm(u)), EPS * problem.length / tolerance)
-    return state.residual <= tolerance * state.reference and step <= tolerance * size
+    return forces.residual <= tolerance * forces.reference and step <= tolerance * size

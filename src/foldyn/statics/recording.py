@@ -33,7 +33,7 @@ MOST_LISTED = 20  # changes that the attribute lists
 
 
 class Change(NamedTuple):
-    """Neighboring points with different counts; without a first one the path begins so."""
+    """Neighboring points whose counts differ; without a first one, where the path begins."""
 
     before: Point | None
     after: Point
@@ -46,7 +46,7 @@ class Change(NamedTuple):
 
     @property
     def loses(self) -> bool:
-        """Whether there are more of them after it."""
+        """Whether negative eigenvalues appear."""
         return self.before is None or self.after.negative > self.before.negative
 
     def __str__(self) -> str:

@@ -160,11 +160,11 @@ class Released:
         self._out[problem.held] = 0.0
 
     def prescribed(self, factor: float) -> NDArray:
-        """From where the held dofs stood to where they belong."""
+        """The held dofs, on their way from where they stood to where they belong."""
         return self._from + factor * (self._to - self._from)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
-        """Residual less what is still held."""
+        """Residual less the force that still holds it."""
         return self.problem.residual(u, self.factor) - (1.0 - factor) * self._out
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:

@@ -163,7 +163,7 @@ def on_nodes(
 
 
 def check_steps(steps: Any, dofs: int) -> None:
-    """Refuse a count of steps that is none, or whose points memory cannot hold."""
+    """Refuse steps that are not a positive whole number, or that memory cannot hold."""
     count = whole("steps", steps, least=1)
     check_memory(
         "steps", f"a path of {float(count):.3g} points", 8.0 * COPIES * count * dofs, "take fewer"
@@ -181,7 +181,7 @@ def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
         if not chosen:
             raise InputError(' = "gravity": the case has no Gravity among its loads', "constant")
         return chosen
-    if isinstance(constant, Sequence) and not len(constant):
+    if np.size(constant) == 0:
         return ()
     chosen = sorted(indices("constant", constant, "load", 'or "gravity"'))
     for which in chosen:
@@ -194,11 +194,11 @@ def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
 
 
 def displacement_of(
-    state: Any, case: Case, field: str, known: str = "a State, as fd.initial_state(path, at=-1)"
+    state: Any, case: Case, field: str, expected: str = "a State, as fd.initial_state(path, at=-1)"
 ) -> NDArray:
-    """Displacements (n, 3) of a case in a state, zero where it has none; `known` may be given."""
+    """Displacements (n, 3) of a case in a state, zero where it has none."""
     if not isinstance(state, State):
-        raise InputError(f": got {type(state).__name__}; give {known}", field)
+        raise InputError(f": got {type(state).__name__}; give {expected}", field)
     shape = case.structure.nodes.shape
     if state.displacement is None:
         return np.zeros(shape)
