@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from foldyn.formats.files import read_pattern, write_pattern
-from foldyn.formats.registry import FORMATS, Format
+from foldyn.formats.files import FORMATS, Format, read_pattern, write_pattern
 
 __all__ = ["FORMATS", "Format", "read_pattern", "write_pattern"]

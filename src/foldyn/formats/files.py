@@ -1,19 +1,53 @@
-"""Read and write pattern files of any registered format."""
+"""Pattern files: the registry of formats, and reading and writing by extension."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
-from foldyn.formats.registry import FORMATS, Format
+from foldyn.formats import fold
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
 from foldyn.writing import write_bytes
 
 MOST = 32
 """Size of a pattern file (MiB)."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A text format for patterns.
+
+    Reading and writing work on text: opening, decoding and saving files, and naming the file
+    in messages, is done once for all formats.
+
+    Parameters
+    ----------
+    name : str
+        Name of the format.
+    extensions : tuple of str
+        File extensions, lower case with the dot.
+    read : callable or None
+        From the text of a file to a `Pattern`; raises `InputError` naming the field.
+        None: the format is written only.
+    write : callable or None
+        From a `Pattern` to the text of a file. None: the format is read only.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    read: Callable[[str], Pattern] | None = None
+    write: Callable[[Pattern], str] | None = None
+
+
+_FORMATS = (Format("FOLD", (".fold",), read=fold.read, write=fold.write),)
+
+FORMATS: dict[str, Format] = {end: fmt for fmt in _FORMATS for end in fmt.extensions}
+"""The format of each file extension."""
 
 
 def read_pattern(path: str | os.PathLike[str]) -> Pattern:
