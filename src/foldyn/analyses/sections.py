@@ -32,7 +32,7 @@ from foldyn.errors import Faults, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures.options import CALIBRATIONS, SCHEMES
+from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, nearest, number, numbers, show, vector
 
 AXES = ("x", "y", "z")

@@ -1,6 +1,6 @@
 """Energy and forces of a shell of triangles, compiled.
 
-Displacements u (n, 3) and rotations; see `shells.element` and `shells.sides`. The dofs x (r,) of
+Displacements u (n, 3) and rotations; see `shells.sides`. The dofs x (r,) of
 the rotations are lengths as well, m, so that norms over all dofs do not depend on the unit of
 length: a rotation is x times `per_reach`.
 """
