@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from foldyn.cases.damping import STATES
+from foldyn.cases.case import STATES
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS

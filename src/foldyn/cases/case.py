@@ -1,4 +1,4 @@
-"""The case: what a solver gets."""
+"""The case: what a solver gets, a structure with supports, loads and damping; and its states."""
 
 from __future__ import annotations
 
@@ -8,19 +8,88 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.damping import Rayleigh
-from foldyn.cases.function import as_history
-from foldyn.cases.histories import History
-from foldyn.cases.loads import LOADS, Gravity
-from foldyn.cases.part import Load
+from foldyn.cases.history import History, as_history
+from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
 from foldyn.errors import Faults, InputError
-from foldyn.values import show
+from foldyn.structures.discretized import read_only
+from foldyn.values import choice, number, numbers, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
+
+
+STATES = ("rest", "start")
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
+
+    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2.
+
+    Parameters
+    ----------
+    alpha : float
+        Mass-proportional coefficient (1/s), at least 0.
+    beta : float
+        Stiffness-proportional coefficient (s), at least 0.
+    state : {"rest", "start"}
+        Where K0 is taken: at the structure's rest, or where a motion starts (for modes and
+        frequency responses: the state about which it vibrates).
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+    state: str = "rest"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "alpha", number("alpha", self.alpha, least=0.0))
+        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
+        choice("state", self.state, STATES)
+
+    def matrix(self, mass: Any, stiffness: Any) -> Any:
+        """C from M (kg) and K0 (N/m)."""
+        damping = mass * self.alpha
+        return damping if self.beta == 0.0 else damping + self.beta * stiffness
+
+    def rate(self, omega: Any) -> Any:
+        """Damping (1/s) of a mode with angular frequency omega (rad/s) and modal mass 1 kg m2."""
+        return self.alpha + self.beta * omega**2
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Displacement and velocity of every node, for example to start a motion from.
+
+    Parameters
+    ----------
+    displacement : array_like, shape (n, 3), optional
+        Displacement (m) of every node from its rest position; zero by default.
+    velocity : array_like, shape (n, 3), optional
+        Velocity (m/s) of every node; zero by default.
+    """
+
+    displacement: ArrayLike | None = None
+    velocity: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        shapes = set()
+        for name in ("displacement", "velocity"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = numbers(name, value)
+            if array.ndim != 2 or array.shape[1] != 3:
+                raise InputError(f"{name}: shape {array.shape}: must be (nodes, 3)")
+            shapes.add(array.shape)
+            object.__setattr__(self, name, array)
+        if len(shapes) == 2:
+            raise InputError("displacement and velocity: must have the same shape")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +181,7 @@ class Case:
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
         """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
-        mask = self.imposed | self._held
-        mask.flags.writeable = False
-        return mask
+        return read_only(self.imposed | self._held)
 
     @cached_property
     def imposed(self) -> NDArray[np.bool_]:
@@ -124,16 +191,15 @@ class Case:
             if not isinstance(support, Impose):
                 continue
             nodes, axis = self._nodes_of(i, support), AXES.index(support.axis)
-            for taken, how in ((self._held, "held and imposed"), (mask, "imposed twice")):
+            for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
                 if twice.size:
                     raise InputError(
-                        f"supports[{i}]: node {twice[0]} is {how} along {support.axis}, a "
+                        f"supports[{i}]: node {twice[0]} is {both} along {support.axis}, a "
                         "contradictory support; leave out one of the two"
                     )
             mask[nodes, axis] = True
-        mask.flags.writeable = False
-        return mask
+        return read_only(mask)
 
     @cached_property
     def _held(self) -> NDArray[np.bool_]:
@@ -271,9 +337,7 @@ def _add(
 
 
 def _frozen(terms: list[tuple[NDArray[np.float64], History]]) -> Terms:
-    for vector, _ in terms:
-        vector.flags.writeable = False
-    return tuple(terms)
+    return tuple((read_only(vector), history) for vector, history in terms)
 
 
 def _tuple_of(name: str, kinds: tuple[type, ...], given: Any) -> tuple:

@@ -17,14 +17,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.case import Case
-from foldyn.cases.damping import Rayleigh
+from foldyn.cases.case import Case, Rayleigh
 from foldyn.cases.decode import law_from
-from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
-from foldyn.cases.loads import load_from
+from foldyn.cases.history import as_history
+from foldyn.cases.loads import Load, load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
-from foldyn.cases.part import Load
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
