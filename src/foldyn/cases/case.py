@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -19,6 +19,7 @@ from foldyn.structures.discretized import read_only
 from foldyn.values import choice, number, numbers, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
+Parts = Iterable[tuple[NDArray[np.float64], Any]]
 
 
 STATES = ("rest", "start")
@@ -167,10 +168,9 @@ class Case:
     def _check_selections(self) -> None:
         """Refuse nodes and creases that are not there, all at once."""
         faults = Faults()
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, BaseMotion):
-                with faults.collected():
-                    self._nodes_of(i, support)
+        for place, support in self._supports(Fix, Impose):
+            with faults.collected():
+                self._nodes_of(place, support)
         for place, load in self._loads():
             with faults.collected():
                 load.loaded(self.structure, place)
@@ -187,15 +187,13 @@ class Case:
     def imposed(self) -> NDArray[np.bool_]:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, Impose):
-                continue
-            nodes, axis = self._nodes_of(i, support), AXES.index(support.axis)
+        for place, support in self._supports(Impose):
+            nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
             for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
                 if twice.size:
                     raise InputError(
-                        f"supports[{i}]: node {twice[0]} is {both} along {support.axis}, a "
+                        f"{place}: node {twice[0]} is {both} along {support.axis}, a "
                         "contradictory support; leave out one of the two"
                     )
             mask[nodes, axis] = True
@@ -205,15 +203,14 @@ class Case:
     def _held(self) -> NDArray[np.bool_]:
         """Whether a Fix holds each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
-        for i, support in enumerate(self.supports):
-            if isinstance(support, Fix):
-                nodes = self._nodes_of(i, support)
-                for axis in support.axes:
-                    mask[nodes, AXES.index(axis)] = True
+        for place, support in self._supports(Fix):
+            nodes = self._nodes_of(place, support)
+            for axis in support.axes:
+                mask[nodes, AXES.index(axis)] = True
         return mask
 
-    def _nodes_of(self, i: int, support: Fix | Impose) -> NDArray[np.int64]:
-        return resolve_nodes(self.structure, support.nodes, f"supports[{i}].nodes")
+    def _nodes_of(self, place: str, support: Any) -> NDArray[np.int64]:
+        return resolve_nodes(self.structure, support.nodes, f"{place}.nodes")
 
     @cached_property
     def free_dofs(self) -> NDArray[np.int64]:
@@ -228,38 +225,39 @@ class Case:
     @cached_property
     def imposed_terms(self) -> Terms:
         """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for i, support in enumerate(self.supports):
-            if isinstance(support, Impose):
-                vector = np.zeros((len(self.structure.nodes), 3))
-                vector[self._nodes_of(i, support), AXES.index(support.axis)] = support.value
-                _add(terms, as_history(support.history), vector)
-        return _frozen(terms)
+        return _summed(self._imposed())
+
+    def _imposed(self) -> Parts:
+        for place, support in self._supports(Impose):
+            vector = np.zeros((len(self.structure.nodes), 3))
+            vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
+            yield vector, support.history
 
     @cached_property
     def base_terms(self) -> Terms:
         """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
+        return _summed(self._moved_by_the_base())
+
+    def _moved_by_the_base(self) -> Parts:
         base = self.fixed & ~self.imposed
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, BaseMotion):
-                continue
+        for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
             if not base[:, axis].any():
                 raise InputError(
-                    f"supports[{i}]: the base moves along {support.axis}, but no support holds a "
+                    f"{place}: the base moves along {support.axis}, but no support holds a "
                     f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
                     "out the base motion"
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            _add(terms, as_history(support.history), vector)
-        return _frozen(terms)
+            yield vector, support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:
         """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
+        return _summed(self._actuated())
+
+    def _actuated(self) -> Parts:
         first: dict[int, str] = {}  # the load that actuates a crease
         for place, load in self._loads():
             actuated = load.rest_changes(self.structure, place)
@@ -275,35 +273,29 @@ class Case:
                 first[crease] = place
             vector = np.zeros(len(self.structure.folds))
             vector[creases] = change
-            _add(terms, as_history(load.history), vector)
-        return _frozen(terms)
+            yield vector, load.history
 
     @cached_property
     def load_terms(self) -> Terms:
         """Forces (N) on all nodes, shape (n, 3), each with its history."""
-        return self._force_terms(lambda load: True)
+        return _summed(self._forces(self._loads()))
 
     @cached_property
     def force_terms(self) -> Terms:
         """The terms of `load_terms` without gravity."""
-        return self._force_terms(lambda load: load.arrows)
+        return _summed(self._forces(pair for pair in self._loads() if pair[1].arrows))
 
-    def _force_terms(self, counts: Callable[[Load], bool]) -> Terms:
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for place, load in self._loads():
-            forces = load.forces(self.structure, place) if counts(load) else None
+    def _forces(self, loads: Iterable[tuple[str, Load]]) -> Parts:
+        for place, load in loads:
+            forces = load.forces(self.structure, place)
             if forces is not None:
-                _add(terms, as_history(load.history), forces)
-        return _frozen(terms)
+                yield forces, load.history
 
     @cached_property
     def gravity_terms(self) -> Terms:
         """Accelerations of gravity (m/s2), shape (3,), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for load in self.loads:
-            if isinstance(load, Gravity):
-                _add(terms, as_history(load.history), np.array(load.acceleration))
-        return _frozen(terms)
+        gravity = (load for load in self.loads if isinstance(load, Gravity))
+        return _summed((np.array(load.acceleration), load.history) for load in gravity)
 
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:
@@ -316,6 +308,11 @@ class Case:
         pairs = [load.rest_changes(self.structure, place) for place, load in self._loads()]
         return _union([pair[0] for pair in pairs if pair is not None])
 
+    def _supports(self, *kinds: type) -> Iterator[tuple[str, Any]]:
+        """Supports of some kinds, with their places for messages."""
+        places = ((f"supports[{i}]", support) for i, support in enumerate(self.supports))
+        return ((place, support) for place, support in places if isinstance(support, kinds))
+
     def _loads(self) -> Iterator[tuple[str, Load]]:
         """Loads with their places for messages."""
         return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))
@@ -325,18 +322,16 @@ def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
 
 
-def _add(
-    terms: list[tuple[NDArray[np.float64], History]], history: History, vector: NDArray[np.float64]
-) -> None:
-    """Add a vector to the term with an equal history, or as a new term."""
-    for known, other in terms:
-        if other == history:
-            known += vector
-            return
-    terms.append((vector, history))
-
-
-def _frozen(terms: list[tuple[NDArray[np.float64], History]]) -> Terms:
+def _summed(parts: Parts) -> Terms:
+    """Vectors with their histories, those with equal histories added."""
+    terms: list[tuple[NDArray[np.float64], History]] = []
+    for vector, given in parts:
+        history = as_history(given)
+        same = next((total for total, other in terms if other == history), None)
+        if same is None:
+            terms.append((vector, history))
+        else:
+            same += vector
     return tuple((read_only(vector), history) for vector, history in terms)
 
 

@@ -123,10 +123,8 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
     if not isinstance(file, str) or not file:
         raise InputError(f".file = {show(file)}: must be the path of a CSV file")
     columns = {name: value for name, value in arguments.items() if name != "file"}
-    try:
+    with within(f".file = {show(file)}: "):
         return Table.from_csv(folder / file, **columns)
-    except InputError as error:
-        raise InputError(f".file = {show(file)}: {error}") from None
 
 
 def _checked(place: str, value: Any, hint: Any) -> Any:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.formats import fold
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
@@ -74,10 +74,8 @@ def read_pattern(path: str | os.PathLike[str]) -> Pattern:
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
     text = read_text(file, f"a {fmt.name} file", MOST, "leave out what is no pattern")
-    try:
+    with within("", file):
         return fmt.read(text)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
@@ -108,8 +106,9 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
     try:
         write_bytes(file, content)
     except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"{file}: cannot be written: {_reason(error)}; check that its directory exists and "
+            f"{file}: cannot be written: {reason}; check that its directory exists and "
             "may be written to."
         ) from None
 
@@ -124,12 +123,8 @@ def _as_path(path: Any) -> Path:
 def _format_of(file: Path) -> Format:
     if os.path.isdir(file):
         raise InputError(f"{file}: is a directory; name a pattern file in it.")
-    found = FORMATS.get(file.suffix.lower())
-    if found is None:
+    fmt = FORMATS.get(file.suffix.lower())
+    if fmt is None:
         has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
         raise InputError(f"{file}: {has}; known ones are {', '.join(sorted(FORMATS))}.")
-    return found
-
-
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+    return fmt

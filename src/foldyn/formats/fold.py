@@ -241,13 +241,9 @@ def _letters(frame: dict[str, Any], bare: Pattern) -> dict[Edge, str]:
 
 
 def _pair(e: int, edge: Any, n_vertices: int) -> Edge:
-    if (
-        not isinstance(edge, list)
-        or len(edge) != 2
-        or not all(isinstance(v, int) and not isinstance(v, bool) for v in edge)
-        or not all(0 <= v < n_vertices for v in edge)
-        or edge[0] == edge[1]
-    ):
+    known = range(n_vertices)
+    pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
+    if not pair or not all(type(v) is int and v in known for v in edge):
         raise InputError(
             f"edges_vertices[{e}] = {_short(edge)}: give two different vertex numbers from 0 to "
             f"{n_vertices - 1}."

@@ -45,7 +45,7 @@ class FaceGeometry(NamedTuple):
     face_planarity: NDArray[np.float64]
 
 
-def face_geometry(vertices: NDArray[np.float64], faces: Faces) -> FaceGeometry:
+def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
     """Areas, normals and planarity of faces.
 
     Parameters
@@ -112,18 +112,14 @@ def face_geometry(vertices: NDArray[np.float64], faces: Faces) -> FaceGeometry:
     return FaceGeometry(areas, normals, planarity / diameter)
 
 
-def _crosses_itself(
-    corners: NDArray[np.float64], normals: NDArray[np.float64], diameter: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> NDArray:
     """Whether two edges of a face, seen along its normal, cross (touching does not count)."""
     size = corners.shape[1]
     after = np.roll(corners, -1, axis=1)
     least = _DEGENERATE * diameter[:, None] ** 2
     result = np.zeros(len(corners), dtype=bool)
 
-    def side(
-        a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-    ) -> NDArray[np.int8]:
+    def side(a: NDArray, b: NDArray, c: NDArray) -> NDArray:
         turn = np.einsum("fvc,fc->fv", np.cross(b - a, c - a), normals)
         return np.where(np.abs(turn) > least, np.sign(turn), 0).astype(np.int8)
 
@@ -136,11 +132,8 @@ def _crosses_itself(
 
 
 def crease_dihedrals(
-    vertices: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    creases: NDArray[np.int64],
-    crease_faces: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray
+) -> tuple[NDArray, NDArray]:
     """Dihedral of each crease, by `atan2` of the two normals about the crease.
 
     Parameters
@@ -174,10 +167,7 @@ def crease_dihedrals(
 
 
 def seams(
-    vertices: NDArray[np.float64],
-    faces: Faces,
-    normals: NDArray[np.float64],
-    boundary: NDArray[np.int64],
+    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray
 ) -> list[tuple[Edge, Edge]]:
     """Pairs of boundary edges whose ends lie in the same places and whose panels do not.
 
@@ -208,7 +198,7 @@ def seams(
     return pairs
 
 
-def _places(vertices: NDArray[np.float64], boundary: NDArray[np.int64]) -> NDArray[np.int64]:
+def _places(vertices: NDArray, boundary: NDArray) -> NDArray:
     """Number of the place of each vertex (n,), the same for those of the boundary that coincide."""
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
@@ -221,12 +211,8 @@ def _places(vertices: NDArray[np.float64], boundary: NDArray[np.int64]) -> NDArr
 
 
 def _inward(
-    vertices: NDArray[np.float64],
-    faces: Faces,
-    normals: NDArray[np.float64],
-    boundary: NDArray[np.int64],
-    chosen: NDArray[np.int64],
-) -> dict[int, NDArray[np.float64]]:
+    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, chosen: NDArray
+) -> dict[int, NDArray]:
     """Unit vectors from the chosen boundary edges into their panels, across the edge."""
     row = edge_lookup(boundary[chosen])
     unit = {}

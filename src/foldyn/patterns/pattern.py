@@ -155,17 +155,13 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
             f"vertices has shape {points.shape}: give at least 3 rows of 3 coordinates each "
             "(or 2, for z = 0)."
         )
-    if not np.isfinite(points).all():
-        v = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError(
-            f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
-        )
-    far = np.abs(points.astype(np.float64)).max(axis=1)
-    if far.max() > LONGEST:
-        v = int(far.argmax())
-        raise InputError(
-            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {LONGEST:g} m."
-        )
+    for usable, what in (
+        (np.isfinite(points), "finite numbers"),
+        (np.abs(points.astype(np.float64)) <= LONGEST, f"at most {LONGEST:g} m"),
+    ):
+        if not usable.all():
+            v = int(np.flatnonzero(~usable.all(axis=1))[0])
+            raise InputError(f"vertices[{v}] = {points[v].tolist()}: coordinates must be {what}.")
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points
     size = float(np.ptp(result, axis=0).max())
@@ -258,9 +254,7 @@ def _checked_letter(letter: Any, pair: Edge) -> str:
     raise InputError(f"assignments: edge {pair} is {letter!r}; {remedy}.")
 
 
-def _warn_of_contradictions(
-    given: NDArray[np.str_], creases: NDArray[np.int64], dihedrals: NDArray[np.float64]
-) -> None:
+def _warn_of_contradictions(given: NDArray, creases: NDArray, dihedrals: NDArray) -> None:
     wrong = np.flatnonzero(
         ((given == "M") & (dihedrals < np.pi - _CONTRADICTION))
         | ((given == "V") & (dihedrals > np.pi + _CONTRADICTION))

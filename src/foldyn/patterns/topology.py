@@ -170,12 +170,7 @@ def build_topology(faces: Faces, n_vertices: int) -> Topology:
     return Topology(wound, flipped, edges, creases, edges[count == 1], crease_faces)
 
 
-def _reversals(
-    n_faces: int,
-    pairs: NDArray[np.int64],
-    clash: NDArray[np.bool_],
-    creases: NDArray[np.int64],
-) -> NDArray[np.bool_]:
+def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -> NDArray:
     """Which faces to reverse so that no two run along a crease in the same direction."""
     reverse = np.zeros(n_faces, dtype=bool)
     if not clash.any():
@@ -208,7 +203,7 @@ def _reversals(
     return reverse
 
 
-def edge_lookup(edges: NDArray[np.int64]) -> dict[Edge, int]:
+def edge_lookup(edges: NDArray) -> dict[Edge, int]:
     """Row number of each (low, high) vertex pair."""
     return {(a, b): k for k, (a, b) in enumerate(edges.tolist())}
 

@@ -222,8 +222,7 @@ class Shell(Discretized):
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m, with rotations in balance."""
-        u, x = self._state(u, None)
-        return self.forces(u, x)[0]
+        return self.forces(u, self.balanced(u))[0]
 
     def tangent(
         self, u: ArrayLike, rotation: ArrayLike | None = None, floor: float = -np.inf

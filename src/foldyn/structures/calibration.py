@@ -109,6 +109,11 @@ def bar_areas(
         ends = [edge_of(a, b) for a, b in around(face)]
         length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
         if len(face) == 4 and mesh.centers[panel] >= 0:
+            if nu <= 0.0:
+                raise InputError(
+                    f"sheet: poissons_ratio = {nu}: N5B8 quadrilaterals need it above 0 (the area "
+                    'of their spokes is proportional to it); use scheme = "n4b5"'
+                )
             w, h = 0.5 * (length[0] + length[2]), 0.5 * (length[1] + length[3])
             scale = t / (2.0 * (1.0 - nu**2))
             along = scale * abs(h**2 - nu * w**2) / h
@@ -168,13 +173,3 @@ def check_scale(sheet: Sheet, pattern: Pattern) -> None:
                 f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
                 f"pattern, whose edges have {low:.3g} to {high:.3g} m"
             )
-
-
-def check_poisson(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> None:
-    """Refuse a Poisson's ratio that leaves N5B8 spokes without area."""
-    quads = [p for p, f in enumerate(pattern.faces) if len(f) == 4 and mesh.centers[p] >= 0]
-    if quads and sheet.poissons_ratio <= 0.0:
-        raise InputError(
-            f"sheet: poissons_ratio = {sheet.poissons_ratio}: N5B8 quadrilaterals need it above 0 "
-            '(the area of their spokes is proportional to it); use scheme = "n4b5"'
-        )

@@ -91,8 +91,6 @@ def discretize(
     calibrate.check_scale(sheet, pattern)
     points = _given_centers(centers or {}, pattern, scheme)
     mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
-    calibrate.check_poisson(mesh, pattern, sheet)
-
     merlin2 = calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
     outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)

@@ -121,14 +121,12 @@ class Structure(Discretized):
     @cached_property
     def model(self) -> mechanics.BarsHinges:
         """The arrays that the compiled kernels work on."""
-        folds = (self.folds, self.fold_stiffness, self.fold_rest, self.fold_law)
-        bends = (self.bends, self.bend_stiffness, self.bend_rest, self.bend_law)
         return mechanics.build(
             self.nodes,
             self.bars,
             self.sheet.youngs_modulus * self.bar_area / self.bar_length,
             self.bar_law,
-            (mechanics.Hinges(*folds), mechanics.Hinges(*bends)),
+            tuple(mechanics.Hinges(h.nodes, h.stiffness, h.rest, h.law) for h in self.hinge_kinds),
         )
 
     @cached_property
