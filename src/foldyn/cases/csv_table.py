@@ -45,7 +45,7 @@ _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
 @dataclass(frozen=True)
 class _Column:
-    """One column: its place in a line, its heading as it stands, and the parts of that."""
+    """One column: its place in a line, its heading as written, and the parts of the heading."""
 
     place: int
     heading: str
@@ -168,7 +168,7 @@ def _lines(text: str) -> tuple[list[_Column], list[tuple[int, list[str]]]]:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise InputError(f"holds no lines but empty ones and comments; {_HEADER}")
+        raise InputError(f"holds only empty lines and comments; {_HEADER}")
     number, first = lines[0]
     delimiter = next((mark for mark in _DELIMITERS if mark in first), ",")
     columns = _headings(number, _cells(number, first, delimiter))
@@ -202,9 +202,9 @@ def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
         )
     columns = []
     for place, cell in enumerate(cells):
-        found = re.search(r"\[([^][]*)\]$", cell)
-        name = cell[: found.start()].strip() if found else cell
-        unit = found.group(1).strip() if found else ""
+        brackets = re.search(r"\[([^][]*)\]$", cell)
+        name = cell[: brackets.start()].strip() if brackets else cell
+        unit = brackets.group(1).strip() if brackets else ""
         columns.append(_Column(place, cell, name, _SPELLINGS.get(unit, unit) or None))
     return columns
 
@@ -235,8 +235,8 @@ def _time_ratio(column: _Column) -> Fraction:
         )
     if column.unit not in TIME_UNITS:
         raise InputError(
-            f'column "{column.shown}": [{shortened(column.unit)}] is no unit of time; use one of '
-            f"{listed}"
+            f'column "{column.shown}": [{shortened(column.unit)}] is not a unit of time; use one '
+            f"of {listed}"
         )
     return TIME_UNITS[column.unit]
 

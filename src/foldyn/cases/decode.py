@@ -154,7 +154,7 @@ class Part:
     Attributes
     ----------
     keys : mapping of str to str
-        Keys of its table in a case file, and the arguments that they are.
+        Keys of its table in a case file, and the arguments that they set.
     missing : mapping of str to str
         Remedies in messages where a key is missing that must not be: those of arguments without a
         default, and those given here; "history" may be among them.
@@ -165,7 +165,7 @@ class Part:
 
     @classmethod
     def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:
-        """Make it of its table; the fields of errors are inside the table.
+        """Make it from its table; errors name fields inside the table.
 
         Parameters
         ----------
@@ -189,12 +189,12 @@ class Part:
             raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
 
     def table(self) -> dict[str, Any]:
-        """Its table, of plain values, but for the history."""
+        """Its table of plain values, without the history."""
         return {key: plain(getattr(self, argument)) for key, argument in self.keys.items()}
 
 
 def given_keys(table: Any, kinds: Iterable[type[Part]]) -> set[str]:
-    """Keys of a table that may be one of some kinds of parts."""
+    """Keys of a table, each of which must belong to one of some kinds of parts."""
     if not isinstance(table, Mapping):
         raise InputError(f" = {show(table)}: must be a table")
     check_keys(table, dict.fromkeys([*(key for kind in kinds for key in kind.keys), "history"]))

@@ -86,7 +86,7 @@ def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) ->
         return _read(_resolve(sections, arrays))
     except InputError:
         raise
-    except Exception as error:  # whatever a number or a table in the wrong place leads to
+    except Exception as error:  # whatever a wrong number or table leads to
         raise InputError(f"the stored case is damaged ({type(error).__name__}: {error})") from error
 
 
@@ -217,7 +217,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     supports = [support_from(item) for item in sections["supports"]]
     loads = [load_from(item) for item in sections["loads"]]
     structure = _structure(sections)
-    with warnings.catch_warnings():  # they were given when the case was first made
+    with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
 
@@ -251,7 +251,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
             )
         centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
         if centers and not np.array_equal(nodes, structure.nodes):
-            # panel centers given by hand, or found to other last digits on another machine
+            # panel centers given by hand, or computed to other last digits on another machine
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
 

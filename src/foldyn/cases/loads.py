@@ -21,7 +21,7 @@ __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
 
 
 class Load(Part):
-    """A load: what it does at factor 1 of its history, a frozen dataclass.
+    """A load: a frozen dataclass that says what it does at factor 1 of its history.
 
     A new kind is a subclass that is listed in `LOADS`; `place`, its place among the loads, is for
     messages.
@@ -42,17 +42,17 @@ class Load(Part):
     history: Any
 
     def forces(self, structure: Any, place: str) -> NDArray[np.float64] | None:
-        """Forces (n, 3), N, on all nodes; None where it is none."""
+        """Forces (n, 3), N, on all nodes; None if it is not a force."""
         return None
 
     def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
-        """Nodes on which it acts, of a load that acts on some."""
+        """Nodes on which it acts; none if it acts on all, or on creases."""
         return np.zeros(0, np.int64)
 
     def rest_changes(
         self, structure: Any, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-        """Creases that it actuates, and the change (rad) of their rest angles; None for none."""
+        """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
         return None
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
@@ -118,7 +118,7 @@ class Force(Load):
             )
         warnings.warn(
             f"{place}: the force {show(self.vector)} acts in part where supports hold its nodes: "
-            f"{what}; that part goes into the reactions only",
+            f"{what}; that part only adds to the reactions",
             FoldynWarning,
             stacklevel=4,
         )
@@ -130,7 +130,7 @@ class Gravity(Load):
 
     Each node gets the sum of its row of the mass matrix times the acceleration, so that the
     weight is exact with every mass rule and a free structure falls with the acceleration itself.
-    What supports hold goes into the reactions.
+    The part that supports hold adds to the reactions.
 
     Parameters
     ----------

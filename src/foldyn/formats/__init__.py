@@ -1,4 +1,4 @@
-"""Pattern files: one module a format, found by extension through a registry."""
+"""Pattern files: one module for each format, chosen by extension from a registry."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ FORMATS: dict[str, Format] = {end: fmt for fmt in _FORMATS for end in fmt.extens
 
 
 def read_pattern(path: str | os.PathLike[str]) -> Pattern:
-    """Read a pattern from a file, whose extension tells the format.
+    """Read a pattern from a file; its extension determines the format.
 
     Parameters
     ----------
@@ -69,17 +69,16 @@ def read_pattern(path: str | os.PathLike[str]) -> Pattern:
         No such file, an unknown extension, or content that is not a sound pattern; the message
         names the file and the field.
     """
-    file = _as_path(path)
-    fmt = _format_of(file)
+    file, fmt = _file_and_format(path)
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
-    text = read_text(file, f"a {fmt.name} file", MOST, "leave out what is no pattern")
+    text = read_text(file, f"a {fmt.name} file", MOST, "leave out all but the pattern")
     with within("", file):
         return fmt.read(text)
 
 
 def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
-    """Write a pattern to a file, whose extension tells the format.
+    """Write a pattern to a file; its extension determines the format.
 
     The whole text is made first and the file put in place in one step, so that a failure
     leaves what was there before.
@@ -96,8 +95,7 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
     InputError
         An unknown extension (nothing is touched then), or the file cannot be written.
     """
-    file = _as_path(path)
-    fmt = _format_of(file)
+    file, fmt = _file_and_format(path)
     if fmt.write is None:
         raise InputError(f"{file}: {fmt.name} files can be read but not written.")
     if not isinstance(pattern, Pattern):
@@ -113,18 +111,15 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
         ) from None
 
 
-def _as_path(path: Any) -> Path:
+def _file_and_format(path: Any) -> tuple[Path, Format]:
     try:
-        return Path(path)
+        file = Path(path)
     except TypeError:
         raise InputError(f"path = {path!r}: give the path of a file.") from None
-
-
-def _format_of(file: Path) -> Format:
     if os.path.isdir(file):
         raise InputError(f"{file}: is a directory; name a pattern file in it.")
     fmt = FORMATS.get(file.suffix.lower())
     if fmt is None:
         has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
         raise InputError(f"{file}: {has}; known ones are {', '.join(sorted(FORMATS))}.")
-    return fmt
+    return file, fmt

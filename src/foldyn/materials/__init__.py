@@ -48,7 +48,7 @@ def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
     return _law(spec, HINGE_LAWS, HingeLaw, field)
 
 
-def _law(spec: Any, laws: Mapping[str, type], base: type, field: str) -> Any:
+def _law(spec: Any, laws: Mapping[str, Any], base: type[BarLaw | HingeLaw], field: str) -> Any:
     if isinstance(spec, str) and spec in laws:
         spec = laws[spec]()
     if not isinstance(spec, base):

@@ -1,4 +1,4 @@
-"""Shells as solvers take them."""
+"""Shells as solvers see them."""
 
 from __future__ import annotations
 
@@ -216,4 +216,4 @@ def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> 
         x = x + step
         if model.per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
             return x
-    raise ComputationError("the rotations of the shell find no balance at this displacement")
+    raise ComputationError("the rotations of the shell do not balance at this displacement")

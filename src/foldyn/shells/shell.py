@@ -67,7 +67,7 @@ class Shell(Discretized):
     piece_rest : (c,)
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
-        What it was made of.
+        What it was made from.
     """
 
     nodes: NDArray
@@ -152,7 +152,7 @@ class Shell(Discretized):
 
     @cached_property
     def _reach(self) -> float:
-        """Length (m) by which a rotation becomes a displacement: that of a side."""
+        """Length (m) that turns a rotation into a displacement: that of a side."""
         return float(np.sqrt((self.bar_length**2).mean()))
 
     @cached_property
@@ -235,7 +235,7 @@ class Shell(Discretized):
         return matrix
 
     def balanced(self, u: ArrayLike) -> NDArray:
-        """Rotations (r,) about which there is no moment at displacement u (n, 3)."""
+        """Rotations (r,) at which there are no moments at displacement u (n, 3)."""
         u, _ = self._state(u, np.zeros(self.rotations))
         return self.body.dofs(u)[u.size :] / self._reach
 
@@ -332,5 +332,5 @@ def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ..
         why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
         raise InputError(why, "clamped") from None
     if inner := [pair for pair in pairs if pair not in boundary]:
-        raise InputError(f": {inner[0]} is no boundary edge of the pattern", "clamped")
+        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", "clamped")
     return tuple((pair[0], pair[1]) for pair in pairs)

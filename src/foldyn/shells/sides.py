@@ -123,11 +123,6 @@ def _mirrored(corners: NDArray) -> NDArray:
     return 2.0 * foot - c
 
 
-def plane_stress(nu: float) -> NDArray:
-    """Matrix (3, 3) on (xx, yy, gamma xy), without E t / (1 - nu^2)."""
-    return np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
-
-
 def side_stiffness(corners: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
 
@@ -146,8 +141,10 @@ def side_stiffness(corners: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
     along = np.stack([tx * tx, ty * ty, tx * ty], axis=2)  # e = along eps
     across = np.stack([ty * ty, tx * tx, -2.0 * tx * ty], axis=1)  # kappa = across beta
     across = across * (length / area[:, None])[:, None, :]
-    elastic = plane_stress(sheet.poissons_ratio)
-    stretch = sheet.youngs_modulus * sheet.thickness / (1.0 - sheet.poissons_ratio**2)
+    nu = sheet.poissons_ratio
+    # plane stress on (xx, yy, gamma xy), without E t / (1 - nu^2)
+    elastic = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
+    stretch = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
     strain = np.linalg.inv(along)
     membrane = np.einsum("tak,ab,tbl,t->tkl", strain, elastic, strain, area * stretch)
     bending = np.einsum("tak,ab,tbl,t->tkl", across, elastic, across, area * sheet.bending_modulus)

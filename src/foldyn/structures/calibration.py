@@ -10,8 +10,8 @@ bars of an N5B8 quad         t |H^2 - nu W^2| / (2 H (1 - nu^2)) for edges 1 and
 bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars alike.
 
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
-assigns two of these in another order than their formulas say; `calibration="merlin2"` reproduces
-that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results contain it.
+assigns two of these in a different order than their formulas say; `calibration="merlin2"`
+reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results contain it.
 """
 
 from __future__ import annotations

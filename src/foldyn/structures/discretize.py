@@ -168,7 +168,7 @@ def fold_rest(
     pattern: Pattern,
     crease: NDArray | None = None,
 ) -> NDArray:
-    """Rest dihedrals (rad) of hinge rows, strictly between closed on either side.
+    """Rest dihedrals (rad) of hinge rows, none of them closed.
 
     crease : crease that each row lies on; the creases in order unless given.
     """
@@ -185,7 +185,9 @@ def fold_rest(
             )
         return rest
     degrees = _per_crease("crease_rest", given, pattern)
-    if ((degrees <= 0.0) | (degrees >= 360.0)).any():
-        bad = degrees[(degrees <= 0.0) | (degrees >= 360.0)][0]
-        raise InputError(f"crease_rest = {bad:g}: must lie between 0 and 360 degrees (flat: 180)")
+    closed = degrees[(degrees <= 0.0) | (degrees >= 360.0)]
+    if closed.size:
+        raise InputError(
+            f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
+        )
     return np.radians(degrees)[crease]

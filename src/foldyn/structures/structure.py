@@ -77,7 +77,7 @@ class Structure(Discretized):
     centers : (np,)
         Node number of each panel's center, -1 without one.
     pattern, sheet, options
-        What it was made of.
+        What it was made from.
     """
 
     nodes: NDArray
