@@ -11,7 +11,7 @@ bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars a
 
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
 assigns two of these in a different order than their formulas say; `calibration="merlin2"`
-reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results contain it.
+reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`): published results contain it.
 """
 
 from __future__ import annotations
