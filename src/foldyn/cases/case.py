@@ -19,7 +19,7 @@ from foldyn.structures.discretized import read_only
 from foldyn.values import choice, number, numbers, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
-Parts = Iterable[tuple[NDArray[np.float64], Any]]
+Summands = Iterable[tuple[NDArray[np.float64], Any]]
 
 
 STATES = ("rest", "start")
@@ -227,7 +227,7 @@ class Case:
         """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
         return _summed(self._imposed())
 
-    def _imposed(self) -> Parts:
+    def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
             vector = np.zeros((len(self.structure.nodes), 3))
             vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
@@ -238,7 +238,7 @@ class Case:
         """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
         return _summed(self._moved_by_the_base())
 
-    def _moved_by_the_base(self) -> Parts:
+    def _moved_by_the_base(self) -> Summands:
         base = self.fixed & ~self.imposed
         for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
@@ -257,7 +257,7 @@ class Case:
         """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
         return _summed(self._actuated())
 
-    def _actuated(self) -> Parts:
+    def _actuated(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease
         for place, load in self._loads():
             actuated = load.rest_changes(self.structure, place)
@@ -285,7 +285,7 @@ class Case:
         """The terms of `load_terms` without gravity."""
         return _summed(self._forces(pair for pair in self._loads() if pair[1].arrows))
 
-    def _forces(self, loads: Iterable[tuple[str, Load]]) -> Parts:
+    def _forces(self, loads: Iterable[tuple[str, Load]]) -> Summands:
         for place, load in loads:
             forces = load.forces(self.structure, place)
             if forces is not None:
@@ -322,7 +322,7 @@ def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
 
 
-def _summed(parts: Parts) -> Terms:
+def _summed(parts: Summands) -> Terms:
     """Vectors with their histories, those with equal histories added."""
     terms: list[tuple[NDArray[np.float64], History]] = []
     for vector, given in parts:

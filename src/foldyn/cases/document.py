@@ -168,12 +168,8 @@ class _Writer:
                 f'{name} is "{law.name}", a user\'s own law, of which only the name is stored'
             )
             return {"kind": "user", "name": str(law.name)}
-        arguments = {
-            f.name: getattr(law, f.name)
-            for f in dataclasses.fields(law)
-            if f.init and f.name != "name"
-        }
-        return {"kind": kind, **{key: plain(value) for key, value in arguments.items()}}
+        names = [f.name for f in dataclasses.fields(law) if f.init and f.name != "name"]
+        return {"kind": kind, **{name: plain(getattr(law, name)) for name in names}}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()

@@ -334,17 +334,14 @@ class Table(Formula):
 
     def __eq__(self, other: object) -> bool:
         """Tell whether the other is a table of the same numbers."""
-        if not isinstance(other, Table):
-            return NotImplemented
-        return (
-            self.smooth == other.smooth
-            and np.array_equal(self.times, other.times)
-            and np.array_equal(self.values, other.values)
-        )
+        return self._key() == other._key() if isinstance(other, Table) else NotImplemented
 
     def __hash__(self) -> int:
         """Hash of the numbers."""
-        return hash((self.times.tobytes(), self.values.tobytes(), self.smooth))
+        return hash(self._key())
+
+    def _key(self) -> tuple[bytes, bytes, bool]:
+        return self.times.tobytes(), self.values.tobytes(), self.smooth
 
 
 HISTORIES: Mapping[str, type[History]] = {

@@ -14,7 +14,7 @@ the pattern (at rest), never panel centers. They are read by a small parser, nev
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,14 @@ SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
 """Words for creases, and the assignments that each means."""
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
+_COMPARISONS: Mapping[type[ast.cmpop], Callable[[NDArray, float], NDArray]] = {
+    ast.Lt: lambda difference, tolerance: difference < -tolerance,
+    ast.LtE: lambda difference, tolerance: difference <= tolerance,
+    ast.Gt: lambda difference, tolerance: difference > tolerance,
+    ast.GtE: lambda difference, tolerance: difference >= -tolerance,
+    ast.Eq: lambda difference, tolerance: np.abs(difference) <= tolerance,
+    ast.NotEq: lambda difference, tolerance: np.abs(difference) > tolerance,
+}
 _MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 
 
@@ -234,19 +242,10 @@ class _Selector:
         if not isinstance(left, ast.Name) or left.id not in _AXES:
             raise self._error("compare x, y or z with a number")
         difference = self.points[:, _AXES[left.id]] - self._number(right)
-        if isinstance(operator, ast.Lt):
-            return difference < -self.tolerance
-        if isinstance(operator, ast.LtE):
-            return difference <= self.tolerance
-        if isinstance(operator, ast.Gt):
-            return difference > self.tolerance
-        if isinstance(operator, ast.GtE):
-            return difference >= -self.tolerance
-        if isinstance(operator, ast.Eq):
-            return np.abs(difference) <= self.tolerance
-        if isinstance(operator, ast.NotEq):
-            return np.abs(difference) > self.tolerance
-        raise self._error("compare with <, <=, >, >=, == or !=")
+        compare = _COMPARISONS.get(type(operator))
+        if compare is None:
+            raise self._error("compare with <, <=, >, >=, == or !=")
+        return compare(difference, self.tolerance)
 
     def _number(self, node: ast.expr) -> float:
         sign = 1.0
