@@ -152,8 +152,14 @@ def test_a_bad_file_gets_one_message(table, tmp_path, name) -> None:
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ({"time": "zeit"}, 'time = "zeit": is no column; there are "time [s]", "force [N]", "no"'),
-        ({"value": "forse"}, "value = \"forse\": is no column; did you mean 'force'? there"),
+        (
+            {"time": "zeit"},
+            'time = "zeit": no such column; there are "time [s]", "force [N]", "no"',
+        ),
+        (
+            {"value": "forse"},
+            "value = \"forse\": no such column; did you mean 'force'? the",
+        ),
         ({"value": "time"}, 'time and value: are both the column "time [s]"'),
         ({"time": "force [N]"}, 'time and value: are both the column "force [N]"'),
         ({"value": "no", "unit": "N"}, 'column "no": has no unit, unit = "N" asks for a force'),

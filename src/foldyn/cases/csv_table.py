@@ -219,7 +219,7 @@ def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: i
     if fits:
         raise InputError(f'{field} = "{asked}": names {len(fits)} of the columns {listed}')
     hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
-    raise InputError(f'{field} = "{asked}": is no column; {hint}there are {listed}')
+    raise InputError(f'{field} = "{asked}": no such column; {hint}there are {listed}')
 
 
 def _quantity(unit: str) -> str | None:

@@ -88,9 +88,9 @@ class Function(History):
     function : callable
         Takes a time (s), a float, and gives a factor.
     at : sequence of float, optional
-        Times (s) at which it jumps or turns a corner, none of them if empty: integrators that
-        choose their steps end one there. Without it they can only look at the function here and
-        there within a step, and warn that a short pulse may be missed.
+        Times (s) at which it jumps or turns a corner; empty if it never does. Integrators that
+        choose their steps end one at each. Without it they can only sample the function within a
+        step, and warn that a short pulse may be missed.
 
     Notes
     -----

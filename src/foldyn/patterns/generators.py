@@ -22,7 +22,7 @@ PER_VERTEX = 2200.0
 def simple_fold(a: float = 1.0, b: float = 1.0, dihedral: float = 60.0) -> Pattern:
     r"""Two rectangles that meet in one crease: an inverted V on the ground, a mountain.
 
-    Vertices 0, 1 stand at x = 0, vertices 2, 3 on the ridge (x = w, z = h), vertices 4, 5 at
+    Vertices 0, 1 are at x = 0, vertices 2, 3 on the ridge (x = w, z = h), vertices 4, 5 at
     x = 2 w, the odd ones at y = b, with w = a sin(dihedral/2) and h = a cos(dihedral/2)::
 
                2,3
@@ -176,8 +176,8 @@ def kresling(
     two triangles: (bottom m, bottom m+1, top m+1) and (bottom m, top m+1, top m). The front is
     the outside.
 
-    A positive `twist` turns the upper ring counter-clockwise seen from above, that is to the
-    right for someone who looks at the tower from outside::
+    A positive `twist` turns the upper ring counter-clockwise seen from above, that is, to the
+    right for someone looking at the tower from outside::
 
            twist < 0              twist = 0              twist > 0
 

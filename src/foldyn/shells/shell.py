@@ -40,7 +40,7 @@ PER_DOUBLING, LEAST = 5900.0, 1450
 
 @dataclass(frozen=True)
 class ShellOptions:
-    """Arguments of `shell` beside pattern and sheet; see there."""
+    """Arguments of `shell` besides pattern and sheet; see there."""
 
     divisions: int = 16
     mass: str = "lumped"
@@ -115,7 +115,7 @@ class Shell(Discretized):
 
     @property
     def rotations(self) -> int:
-        """Number of rotations beside the displacements."""
+        """Number of rotations, which are dofs besides the displacements."""
         return self.sides.rotations
 
     @cached_property

@@ -22,8 +22,8 @@ from foldyn.shells.kernels import ShellModel, fold, shell_work, side_rotations, 
 class ShellPattern(NamedTuple):
     """Pattern of the tangent, and where the elements' blocks go; -1 where there is no place.
 
-    Entry (a, b) of block (i, j) stands a * (indptr[d + 1] - indptr[d]) + b behind the block's
-    first entry, d the first dof of place i.
+    Entry (a, b) of block (i, j) comes a * (indptr[d + 1] - indptr[d]) + b entries after the
+    block's first one, d the first dof of place i.
     """
 
     size: int  # of the matrix
