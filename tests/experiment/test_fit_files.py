@@ -123,7 +123,7 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ('kind = "shapes"', 'kind = "shape"', "data[1].kind = \"shape\": did you mean 'shapes'?"),
         ('file = "forces.csv"', 'file = "f.csv"', "f.csv: there is no such file"),
         ("nodes = [0, 2]\n", "", "data[2]: nodes: missing"),
-        ("nodes = [0, 2]", "nodes = [0, 1]", '"node 1 x": is no column; did you mean'),
+        ("nodes = [0, 2]", "nodes = [0, 1]", '"node 1 x": no such column; did you mean'),
         ("nodes = [0, 2]", 'nodes = "xmin"', "give the numbers of the nodes in sway.csv"),
         ("band = [1, 6]", "band = [6, 1]", "data[3]: band = [6, 1]: give two frequencies"),
         ("band = [1, 6]\n", "", "data[3]: band = None: give two frequencies"),
@@ -153,7 +153,7 @@ def test_fit_files_with_mistakes(folder, old, new, message) -> None:
         ("-200,-17", "-200,x", 'line 3, column "force [mN]": "x" is not a number'),
         ("force [mN]", "force", 'column "force": has no unit'),
         ("force [mN]", "force [mm]", 'column "force [mm]": is a length, unit = "N" asks'),
-        ("force [mN]", "load [mN]", 'force = "force": is no column'),
+        ("force [mN]", "load [mN]", 'force = "force": no such column'),
     ],
 )
 def test_tables_with_mistakes(folder, old, new, message) -> None:

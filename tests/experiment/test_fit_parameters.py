@@ -66,7 +66,7 @@ def test_ties_are_arithmetic_on_keys() -> None:
         ("__import__('os').getcwd()", "is no number or key"),
         ("2 ** 3", "2 ** 3 is no number or key"),
         ("1 / 0", "divides by zero"),
-        ("x" + ".a" * 480, "has more than 50 operations in one another"),
+        ("x" + ".a" * 480, "has more than 50 nested operations"),
         ("1" * 1001, "is longer than 1000 characters"),
         ("2 * 0x" + "f" * 900, "is not a finite number"),
         (360, "= 360: must be a text"),
