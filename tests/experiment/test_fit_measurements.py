@@ -8,7 +8,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
+from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 from foldyn.signals import spectrum
 
@@ -17,8 +17,8 @@ SWAY = np.sin(TIME)
 ALPHA = [Parameter("damping.alpha")]
 
 
-def history(**changes) -> History:
-    return History(**{"nodes": [0], "time": TIME, "values": SWAY, **changes})
+def history(**changes) -> TimeHistory:
+    return TimeHistory(**{"nodes": [0], "time": TIME, "values": SWAY, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def motion(swung):
         ({"values": np.where(TIME > 1, np.inf, SWAY)}, "infinite; give NaN where a node was lost"),
         ({"time": TIME[::-1]}, "must be at least two increasing times"),
         ({"time": np.where(TIME > 1, np.nan, TIME)}, "time[21] = nan: must be a finite number"),
-        ({"axis": "w"}, 'axis = "w": must be "x", "y" or "z"'),
+        ({"axis": "w"}, 'axis = "w": choose one of x, y, z'),
         ({"sigma": 0.0}, "sigma = 0.0: must be greater than 0"),
         ({"align": -0.01}, "align = -0.01: must be at least 0"),
         ({"detrend": "mean"}, 'detrend = "mean": choose'),

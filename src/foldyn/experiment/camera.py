@@ -1,14 +1,16 @@
-"""A perspective camera with radial lens distortion."""
+"""A perspective camera with radial lens distortion, and OpenCV, which reads what it recorded."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
+from foldyn.values import choice, number
 
 _TERMS = 6  # of the polynomial in r^2 that inverts the distortion
 _REACH = 1.08  # part of the half diagonal, up to which it is fitted
@@ -18,14 +20,25 @@ DIRECTIONS = {
     for k, axis in enumerate("xyz")
     for sign in ("", "+", "-")
 }
-"""Directions by the names that a person types: "x", "-x", "+z"."""
+"""Unit vectors by the names that a user types: "x", "-x", "+z"."""
 
 
-def direction(name: str, value: str) -> NDArray[np.float64]:
-    """Unit vector of "x", "-y", "+z"."""
-    if value not in DIRECTIONS:
-        raise InputError(f"{name}: {value!r} is no direction; use x, -x, y, -y, z or -z")
-    return DIRECTIONS[value]
+def opencv() -> Any:
+    """Return the module `cv2`, an optional dependency.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        import cv2  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            "camera tracking needs OpenCV, which is not installed: "
+            "pip install opencv-python-headless (or foldyn[experiment])"
+        ) from None
+    return cv2
 
 
 def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
@@ -48,7 +61,8 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
     InputError
         Not two directions at a right angle.
     """
-    top, toward = direction("up", up), direction("facing", facing)
+    top = DIRECTIONS[choice("up", up, DIRECTIONS)]
+    toward = DIRECTIONS[choice("facing", facing, DIRECTIONS)]
     if abs(top @ toward) > 0.5:
         raise InputError(f"up: {up!r} and facing: {facing!r} lie along the same axis; turn one")
     return np.array([np.cross(top, toward), -top, -toward])
@@ -83,8 +97,7 @@ class Camera:
     k2: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.focal) and self.focal > 0.0):
-            raise InputError(f"focal: {self.focal!r}; give a positive number of pixels")
+        number("focal", self.focal, above=0.0, unit="pixels")
         if min(self.size) < 8:
             raise InputError(f"size: {self.size} pixels; at least 8 x 8 are needed")
         r2 = self._outermost**2 * np.linspace(0.0, 1.0, 64) ** 2
@@ -112,10 +125,8 @@ class Camera:
         `metres_per_pixel` holds in the plane through the target; `turned` are angles (degrees)
         about the image's right, down and forward, by which the camera goes around the target.
         """
-        if not (np.isfinite(distance) and distance > 0.0):
-            raise InputError(f"distance: {distance!r}; give a positive number of m")
-        if not (np.isfinite(metres_per_pixel) and metres_per_pixel > 0.0):
-            raise InputError(f"metres_per_pixel: {metres_per_pixel!r}; give a positive number")
+        number("distance", distance, above=0.0, unit="m")
+        number("metres_per_pixel", metres_per_pixel, above=0.0)
         from scipy.spatial.transform import Rotation
 
         tilt = Rotation.from_rotvec(np.radians(np.asarray(turned, dtype=float))).as_matrix()

@@ -85,7 +85,7 @@ def fit(
     case : path
         A case file of kind "statics" or "dynamics".
     data : sequence of Measurement
-        `ForceDisplacement`, `Shapes`, `History`, `Spectrum`.
+        `ForceDisplacement`, `Shapes`, `TimeHistory`, `Spectrum`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
         Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.

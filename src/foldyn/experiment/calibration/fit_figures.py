@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.experiment.calibration.fitted import Fit
-from foldyn.experiment.calibration.measured_motions import History, Spectrum
-from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
 from foldyn.plots import style
 
 WIDTH = 9.0  # inches
@@ -97,15 +96,15 @@ def plot_shapes(one: Shapes, case: Case, model: NDArray[np.float64]) -> Figure:
     return style.finish(figure)
 
 
-def plot_histories(one: History, case: Case, model: NDArray[np.float64]) -> Figure:
+def plot_histories(one: TimeHistory, case: Case, model: NDArray[np.float64]) -> Figure:
     """Draw measured histories, those of the model and what is between them, without trend.
 
     Parameters
     ----------
-    one : History
+    one : TimeHistory
     case : Case
     model : ndarray, shape (t, m)
-        As `History.curves` gives it.
+        As `TimeHistory.curves` gives it.
     """
     measured, model = one.values - one.trend(one.values), model - one.trend(model)
     labels = "time (s)", f"{one.axis} displacement (mm)"
@@ -137,7 +136,7 @@ def plot_correlation(fit: Fit) -> Figure:
 
 
 def _beside(
-    one: History | Spectrum,
+    one: TimeHistory | Spectrum,
     nodes: NDArray[np.int64],
     along: NDArray[np.float64],
     measured: NDArray[np.float64],

@@ -14,8 +14,7 @@ from foldyn.cases import Case
 from foldyn.experiment.calibration import fit_figures
 from foldyn.experiment.calibration.fit_problem import Run
 from foldyn.experiment.calibration.fitted import Fit
-from foldyn.experiment.calibration.measured_motions import History, Spectrum
-from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.plots import style
 from foldyn.report.page import write_report
@@ -122,7 +121,7 @@ def _searches(fit: Fit) -> Table:
 
 def _caption(one: Measurement) -> str:
     told = f"{one.name}: {one.label} and model."
-    if isinstance(one, History | Spectrum) and one.values.shape[1] > fit_figures.MOST:
+    if isinstance(one, TimeHistory | Spectrum) and one.values.shape[1] > fit_figures.MOST:
         told += f" The first {fit_figures.MOST} of {one.values.shape[1]} nodes."
     return f"{told} Held out: the fit did not use it." if one.held_out else told
 
@@ -139,7 +138,7 @@ def _draw(fit: Fit, number: int, one: Measurement, folder: Path, note: str) -> P
         if len(one.axes) < 2:
             return None
         figure = fit_figures.plot_shapes(one, case, one.shapes(result(), case))
-    elif isinstance(one, History):
+    elif isinstance(one, TimeHistory):
         figure = fit_figures.plot_histories(one, case, one.curves(result(), case))
     elif isinstance(one, Spectrum):
         figure = fit_figures.plot_spectra(one, case, one.spectra(result(), case))

@@ -17,9 +17,8 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment.calibration.key_paths import replaced, value_at
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.parameters import Parameter, Space, replaced, space, value_at
 from foldyn.program import program
 from foldyn.values import show
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import foldyn
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
-from foldyn.experiment.calibration.key_paths import replaced
+from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import netcdf
 from foldyn.writing import write_text
 

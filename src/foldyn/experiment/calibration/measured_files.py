@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
-from foldyn.errors import InputError
-from foldyn.experiment.calibration.measured_motions import History, Spectrum
-from foldyn.experiment.calibration.measured_paths import IMPOSED, ForceDisplacement, Shapes
-from foldyn.experiment.calibration.measurement import Measurement, axis_number
-from foldyn.experiment.tracking.store import load_tracks
-from foldyn.values import numbers, show
+from foldyn.errors import InputError, within
+from foldyn.experiment.calibration.measured import (
+    IMPOSED,
+    ForceDisplacement,
+    Shapes,
+    Spectrum,
+    TimeHistory,
+)
+from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.tracking.tracks_dataset import load_tracks
+from foldyn.values import choice, numbers, show
 
 
 def force_displacement(
@@ -32,7 +37,7 @@ def force_displacement(
     ----------
     file : Path
     columns : mapping, optional
-        Headings, where they are not "displacement" and "force".
+        Headings, if they are not "displacement" and "force".
     **known
         Other arguments of `ForceDisplacement`.
     """
@@ -62,7 +67,7 @@ def shapes(
         CSV with the columns load_factor, node, and x, y, z as far as they were measured, empty
         where a node was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
     nodes : sequence of int, optional
-        Those to take; all in the file by default.
+        Nodes to take; all in the file by default.
     load_factor : sequence of float, optional
         Of the photographs in tracks.
     **known
@@ -87,17 +92,14 @@ def shapes(
     missing = sorted(set(chosen) - set(listed.tolist()))
     if missing:
         raise InputError(f"{file}: has no line for node {missing[0]}")
+    lines, times = np.unique([listed, table["load_factor"]], axis=1, return_counts=True)
+    for node, factor in lines.T[times > 1]:
+        raise InputError(f"{file}: has two lines for node {node:g} at the load factor {factor:g}")
     values = np.full((len(steps), len(chosen), len(axes)), np.nan)
-    places = {node: k for k, node in enumerate(chosen)}
-    told: set[tuple[int, float]] = set()
-    for line, node in enumerate(listed.tolist()):
-        factor = table["load_factor"][line]
-        if (node, factor) in told:
-            raise InputError(f"{file}: has two lines for node {node} at the load factor {factor:g}")
-        told.add((node, factor))
-        if node in places:
-            step = np.searchsorted(steps, factor)
-            values[step, places[node]] = [table[axis][line] for axis in axes]
+    for column, node in enumerate(chosen):
+        own = listed == node
+        step = np.searchsorted(steps, table["load_factor"][own])
+        values[step, column] = np.stack([table[axis][own] for axis in axes], axis=1)
     return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
 
 
@@ -108,7 +110,7 @@ def history(
     columns: Sequence[str] | None = None,
     window: Sequence[float] | None = None,
     **known: Any,
-) -> History:
+) -> TimeHistory:
     """Histories from a CSV file with a column of times and one for each node, or from tracks.
 
     Parameters
@@ -123,7 +125,7 @@ def history(
     window : (float, float), optional
         First and last time (s) to take.
     **known
-        Other arguments of `History`.
+        Other arguments of `TimeHistory`.
     """
     chosen = _listed(file, nodes)
     time, values = _motions(_Source.of(file), chosen, axis, columns)
@@ -136,7 +138,7 @@ def history(
                 f"{time[0]:.6g} to {time[-1]:.6g} s"
             )
         time, values = time[within], values[within]
-    return _made(History, file, nodes=chosen, time=time, values=values, axis=axis, **known)
+    return _made(TimeHistory, file, nodes=chosen, time=time, values=values, axis=axis, **known)
 
 
 def spectrum(
@@ -149,12 +151,12 @@ def spectrum(
 
 
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
-    """Measurement in a file, of the kind that its columns tell.
+    """Measurement in a file; its columns tell the kind.
 
-    Columns displacement and force are forces on all nodes that supports move along the axis; a
-    column load_factor makes shapes; a first column of times, histories of the nodes along the
-    axis, "node 8 x"; as do the tracks of a film, of all nodes that were seen. A node that was seen
-    once only shows no motion and is left out.
+    Columns displacement and force: forces on all nodes that supports move along the axis. A column
+    load_factor: shapes. A first column of times and others such as "node 8 x": histories of the
+    nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
+    only once shows no motion and is left out.
     """
     source = _Source.of(file)
     names = source.names
@@ -184,13 +186,13 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     kept = np.flatnonzero(shown if shown.any() else ~shown)
     listed = [nodes[k] for k in kept]
     return _made(
-        History, file, nodes=listed, time=time, values=values[:, kept], axis=axis, **known
+        TimeHistory, file, nodes=listed, time=time, values=values[:, kept], axis=axis, **known
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _Source:
-    """A file that has been looked into once.
+    """A file whose kind and columns are known.
 
     Attributes
     ----------
@@ -239,7 +241,7 @@ def _motions(
     if source.tracks is not None:
         moved = _along(file, source.moved("time"), [axis], nodes)
         return moved["time"].values, moved.values[..., 0]
-    axis_number(f"{file}: axis", axis)
+    choice(f"{file}: axis", axis, AXES)
     headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
     if not _texts(headings) or len(headings) != len(nodes):
         raise InputError(
@@ -293,7 +295,7 @@ def _along(
 ) -> xr.DataArray:
     """Displacements in tracks of nodes, all by default, along axes."""
     for axis in axes:
-        axis_number(f"{file}: axis", axis)
+        choice(f"{file}: axis", axis, AXES)
     known = moved["node"].values.tolist()
     missing = sorted(set(nodes or ()) - set(known))
     if missing:
@@ -302,7 +304,7 @@ def _along(
 
 
 def _listed(file: Path, nodes: Any) -> list[int]:
-    """Numbers of nodes: a file knows nothing of a pattern, so that no expression can be read."""
+    """Numbers of nodes: expressions over a pattern mean nothing to a file."""
     empty = isinstance(nodes, Sized) and not len(nodes)
     chosen = "" if empty else check_nodes(nodes)
     if isinstance(chosen, str):
@@ -324,22 +326,15 @@ def _range(name: str, given: Any, what: str) -> tuple[float, float]:
 
 
 def _made(kind: Any, file: Path, **known: Any) -> Any:
-    """A measurement; what is wrong with it is told with the file."""
-    try:
+    """A measurement; messages on what is wrong with it name the file."""
+    with within("", file):
         return kind(**known)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 READERS: Mapping[str, Any] = {
     ForceDisplacement.kind: force_displacement,
     Shapes.kind: shapes,
-    History.kind: history,
+    TimeHistory.kind: history,
     Spectrum.kind: spectrum,
 }
-"""What reads each kind of measurement: ``reader(file, **arguments)`` gives it."""
-
-
-def read_measurement(kind: str, file: Path, **arguments: Any) -> Measurement:
-    """Read a measurement of one of the kinds of `READERS`."""
-    return READERS[kind](file, **arguments)
+"""Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it."""

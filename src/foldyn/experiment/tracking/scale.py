@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.experiment.opencv import opencv
+from foldyn.experiment.camera import opencv
+from foldyn.values import number
 
 _LARGEST_SPREAD = 0.02
 
@@ -22,26 +23,22 @@ class Scale:
     ----------
     metres_per_pixel : float
     spread : float
-        Largest relative deviation of what it was found from: two lengths that differ tell of a
-        tilted camera, or of different depths. NaN where there was one length only.
+        Largest relative deviation of the lengths that it was found from: if they differ, the camera
+        was tilted, or they lie at different depths. NaN for a single length.
     """
 
     metres_per_pixel: float
     spread: float = float("nan")
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.metres_per_pixel) and self.metres_per_pixel > 0.0):
-            raise InputError(
-                f"--scale {self.metres_per_pixel!r}: give a positive number of metres per pixel"
-            )
+        number("--scale", self.metres_per_pixel, above=0.0, unit="m per pixel")
 
     def at_depth(self, behind: ArrayLike, distance: float) -> NDArray[np.float64]:
         """Metres per pixel `behind` the plane (m), `distance` (m) being the plane's own.
 
         A pinhole shows what is farther away smaller, in proportion to its distance.
         """
-        if not (np.isfinite(distance) and distance > 0.0):
-            raise InputError(f"--distance {distance!r}: give a positive number of m")
+        number("--distance", distance, above=0.0, unit="m")
         return self.metres_per_pixel * (1.0 + np.asarray(behind, dtype=np.float64) / distance)
 
 
@@ -72,9 +69,9 @@ def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:
     mean = float(np.mean(scales))
     spread = float(np.max(np.abs(np.array(scales) / mean - 1.0)))
     if spread > _LARGEST_SPREAD:
-        told = ", ".join(f"{scale:.4g}" for scale in scales)
+        listed = ", ".join(f"{scale:.4g}" for scale in scales)
         raise InputError(
-            f"--reference: the lengths say {told} metres per pixel, which differ by more than "
+            f"--reference: the lengths say {listed} metres per pixel, which differ by more than "
             f"{2 * _LARGEST_SPREAD:.0%}; measure them in one plane, square to the camera"
         )
     return Scale(mean, spread if len(scales) > 1 else float("nan"))
@@ -106,11 +103,9 @@ def scale_of_target(
         The board is not found.
     """
     cv2 = opencv()
-    if not (np.isfinite(square) and square > 0.0):
-        raise InputError(f"square: {square!r}; give the side of a square in m")
-    found, corners = cv2.findChessboardCornersSB(
-        photo, (columns, rows), flags=cv2.CALIB_CB_ACCURACY
-    )
+    number("square", square, above=0.0, unit="m")
+    size, accurately = (columns, rows), cv2.CALIB_CB_ACCURACY
+    found, corners = cv2.findChessboardCornersSB(photo, size, flags=accurately)
     if not found:
         raise InputError(
             f"{place}: no chessboard of {columns} x {rows} inner corners; show all of it, with a "
