@@ -284,5 +284,5 @@ def test_tracks_of_photographs_are_shapes(folder) -> None:
     np.testing.assert_allclose(one.values[:, 0], [[9, 16], [81, 100], [225, 256]])
     with pytest.raises(InputError, match="give the load factor of each of its 3 photographs"):
         shapes(folder / "photos.nc")
-    with pytest.raises(InputError, match="node 7 was not tracked"):
+    with pytest.raises(InputError, match="node 7 was not measured"):
         shapes(folder / "photos.nc", nodes=[7], load_factor=[1, 2, 3])

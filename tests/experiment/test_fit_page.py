@@ -10,8 +10,12 @@ import pytest
 
 import foldyn as fd
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
-from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_histories, plot_shapes
-from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.experiment.calibration.fit_page import (
+    plot_correlation,
+    plot_histories,
+    plot_shapes,
+    write_fit,
+)
 from foldyn.experiment.calibration.fit_problem import problem
 
 TIME = np.linspace(0.0, 2.0, 80)

@@ -199,7 +199,7 @@ def test_what_tracks_cannot_say(filmed, photographed, ending):
         recognize(photos)
     with pytest.raises(InputError, match="load factor of each of its 3 photographs"):
         shapes(photos, load_factor=[1.0])
-    with pytest.raises(InputError, match="node 70 was not tracked"):
+    with pytest.raises(InputError, match="node 70 was not measured"):
         shapes(photos, nodes=[70], load_factor=FACTORS)
     with pytest.raises(InputError, match=rf"film\.{ending}: axis = \"w\": choose"):
         history(film, [6], axis="w")

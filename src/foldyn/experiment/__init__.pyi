@@ -1,6 +1,7 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
-from foldyn.experiment.calibration.fit import Course as Course, fit as fit
+from foldyn.experiment.calibration.evaluations import Course as Course
+from foldyn.experiment.calibration.fit import fit as fit
 from foldyn.experiment.calibration.fitted import (
     Descent as Descent,
     Estimate as Estimate,
@@ -15,7 +16,13 @@ from foldyn.experiment.calibration.measured import (
 )
 from foldyn.experiment.calibration.measurement import Measurement as Measurement
 from foldyn.experiment.calibration.parameters import Parameter as Parameter
-from foldyn.experiment.camera import Camera as Camera, opencv as opencv
+from foldyn.experiment.camera import (
+    Camera as Camera,
+    Scale as Scale,
+    opencv as opencv,
+    scale_of_lengths as scale_of_lengths,
+    scale_of_target as scale_of_target,
+)
 from foldyn.experiment.rendering.picture import Look as Look, Sensor as Sensor
 from foldyn.experiment.rendering.synthetic import (
     SyntheticFilm as SyntheticFilm,
@@ -38,11 +45,6 @@ from foldyn.experiment.tracking.matching import (
     Match as Match,
     Placing as Placing,
     match_nodes as match_nodes,
-)
-from foldyn.experiment.tracking.scale import (
-    Scale as Scale,
-    scale_of_lengths as scale_of_lengths,
-    scale_of_target as scale_of_target,
 )
 from foldyn.experiment.tracking.tracks import (
     Tracking as Tracking,

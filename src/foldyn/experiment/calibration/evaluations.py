@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,108 +25,90 @@ Values = tuple[float, ...]
 """Of the parameters."""
 
 
+@dataclass(frozen=True)
+class Course:
+    """How far a fit is.
+
+    Attributes
+    ----------
+    computed, found : int
+        Evaluations of the model that were computed, and that were kept from before.
+    cost : float
+        The smallest so far.
+    """
+
+    computed: int
+    found: int
+    cost: float
+
+
 class Evaluations:
     """Predictions of a model at values of its parameters, each computed once.
 
-    A context manager: its processes end with it. Several threads may ask at a time.
+    Several threads may ask at a time.
 
     Parameters
     ----------
     problem : Problem
-    processes : int
-        How many evaluations run at a time; 1: in this process.
-    folder : Path, optional
-        Keeps every evaluation, and is looked in first.
-    tell : callable
-        Called with the number of evaluations computed and of those found, after each.
+    pool : Workers, optional
+        Evaluate; by default this process does.
+    folder : path, optional
+        Keeps every evaluation; those that are there are not computed again.
+    progress : callable, optional
+        Called with a `Course` after each.
     """
 
     def __init__(
         self,
         problem: Problem,
-        processes: int = 1,
-        folder: Path | None = None,
-        tell: Callable[[int, int], None] = lambda computed, found: None,
+        pool: Workers | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        progress: Callable[[Course], None] | None = None,
     ) -> None:
-        self.problem, self.folder, self.tell = problem, folder, tell
-        self.computed = self.found = 0
+        self.problem, self.pool, self.progress = problem, pool, progress
+        self.folder = None if folder is None else Path(folder)
+        self.computed, self.found, self.cost = 0, 0, math.inf
         self._known: dict[Values, Outcome] = {}
         self._lock = Lock()
         self._digest = problem.digest()
-        self._pool = None
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            remove_leftovers(folder)
-        if processes > 1:
-            self._pool = Workers(processes, _begin, problem)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        if self._pool is not None:
-            self._pool.__exit__(*raised)
-
-    def stop(self) -> None:
-        """End what the processes compute: threads that wait for it go on with an error."""
-        if self._pool is not None:
-            self._pool.stop()
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(self.folder)
 
     def at(self, points: Sequence[NDArray]) -> list[Outcome]:
-        """Predictions at several points, at the same time where there are processes."""
+        """Predictions at several points, at the same time where there is a pool."""
         wanted = [tuple(map(float, point)) for point in points]
         new = [values for values in dict.fromkeys(wanted) if not self._look(values)]
-        if self._pool is None:
+        evaluate = partial(_evaluate, self.problem)
+        if self.pool is None:
             for values in new:
-                self._keep(values, _evaluate(self.problem, values))
+                self._keep(values, evaluate(values))
         else:
-            self._at_a_time(self._pool, new)
+            self.pool.each(evaluate, new, self._keep)
         return [self._known[values] for values in wanted]
-
-    def _at_a_time(self, pool: Workers, new: Sequence[Values]) -> None:
-        """Compute in processes; each evaluation is kept as soon as it is there."""
-        waiting: dict[Future[Outcome], Values] = {}
-        try:
-            waiting = {pool.submit(_evaluate_own, values): values for values in new}
-            for future in as_completed(list(waiting)):
-                self._keep(waiting.pop(future), future.result())
-        except BrokenProcessPool:
-            raise ComputationError(
-                "a process that evaluates the model ended at once; in a script, call fit "
-                'below if __name__ == "__main__": (or use processes=1)'
-            ) from None
-        except KeyboardInterrupt:
-            for future, values in waiting.items():
-                if future.done() and not future.cancelled() and future.exception() is None:
-                    self._keep(values, future.result())
-            raise
-
-    def _file(self, values: Values) -> Path:
-        assert self.folder is not None
-        return self.folder / f"{name_of([self._digest, values])}.npz"
 
     def _look(self, values: Values) -> bool:
         """Whether a point is known, or kept in the folder."""
-        if values in self._known or self.folder is None:
-            return values in self._known
-        file = self._file(values)
-        outcome = KEPT.find(file, file.stem)
-        if outcome is None:
-            return False
-        self._known[values] = outcome
-        with self._lock:
-            self.found += 1
-            self.tell(self.computed, self.found)
-        return True
+        if values not in self._known and self.folder is not None:
+            name = name_of([self._digest, values])
+            outcome = KEPT.find(self.folder / f"{name}.npz", name)
+            if outcome is not None:
+                self._count(values, outcome, found=1)
+        return values in self._known
 
     def _keep(self, values: Values, outcome: Outcome) -> None:
-        self._known[values] = outcome
         if self.folder is not None:
-            file = self._file(values)
-            KEPT.keep(file, file.stem, outcome)
+            name = name_of([self._digest, values])
+            KEPT.keep(self.folder / f"{name}.npz", name, outcome)
+        self._count(values, outcome, computed=1)
+
+    def _count(self, values: Values, outcome: Outcome, computed: int = 0, found: int = 0) -> None:
+        self._known[values] = outcome
         with self._lock:
-            self.computed += 1
-            self.tell(self.computed, self.found)
+            self.computed += computed
+            self.found += found
+            if self.progress is not None:
+                self.progress(Course(self.computed, self.found, self.cost))
 
 
 def _read(file: Path) -> tuple[str, Outcome]:
@@ -144,17 +127,6 @@ def _write(file: Path, stamp: str, outcome: Outcome) -> None:
 
 
 KEPT: Store[Outcome] = Store(_read, _write, warns=False)
-
-
-_own: list[Problem] = []  # the one problem of a process that evaluates
-
-
-def _begin(problem: Problem) -> None:
-    _own[:] = [problem]
-
-
-def _evaluate_own(values: Values) -> Outcome:
-    return _evaluate(_own[0], values)
 
 
 def _evaluate(problem: Problem, values: Values) -> Outcome:

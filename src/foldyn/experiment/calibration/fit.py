@@ -7,21 +7,20 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from pathlib import Path
+from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from foldyn.errors import ComputationError
-from foldyn.experiment.calibration.evaluations import Evaluations
+from foldyn.experiment.calibration.evaluations import Course, Evaluations
 from foldyn.experiment.calibration.fit_problem import Problem, problem
-from foldyn.experiment.calibration.fitted import Descent, Estimate, Fit, score
+from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score, spread
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.experiment.calibration.uncertainty import Uncertainty, uncertainty
 from foldyn.values import number, whole
+from foldyn.workers import Workers
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
@@ -42,23 +41,6 @@ WHY = {
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
-
-
-@dataclass(frozen=True)
-class Course:
-    """How far a fit is.
-
-    Attributes
-    ----------
-    computed, found : int
-        Evaluations of the model that were computed, and that were kept from before.
-    cost : float
-        The smallest so far.
-    """
-
-    computed: int
-    found: int
-    cost: float
 
 
 def fit(
@@ -124,58 +106,48 @@ def fit(
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
-    best = [math.inf]
-
-    def tell(computed: int, found: int) -> None:
-        if progress is not None:
-            progress(Course(computed, found, best[0]))
-
-    kept = None if folder is None else Path(folder)
-    with Evaluations(made, processes, kept, tell) as evaluations:
-        searches = [_Search(made, evaluations, best) for _ in points]
-        if processes > 1 and starts > 1:
-            descents = _at_a_time(min(starts, processes), evaluations, searches, points)
+    pool = Workers(processes) if processes > 1 else None
+    with pool or nullcontext():
+        evaluations = Evaluations(made, pool, folder, progress)
+        search = _Search(made, evaluations)
+        if pool is not None and starts > 1:
+            descents = _at_a_time(min(starts, processes), pool, search, points)
         else:
-            descents = [one.descend(point) for one, point in zip(searches, points, strict=True)]
+            descents = [search.descend(point) for point in points]
         lowest = min(descents, key=lambda one: one.cost)
         if not math.isfinite(lowest.cost):
             raise ComputationError(f"no search found an end: {lowest.message}")
         values = np.array(lowest.values)
-        known = searches[0].uncertainty(values, confidence)
-        predicted = _split(made, _sound(evaluations.at([values])[0]))
-        spent = evaluations.computed + evaluations.found
+        known = search.uncertainty(values, confidence)
+        (best,) = evaluations.at([values])
+        ends = np.cumsum([len(one) for one in made.observed()])
+        predicted = np.split(np.asarray(best), ends[:-1])
     return Fit(
-        _estimates(made, values, known),
+        known.estimates(made.space.keys, values),
         known.correlation,
         known.singular_values,
         known.directions,
         confidence,
         known.freedom,
         known.misfit,
-        tuple(
-            score(one.name, one.held_out, one.unit, one.observed(), said)
-            for one, said in zip(made.measurements, predicted, strict=True)
-        ),
+        tuple(map(score, made.measurements, predicted)),
         tuple(descents),
         made,
         tuple(predicted),
-        spent,
+        evaluations.computed + evaluations.found,
         time.perf_counter() - began,
     )
 
 
 def _at_a_time(
-    count: int,
-    evaluations: Evaluations,
-    searches: Sequence[_Search],
-    points: NDArray[np.float64],
+    count: int, pool: Workers, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
     """Search from several starts in threads, which end where this one is interrupted."""
     threads = ThreadPoolExecutor(count)
     try:
-        return list(threads.map(_Search.descend, searches, points))
+        return list(threads.map(search.descend, points))
     except BaseException:
-        evaluations.stop()
+        pool.stop()  # threads that wait for it go on with an error
         raise
     finally:
         threads.shutdown(cancel_futures=True)
@@ -184,14 +156,14 @@ def _at_a_time(
 class _Search:
     """A search for the smallest misfit, in parameters over their scales."""
 
-    def __init__(self, made: Problem, evaluations: Evaluations, best: list[float]) -> None:
-        self.made, self.evaluations, self.best = made, evaluations, best
+    def __init__(self, made: Problem, evaluations: Evaluations) -> None:
+        self.made, self.evaluations = made, evaluations
         space = made.space
         self.scale = space.column("scale")
         self.lower, self.upper = space.column("lower"), space.column("upper")
         observed = made.observed()
         weights = [
-            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or _spread(seen)))
+            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or spread(seen)))
             for one, seen in zip(made.measurements, observed, strict=True)
         ]
         self.weight = np.concatenate(weights)
@@ -201,11 +173,11 @@ class _Search:
     def descend(self, start: NDArray[np.float64]) -> Descent:
         """Search from a start."""
         begin = tuple(start.tolist())
-        (first,) = self.evaluations.at([start])
-        if isinstance(first, str):
-            return Descent(begin, begin, math.inf, 1, first, False)
         try:
-            found = least_squares(
+            (first,) = self.evaluations.at([start])
+            if isinstance(first, str):
+                raise ComputationError(first)
+            end = least_squares(
                 lambda z: self._residual([z * self.scale])[0],
                 start / self.scale,
                 lambda z: self._jacobian(z * self.scale, both_sides=False),
@@ -214,27 +186,27 @@ class _Search:
             )  # fmt: skip
         except ComputationError as error:
             return Descent(begin, begin, math.inf, 1, str(error), False)
-        values = tuple((found.x * self.scale).tolist())
-        return Descent(
-            begin, values, float(found.cost), int(found.nfev), WHY[found.status], found.status > 0
-        )
+        values = tuple((end.x * self.scale).tolist())
+        why = WHY[end.status]
+        return Descent(begin, values, float(end.cost), int(end.nfev), why, end.status > 0)
 
     def uncertainty(self, values: NDArray[np.float64], confidence: float) -> Uncertainty:
         """How well the parameters are known at the end of a search."""
         jacobian = self._jacobian(values, both_sides=True)
         near = STEP * self.scale
         at_bound = (values - self.lower < near) | (self.upper - values < near)
-        return uncertainty(jacobian, self._residual([values])[0], self.scale, at_bound, confidence)
+        (residual,) = self._residual([values])
+        return Uncertainty.of(jacobian, residual, self.scale, at_bound, confidence)
 
     def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
         residuals = []
-        for said in self.evaluations.at(points):
-            if isinstance(said, str):
+        for predicted in self.evaluations.at(points):
+            if isinstance(predicted, str):
                 residuals.append(np.full(int(self.chosen.sum()), np.inf))
                 continue
-            residual = ((said - self.observed) * self.weight)[self.chosen]
-            self.best[0] = min(self.best[0], 0.5 * float(residual @ residual))
+            residual = ((predicted - self.observed) * self.weight)[self.chosen]
+            self.evaluations.cost = min(self.evaluations.cost, 0.5 * float(residual @ residual))
             residuals.append(residual)
         return residuals
 
@@ -243,19 +215,17 @@ class _Search:
         points = [values]
         pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
         for k, scale in enumerate(self.scale):
-            up, down = (values.copy() for _ in range(2))
-            up[k] += STEP * scale
-            down[k] -= STEP * scale
-            above, below = up[k] <= self.upper[k], down[k] >= self.lower[k]
-            sides = [side for side, fits in ((up, above), (down, below)) if fits]
+            step = np.zeros(len(values))
+            step[k] = STEP * scale
+            both = values + step, values - step
+            sides = [side for side in both if self.lower[k] <= side[k] <= self.upper[k]]
             if not sides:
                 raise ComputationError(
                     f"{self.made.space.keys[k]}: the bounds are closer than {STEP:g} of its scale"
                 )
-            sides = sides if both_sides else sides[:1]
-            points += sides
-            first = len(points) - len(sides)
-            end = first + 1 if len(sides) == 2 else 0
+            first = len(points)
+            points += sides if both_sides else sides[:1]
+            end = first + 1 if len(points) == first + 2 else 0
             pairs.append((first, end, (points[first][k] - points[end][k]) / scale))
         residuals = self._residual(points)
         with np.errstate(invalid="ignore"):  # where the model fails
@@ -267,36 +237,3 @@ class _Search:
                 f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
             )
         return np.stack(columns, axis=1)
-
-
-def _spread(observed: NDArray[np.float64]) -> float:
-    """Size of measured values, by which they are weighed where their error is not known."""
-    return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
-
-
-def _estimates(
-    made: Problem, values: NDArray[np.float64], known: Uncertainty
-) -> tuple[Estimate, ...]:
-    at_bound = np.isnan(known.standard_error)
-    return tuple(
-        Estimate(
-            key, float(value), float(error), float(value - half), float(value + half),
-            bool(determined), bool(held),
-        )
-        for key, value, error, half, determined, held in zip(
-            made.space.keys, values, known.standard_error, known.half_width, known.determined,
-            at_bound, strict=True,
-        )
-    )  # fmt: skip
-
-
-def _sound(said: NDArray[np.float64] | str) -> NDArray[np.float64]:
-    if isinstance(said, str):
-        raise ComputationError(said)
-    return said
-
-
-def _split(made: Problem, said: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Predictions of each measurement."""
-    lengths = [len(one) for one in made.observed()]
-    return np.split(said, np.cumsum(lengths)[:-1])

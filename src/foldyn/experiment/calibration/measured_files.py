@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence, Sized
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +41,9 @@ def force_displacement(
         Other arguments of `ForceDisplacement`.
     """
     units = {"displacement": "m", "force": "N"}
-    headings = {name: name for name in units} if columns is None else columns
-    if (
-        not isinstance(headings, Mapping)
-        or not {*headings} <= {*units}
-        or not _texts(list(headings.values()))
-    ):
+    headings = {} if columns is None else columns
+    sound = isinstance(headings, Mapping) and {*headings} <= {*units}
+    if not sound or not _texts(list(headings.values())):
         raise InputError(
             f"columns = {show(columns)}: give the headings of displacement and force, as in "
             '{ displacement = "way", force = "load" }'
@@ -73,10 +69,10 @@ def shapes(
     **known
         Other arguments of `Shapes`.
     """
-    source = _Source.of(file)
-    names = source.names
-    if source.tracks is not None or "photo" in names:
-        return _shapes_of_tracks(source, nodes, load_factor, **known)
+    tracks, names = _opened(file)
+    if tracks is not None or "photo" in names:
+        moved = _table(file, names) if tracks is None else _moved(file, tracks, "photo")
+        return _shapes_of_tracks(file, moved, nodes, load_factor, **known)
     if load_factor is not None:
         raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
     axes = "".join(axis for axis in AXES if axis in names)
@@ -88,19 +84,15 @@ def shapes(
     broken = np.flatnonzero(table["node"] != listed)
     if broken.size:
         raise InputError(f"{file}: node = {table['node'][broken[0]]:g}: must be a whole number")
-    chosen = np.unique(listed).tolist() if nodes is None else _listed(file, nodes)
-    missing = sorted(set(chosen) - set(listed.tolist()))
-    if missing:
-        raise InputError(f"{file}: has no line for node {missing[0]}")
     lines, times = np.unique([listed, table["load_factor"]], axis=1, return_counts=True)
     for node, factor in lines.T[times > 1]:
         raise InputError(f"{file}: has two lines for node {node:g} at the load factor {factor:g}")
-    values = np.full((len(steps), len(chosen), len(axes)), np.nan)
-    for column, node in enumerate(chosen):
-        own = listed == node
-        step = np.searchsorted(steps, table["load_factor"][own])
-        values[step, column] = np.stack([table[axis][own] for axis in axes], axis=1)
-    return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
+    every = np.unique(listed)
+    values = np.full((len(steps), len(every), len(axes)), np.nan)
+    place = np.searchsorted(steps, table["load_factor"]), np.searchsorted(every, listed)
+    values[place] = np.stack([table[axis] for axis in axes], axis=1)
+    moved = xr.DataArray(values, {"node": every, "axis": list(axes)}, ("photo", "node", "axis"))
+    return _shapes_of_tracks(file, moved, nodes, steps, **known)
 
 
 def history(
@@ -128,7 +120,7 @@ def history(
         Other arguments of `TimeHistory`.
     """
     chosen = _listed(file, nodes)
-    time, values = _motions(_Source.of(file), chosen, axis, columns)
+    time, values = _motions(file, *_opened(file), chosen, axis, columns)
     if window is not None:
         first, last = _range("window", window, "times (s)")
         within = (time >= first) & (time <= last)
@@ -158,15 +150,15 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
     only once shows no motion and is left out.
     """
-    source = _Source.of(file)
-    names = source.names
+    tracks, names = _opened(file)
     if "photo" in names:
         raise InputError(
             f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
             'kind = "shapes", load_factor = [...]'
         )
-    if source.tracks is not None:
-        moved = _along(file, source.moved("time"), [axis])[..., 0]
+    choice(f"{file}: axis", axis, AXES)
+    if tracks is not None:
+        moved = _moved(file, tracks, "time").sel(axis=axis)
         nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
         if not nodes:
             raise InputError(f"{file}: no node was measured along {axis}; choose another axis")
@@ -181,7 +173,7 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
                 f'{file}: the columns are {some(names)}; needed are "displacement" and '
                 f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
             )
-    time, values = _motions(source, nodes, axis)
+    time, values = _motions(file, tracks, names, nodes, axis)
     shown = np.isfinite(values).sum(axis=0) != 1
     kept = np.flatnonzero(shown if shown.any() else ~shown)
     listed = [nodes[k] for k in kept]
@@ -190,39 +182,22 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _Source:
-    """A file whose kind and columns are known.
+def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
+    """Tracks and their dimensions, or None and the names of the columns of a CSV file."""
+    if file.suffix.lower() == ".nc":
+        tracks = load_tracks(file)
+        return tracks, [str(name) for name in tracks.sizes]
+    return None, [name for name, _ in read_headings(file)]
 
-    Attributes
-    ----------
-    file : Path
-    names : list of str
-        Of the columns of a CSV file, or of the dimensions of tracks.
-    tracks : xarray.Dataset or None
-        None for a CSV file.
-    """
 
-    file: Path
-    names: list[str]
-    tracks: xr.Dataset | None
-
-    @classmethod
-    def of(cls, file: Path) -> _Source:
-        if file.suffix.lower() == ".nc":
-            tracks = load_tracks(file)
-            return cls(file, [str(name) for name in tracks.sizes], tracks)
-        return cls(file, [name for name, _ in read_headings(file)], None)
-
-    def moved(self, along: str) -> xr.DataArray:
-        """Displacements of nodes in tracks."""
-        if self.tracks is None or "displacement" not in self.tracks or along not in self.names:
-            what = "a film" if along == "time" else "photographs"
-            raise InputError(
-                f"{self.file}: holds no displacements of nodes over {along}; track {what} with "
-                "--model"
-            )
-        return self.tracks["displacement"]
+def _moved(file: Path, tracks: xr.Dataset, along: str) -> xr.DataArray:
+    """Displacements of nodes in tracks."""
+    if "displacement" not in tracks or along not in tracks.sizes:
+        what = "a film" if along == "time" else "photographs"
+        raise InputError(
+            f"{file}: holds no displacements of nodes over {along}; track {what} with --model"
+        )
+    return tracks["displacement"]
 
 
 def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
@@ -232,16 +207,20 @@ def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _motions(
-    source: _Source, nodes: Sequence[int], axis: str, columns: Sequence[str] | None = None
+    file: Path,
+    tracks: xr.Dataset | None,
+    names: Sequence[str],
+    nodes: Sequence[int],
+    axis: str,
+    columns: Sequence[str] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times, and displacements of nodes along an axis, shape (t, m)."""
-    file, names = source.file, source.names
+    choice(f"{file}: axis", axis, AXES)
     if "photo" in names:
         raise InputError(f'{file}: holds photographs, which have no times; use kind = "shapes"')
-    if source.tracks is not None:
-        moved = _along(file, source.moved("time"), [axis], nodes)
-        return moved["time"].values, moved.values[..., 0]
-    choice(f"{file}: axis", axis, AXES)
+    if tracks is not None:
+        moved = _of_nodes(file, _moved(file, tracks, "time").sel(axis=axis), nodes)
+        return moved["time"].values, moved.values
     headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
     if not _texts(headings) or len(headings) != len(nodes):
         raise InputError(
@@ -255,10 +234,8 @@ def _motions(
 
 
 def _shapes_of_tracks(
-    source: _Source, nodes: Any, load_factor: Sequence[float] | None, **known: Any
+    file: Path, moved: xr.DataArray, nodes: Any, load_factor: Sequence[float] | None, **known: Any
 ) -> Shapes:
-    file = source.file
-    moved = _table(source) if source.tracks is None else source.moved("photo")
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(
@@ -267,17 +244,18 @@ def _shapes_of_tracks(
     moved = moved.dropna("node", how="all")
     if not moved.size:
         raise InputError(f"{file}: no node was measured in any photograph")
-    chosen = None if nodes is None else _listed(file, nodes)
-    moved = _along(file, moved, moved["axis"].values.tolist(), chosen).dropna("axis", how="all")
+    if nodes is not None:
+        moved = _of_nodes(file, moved, _listed(file, nodes))
+    moved = moved.dropna("axis", how="all")
     return _made(
         Shapes, file, nodes=moved["node"].values.tolist(), load_factor=load_factor,
         values=moved.values, axes="".join(moved["axis"].values), **known,
     )  # fmt: skip
 
 
-def _table(source: _Source) -> xr.DataArray:
+def _table(file: Path, names: Sequence[str]) -> xr.DataArray:
     """Displacements in a CSV file with a line for each photograph, as tracks have them."""
-    file, columns = source.file, _columns(source.names)
+    columns = _columns(names)
     if not columns:
         raise InputError(f'{file}: has no columns "node 8 x", ... of displacements')
     headings = [f"node {node} {axis}" for node, axis in columns]
@@ -290,17 +268,12 @@ def _table(source: _Source) -> xr.DataArray:
     return xr.DataArray(values, axes, ("photo", "node", "axis"))
 
 
-def _along(
-    file: Path, moved: xr.DataArray, axes: Sequence[str], nodes: Sequence[int] | None = None
-) -> xr.DataArray:
-    """Displacements in tracks of nodes, all by default, along axes."""
-    for axis in axes:
-        choice(f"{file}: axis", axis, AXES)
-    known = moved["node"].values.tolist()
-    missing = sorted(set(nodes or ()) - set(known))
+def _of_nodes(file: Path, moved: xr.DataArray, nodes: Sequence[int]) -> xr.DataArray:
+    """Displacements of some nodes in tracks."""
+    missing = sorted(set(nodes) - set(moved["node"].values.tolist()))
     if missing:
-        raise InputError(f"{file}: node {missing[0]} was not tracked")
-    return moved.sel(node=known if nodes is None else list(nodes), axis=list(axes))
+        raise InputError(f"{file}: node {missing[0]} was not measured")
+    return moved.sel(node=list(nodes))
 
 
 def _listed(file: Path, nodes: Any) -> list[int]:

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
+from foldyn.results import case_of
 from foldyn.values import number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
@@ -135,10 +137,6 @@ def film_of(
     InputError
         Not a motion, a part that it does not have, or nodes behind the camera.
     """
-    from scipy.interpolate import CubicSpline
-
-    from foldyn.results import case_of
-
     structure = case_of(motion).structure
     if "time" not in motion.dims or motion.sizes["time"] < 4:
         raise InputError("motion: not a trajectory of at least four samples; use fd.simulate")
@@ -186,8 +184,6 @@ def photos_of(
     truth : xarray.Dataset
         `position`, `position_px` and `seen` along the dimension `photo`.
     """
-    from foldyn.results import case_of
-
     structure = case_of(path).structure
     states = path["rest_position"].values + path["displacement"].values[list(steps)]
     sensor = replace(sensor or Sensor(), exposure=0.0)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from foldyn.errors import InputError
 from foldyn.experiment.camera import axes_of_view
@@ -156,8 +158,6 @@ def match_nodes(
 
 def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, int]]:
     """The best ways to lay the model over the points, by how many nodes fall on a point."""
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(uv)
     axes = axes_of_view(placing.up, placing.facing)
     chosen = np.unique(np.linspace(0, len(states) - 1, _STATES).round().astype(int))
@@ -337,8 +337,6 @@ def _between(states: Array, state: float) -> Array:
 
 def assign(nodes: Array, points: Array, limit: float) -> tuple[NDArray, NDArray]:
     """Pairs of nodes and points (pixels) with the shortest total distance, none above a limit."""
-    from scipy.optimize import linear_sum_assignment
-
     distance = np.hypot(*(nodes[:, np.newaxis] - points).transpose(2, 0, 1))
     # a node without a partner costs the limit: it takes none that is farther away
     padded = np.concatenate([np.minimum(distance, 1e6), np.full((len(nodes),) * 2, limit)], axis=1)

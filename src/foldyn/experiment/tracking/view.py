@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from foldyn.errors import InputError
+from foldyn.results import case_of
+from foldyn.results.contents import check_variable
 
 Array = NDArray[np.float64]
 
@@ -42,28 +46,21 @@ class TrackedModel:
     @classmethod
     def of(cls, thing: Any) -> TrackedModel:
         """Model of a case or structure, at rest, or of a result of `trace`, with all its states."""
-        if isinstance(thing, xr.Dataset):
-            return cls._of_result(thing)
-        structure = getattr(thing, "structure", thing)
-        rest = np.asarray(structure.nodes, dtype=np.float64)
-        triangles = np.asarray(structure.triangles, dtype=np.int64)
-        edges = np.asarray(structure.pattern.edges, dtype=np.int64)
-        count = len(structure.pattern.vertices)
-        return cls(rest, rest[np.newaxis], triangles, count, edges)
-
-    @classmethod
-    def _of_result(cls, result: xr.Dataset) -> TrackedModel:
-        from foldyn.results import case_of
-        from foldyn.results.contents import check_variable
-
-        if "displacement" not in result or "rest_position" not in result:
+        if not isinstance(thing, xr.Dataset):
+            structure = getattr(thing, "structure", thing)
+            rest = np.asarray(structure.nodes, dtype=np.float64)
+            triangles = np.asarray(structure.triangles, dtype=np.int64)
+            edges = np.asarray(structure.pattern.edges, dtype=np.int64)
+            count = len(structure.pattern.vertices)
+            return cls(rest, rest[np.newaxis], triangles, count, edges)
+        if "displacement" not in thing or "rest_position" not in thing:
             raise InputError("--model: the result has no displacements; give a case or a path")
-        at_rest = cls.of(case_of(result))
-        if result["displacement"].ndim != 3:
+        at_rest = cls.of(case_of(thing))
+        if thing["displacement"].ndim != 3:
             raise InputError("--model: give a path or a motion, not modes or responses")
-        place, along = ("node", "axis"), str(result["displacement"].dims[0])
-        rest = check_variable(result, "rest_position", place, place="--model: ").values
-        moved = check_variable(result, "displacement", (along, *place), place="--model: ").values
+        place, along = ("node", "axis"), str(thing["displacement"].dims[0])
+        rest = check_variable(thing, "rest_position", place, place="--model: ").values
+        moved = check_variable(thing, "displacement", (along, *place), place="--model: ").values
         states = rest + moved
         if not states.size or not np.isfinite(states).all():
             raise InputError("--model: the result holds no finite displacements; compute it again")
@@ -123,8 +120,6 @@ class View:
 
     def turned(self, rotvec: ArrayLike) -> View:
         """The same view with the model turned by a rotation vector (rad) in the camera's axes."""
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec(np.asarray(rotvec, dtype=np.float64)).as_matrix()
         return replace(self, rotation=turn @ self.rotation)
 
@@ -161,8 +156,6 @@ def fit_view(
     rms : float
         Root mean square of the distances between seen and projected (pixels).
     """
-    from scipy.optimize import least_squares
-
     extent = float(np.ptp(points, axis=0).max())
     size, nearness = extent / view.metres_per_pixel, extent / view.distance
 
