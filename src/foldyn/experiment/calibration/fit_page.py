@@ -71,9 +71,8 @@ def _quality(fit: Fit) -> str:
     text += "degrees of freedom; they hold if the model is right and its errors are random."
     if given and math.isfinite(fit.misfit):
         text += f" The misfit is {fit.misfit:.3g} times what the data's standard errors explain"
-        text += (
-            ": the model is wrong somewhere, or they are too small." if fit.misfit > 1.5 else "."
-        )
+        wrong = ": the model is wrong somewhere, or they are too small"
+        text += f"{wrong if fit.misfit > 1.5 else ''}."
     return text
 
 

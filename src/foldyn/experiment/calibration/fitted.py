@@ -293,13 +293,13 @@ class Uncertainty:
     ) -> Uncertainty:
         """Linearized uncertainty of a fit at its optimum.
 
-        With the singular values s_k and directions v_k of the Jacobian J, cov = misfit^2 sum v_k v_k^T
-        / s_k^2, and the half width of an interval is the standard error times the quantile of
+        With the singular values s_k and directions v_k of the Jacobian J, cov = misfit^2 sum v_k
+        v_k^T / s_k^2, and the half width of an interval is the standard error times the quantile of
         Student's t of the degrees of freedom.
 
-        A direction with a singular value below `WEAK` of the largest is one that the data do not see;
-        one whose standard error exceeds the scales of the parameters is one that they hardly see. Both
-        are left out of the covariance, and parameters that take part in them are not determined.
+        The data do not see a direction whose singular value is below `WEAK` of the largest, and
+        hardly see one whose standard error exceeds the scales of the parameters. Both are left out
+        of the covariance, and parameters that take part in them are not determined.
 
         Parameters
         ----------

@@ -234,8 +234,9 @@ def _motions(
 
 
 def _shapes_of_tracks(
-    file: Path, moved: xr.DataArray, nodes: Any, load_factor: Sequence[float] | None, **known: Any
+    file: Path, moved: xr.DataArray, nodes: Any, load_factor: Any, **known: Any
 ) -> Shapes:
+    """Shapes from displacements along the dimension `photo`, one for each load factor."""
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(
