@@ -1,7 +1,6 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
-from foldyn.experiment.calibration.evaluations import Course as Course
-from foldyn.experiment.calibration.fit import fit as fit
+from foldyn.experiment.calibration.fit import Course as Course, fit as fit
 from foldyn.experiment.calibration.fitted import (
     Descent as Descent,
     Estimate as Estimate,

@@ -134,17 +134,17 @@ class Tie:
         parts(self.key)
         if not isinstance(self.expression, str):
             raise InputError(f"tie {self.key} = {show(self.expression)}: must be a text; {_REMEDY}")
-        self.value(_Anything())
+        self.value(None)
 
-    def value(self, parameters: Mapping[str, float]) -> float:
-        """Value for given values of the parameters."""
+    def value(self, parameters: Mapping[str, float] | None) -> float:
+        """Value for given values of the parameters; None where these are not known yet."""
         try:
             tree = parse(self.expression.strip())
         except InputError as error:
             raise self._error(str(error)) from None
         return self._value(tree, parameters)
 
-    def _value(self, node: ast.expr, parameters: Mapping[str, float]) -> float:
+    def _value(self, node: ast.expr, parameters: Mapping[str, float] | None) -> float:
         if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
             left, right = self._value(node.left, parameters), self._value(node.right, parameters)
             try:
@@ -161,6 +161,8 @@ class Tie:
                 raise self._error(f"{written(node)} is not a finite number") from None
         if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
             key = ast.unparse(node)
+            if parameters is None:
+                return 0.7320508  # no tie is likely to divide by a difference from this number
             if key not in parameters:
                 known = ", ".join(parameters)
                 hint = suggest(key, parameters)
@@ -170,16 +172,6 @@ class Tie:
 
     def _error(self, what: str) -> InputError:
         return InputError(f'tie {self.key} = "{shortened(self.expression)}": {what}; {_REMEDY}')
-
-
-class _Anything(dict[str, float]):
-    """Parameters of any name: a tie can be checked before the parameters are known."""
-
-    def __contains__(self, key: object) -> bool:
-        return True
-
-    def __getitem__(self, key: str) -> float:
-        return 0.7320508  # no tie is likely to divide by a difference from this number
 
 
 @dataclass(frozen=True)

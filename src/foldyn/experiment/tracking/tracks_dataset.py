@@ -126,12 +126,9 @@ def add_displacements(
 
 def _longest_gaps(measured: np.ndarray) -> np.ndarray:
     """Most frames in a row in which a node was not measured, shape (n,)."""
-    longest = np.zeros(measured.shape[1], np.int64)
-    running = np.zeros(measured.shape[1], np.int64)
-    for row in measured:
-        running = np.where(row, 0, running + 1)
-        longest = np.maximum(longest, running)
-    return longest
+    frame = np.arange(1, len(measured) + 1)[:, np.newaxis]
+    last = np.maximum.accumulate(np.where(measured, frame, 0), axis=0)
+    return (frame - last).max(axis=0)
 
 
 def save_tracks(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
