@@ -267,7 +267,7 @@ def test_a_start_at_which_nothing_can_be_computed(pressed) -> None:
 def test_a_model_that_fails_at_every_start(swung) -> None:
     """The load is so large that panel passes through panel."""
     bad = histories(swung, [0])
-    with pytest.raises(ComputationError, match="no search found an end: "):
+    with pytest.raises(ComputationError, match="no search converged: "):
         fd.fit(swung, [bad], [Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
 
 

@@ -120,9 +120,9 @@ def fit(
     Raises
     ------
     InputError
-        Anything cannot be used; the message says what and why.
+        An argument or a file cannot be used; the message says what and why.
     ComputationError
-        No search found an end.
+        No search converged.
 
     Notes
     -----
@@ -144,7 +144,7 @@ def fit(
             descents = [search.descend(point) for point in points]
         lowest = min(descents, key=lambda one: one.cost)
         if not math.isfinite(lowest.cost):
-            raise ComputationError(f"no search found an end: {lowest.message}")
+            raise ComputationError(f"no search converged: {lowest.message}")
         values = np.array(lowest.values)
         known = search.uncertainty(values, confidence)
         (best,) = evaluations.at([values])

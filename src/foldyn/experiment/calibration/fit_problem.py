@@ -99,9 +99,8 @@ class Problem:
         members: Sequence[Measurement] | None = None,
     ) -> Any:
         """Path or motion at given values, for its own measurements or others."""
-        if members is None:
-            members = [self.measurements[i] for i in run.members]
-        return _result(self.case_file(run, values), members)
+        own = [self.measurements[i] for i in run.members]
+        return _result(self.case_file(run, values), members or own)
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""

@@ -161,10 +161,10 @@ class Fit:
 
     def __getitem__(self, key: str) -> Estimate:
         """Estimate of a parameter."""
-        for one in self.estimates:
-            if one.key == key:
-                return one
-        raise InputError(f"{key}: was not fitted; {', '.join(self.values)} were")
+        estimates = {one.key: one for one in self.estimates}
+        if key not in estimates:
+            raise InputError(f"{key}: was not fitted; {', '.join(estimates)} were")
+        return estimates[key]
 
     @property
     def values(self) -> dict[str, float]:
@@ -372,7 +372,7 @@ def _plain(value: Any) -> Any:
 
 
 def _moved(value: Any, way: str) -> Any:
-    """Document with the files that it names found from another folder."""
+    """Document whose file names are relative to another folder."""
     if isinstance(value, dict):
         return {
             key: Path(way, item).as_posix() if key == "file" else _moved(item, way)

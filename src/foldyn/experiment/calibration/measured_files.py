@@ -176,10 +176,8 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     time, values = _motions(file, tracks, names, nodes, axis)
     shown = np.isfinite(values).sum(axis=0) != 1
     kept = np.flatnonzero(shown if shown.any() else ~shown)
-    listed = [nodes[k] for k in kept]
-    return _made(
-        TimeHistory, file, nodes=listed, time=time, values=values[:, kept], axis=axis, **known
-    )  # fmt: skip
+    known |= {"nodes": np.array(nodes)[kept].tolist(), "values": values[:, kept]}
+    return _made(TimeHistory, file, time=time, axis=axis, **known)
 
 
 def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
@@ -202,8 +200,8 @@ def _moved(file: Path, tracks: xr.Dataset, along: str) -> xr.DataArray:
 
 def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
     """Nodes and axes of the columns "node 8 x", ..."""
-    found = [re.fullmatch(rf"node (\d+) ([{AXES}])", name) for name in names]
-    return [(int(one[1]), one[2]) for one in found if one]
+    headings = [re.fullmatch(rf"node (\d+) ([{AXES}])", name) for name in names]
+    return [(int(heading[1]), heading[2]) for heading in headings if heading]
 
 
 def _motions(
