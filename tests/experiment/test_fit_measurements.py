@@ -78,7 +78,7 @@ def test_forces_and_shapes_are_checked() -> None:
         ([history(nodes=[0, 1])], "values: are of 1 nodes, 2 are named"),
         ([history(nodes=[99])], "node 99 is out of range"),
         ([history(delay=0.1)], "time: 0.1 to 2.05 s, delay included, is not within the motion"),
-        ([history(), history()], "sigma: missing; several measurements are weighed"),
+        ([history(), history()], "sigma: missing; several measurements are weighted"),
         ([ForceDisplacement(displacement=[1], force=[1])], 'needs a case of kind "statics"'),
         ([history(held_out=True)], "0 values that are not held out cannot give 1 parameters"),
         ([history(case="none.toml")], "none.toml: there is no such file"),
