@@ -7,9 +7,7 @@ import pytest
 
 from foldyn.errors import InputError
 from foldyn.experiment import Parameter
-from foldyn.experiment.calibration.key_paths import parts, replaced, value_at
-from foldyn.experiment.calibration.parameters import space
-from foldyn.experiment.calibration.ties import Tie
+from foldyn.experiment.calibration.parameters import Tie, parts, replaced, space, value_at
 
 DOCUMENT = {
     "sheet": {"thickness": 0.01, "length_scale_ratio": 2.0},

@@ -58,7 +58,7 @@ def _ffmpeg() -> str:
 
 
 def _opencv() -> str:
-    from foldyn.experiment.opencv import opencv
+    from foldyn.experiment.camera import opencv
 
     try:
         return f"found: {opencv().__version__}"

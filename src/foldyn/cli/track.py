@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     import xarray
 
-    from foldyn.experiment import Model, Tracking
+    from foldyn.experiment import TrackedModel, Tracking
 
 _SHOWN = 3  # nodes in the figure of histories
 _KEPT = "\nfoldyn: kept what was computed: "
@@ -150,16 +150,16 @@ def wholes(name: str, text: str, count: int | None = None) -> list[int]:
     return [whole_number(name, int(value)) for value in values]
 
 
-def model_of(name: str) -> Model:
+def model_of(name: str) -> TrackedModel:
     """Model of a result, of a case at rest, or with all states of the path of a static case."""
     import foldyn as fd
-    from foldyn.experiment import Model
+    from foldyn.experiment import TrackedModel
 
     if name.endswith(".nc"):
-        return Model.of(fd.load(name))
+        return TrackedModel.of(fd.load(name))
     case_file = fd.read_case(find_case(name))
     static = case_file.analysis.kind == "statics"
-    return Model.of(case_file.run() if static else case_file.case())
+    return TrackedModel.of(case_file.run() if static else case_file.case())
 
 
 def summary(ds: xarray.Dataset) -> str:

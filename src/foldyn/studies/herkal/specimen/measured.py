@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
+from foldyn.experiment import ForceDisplacement, Measurement, TimeHistory, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
 from foldyn.experiment.tracking.films import PHOTOS
 from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL
@@ -123,7 +123,7 @@ def _kind(file: Path) -> str:
     if isinstance(told, ForceDisplacement):
         _check_forces(told)
         return "static"
-    if not isinstance(told, History):
+    if not isinstance(told, TimeHistory):
         raise InputError(
             "shapes without forces say nothing of the stiffness; give forces over displacements, "
             "or tracks of photographs with loads (*.nc)"
