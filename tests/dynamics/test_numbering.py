@@ -7,8 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
-from foldyn.dynamics.numbering import renumbered
-from foldyn.mechanics import renumber
+from foldyn.mechanics.renumber import renumber, renumbered
 from foldyn.structures import body
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)

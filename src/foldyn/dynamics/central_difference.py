@@ -11,9 +11,8 @@ import numpy as np
 
 from foldyn.dynamics.course import Outcome, observe, tell
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 2
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.system import record
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.mechanics import largest, part, total, wait
+from foldyn.mechanics.threads import largest, part, total, wait
 
 
 class Outcome(IntEnum):

@@ -18,9 +18,9 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
-from foldyn.dynamics.numbering import Numbering
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.renumber import Numbering
 
 
 class Damping(NamedTuple):

@@ -13,9 +13,8 @@ import numpy as np
 from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 5
 

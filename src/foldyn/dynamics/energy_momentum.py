@@ -30,9 +30,8 @@ from foldyn.dynamics.implicit.discrete_gradient import (
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import times_mass
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import Course, Plan, Samples
 from foldyn.dynamics.system import Packed, scratches
-from foldyn.mechanics import run_together
+from foldyn.mechanics.threads import run_together
 
 
 class Engine(Protocol):

@@ -30,12 +30,12 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
-from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.jit.flat import flat
-from foldyn.mechanics import wait
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import energies_of, force_of
+from foldyn.mechanics.renumber import Numbering, renumbered
+from foldyn.mechanics.threads import wait
 
 
 class Entries(NamedTuple):

@@ -124,7 +124,7 @@ class Body(ABC):
 
     @abstractmethod
     def blocks(self) -> Blocks:
-        """The same for implicit integrators; see `mechanics.blocks`."""
+        """The same for implicit integrators; see `mechanics.step_tangent`."""
 
     @abstractmethod
     def workspaces(self, threads: int) -> Sequence[Any]:

@@ -12,8 +12,8 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.blocks import SparseBlocks
 from foldyn.mechanics.body import Body, SoftHinges, largest_turn
+from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.balance import balanced_rotations
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
 from foldyn.shells.sparsity import ShellPattern, shell_pattern

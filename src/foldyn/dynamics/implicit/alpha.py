@@ -28,9 +28,8 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 NONE: Mapping[str, float] = {}
 TOLERANCE = 1e-7  # of the residual; see `Scheme`

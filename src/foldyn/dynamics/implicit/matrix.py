@@ -19,7 +19,7 @@ from foldyn.algebra.choice import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
 from foldyn.mechanics import Sparsity
 
 

@@ -14,7 +14,7 @@ from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
 
 EPS = float(np.finfo(float).eps)
 
