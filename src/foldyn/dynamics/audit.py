@@ -41,6 +41,12 @@ def energy_scale(energy: NDArray) -> float:
     return float(np.nanmax(np.abs(moving)))
 
 
+def relative_errors(energy: NDArray) -> NDArray:
+    """Energy errors over the energies at play, per sample; 0 where nothing is at play."""
+    scale = energy_scale(energy) if len(energy) else 0.0
+    return np.abs(energy_error(energy)) / scale if scale > 0.0 else np.zeros(len(energy))
+
+
 class Rounding:
     """What rounding hides in the motions of a body."""
 
@@ -58,7 +64,7 @@ class Rounding:
         turns = self._moment * ANGLE * min(strain, math.pi)
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
 
-    def told_by(self, energy: NDArray, moved: float) -> bool:
+    def reveals(self, energy: NDArray, moved: float) -> bool:
         """Whether an error as large as the energies at play tells that a motion is unstable.
 
         The first steps under a load that begins slowly may miss what little there is by far:

@@ -27,7 +27,7 @@ class Outcome(IntEnum):
 WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
 
 
-class Plan(NamedTuple):
+class StepPlan(NamedTuple):
     """Steps and samples. With a fixed step, step n is at start + n dt; `end` serves the others."""
 
     start: float  # s

@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -14,23 +13,21 @@ from numpy.typing import NDArray
 from foldyn.algebra.fill import check_fill
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import generalized_alpha
-from foldyn.dynamics.choice import AUTO, choose
-from foldyn.dynamics.course import Plan
-from foldyn.dynamics.critical_step import critical_step
+from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
+from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
+from foldyn.dynamics.method_choice import AUTO, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
 from foldyn.dynamics.sampling import Sampler
-from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.timing import (
     check_samples,
     counted_in_seconds,
     expected_samples,
     fixed_steps,
-    positive,
     variable_steps,
 )
 from foldyn.errors import FoldynWarning, InputError
@@ -159,7 +156,7 @@ def prepare(
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of("rk4") if method == AUTO else suited(method, case.structure)
-    positive("duration", duration)
+    number("duration", duration, above=0.0)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
     if not len(case.free_dofs):
@@ -178,9 +175,9 @@ def prepare(
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.structure.mass):
         check_mass(case.structure.mass, case.fixed)
-    critical = critical_step(case, method, u)
+    critical = integrator.critical_step(case, u)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
-    _warn_of_damping(case, method, u, critical)
+    _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, u)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
@@ -213,9 +210,8 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u)
-    beginning = partial(begin, case, u, v, plan, packed)
     sampler = Sampler(case, sample or {}, u, v, plan.start)
-    return Motion(case, integrator, plan, critical, force, beginning, packed, sampler, reason)
+    return Motion(case, integrator, plan, critical, force, (u, v), packed, sampler, reason)
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:
@@ -235,10 +231,10 @@ def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrato
 def _plan(
     case: Case, method: Integrator, duration: float, dt: float | None, every: int | float,
     critical: float, force: bool, tolerance: float | None, start: float,
-) -> Plan:  # fmt: skip
+) -> StepPlan:  # fmt: skip
     """Steps and samples that the arguments of `simulate` ask for."""
     if tolerance is not None:
-        positive("tolerance", tolerance)
+        number("tolerance", tolerance, above=0.0)
         if not method.adaptive and not method.implicit:
             raise InputError(
                 f" = {tolerance!r}: {method.name} has fixed steps; give dt, or choose "
@@ -253,11 +249,11 @@ def _plan(
     return fixed_steps(duration, dt, every, critical, start)
 
 
-def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
+def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:
     """Say so where stiffness-proportional damping makes an explicit step very small."""
     if case.damping.beta == 0.0 or not math.isfinite(critical):
         return
-    without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
+    without = method.critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), u)
     if without > DAMPING_COST * critical:
         warnings.warn(
             f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "

@@ -12,15 +12,14 @@ Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import add_viscous, drag, drag_works, viscous_work
-from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.discrete_gradient import (
     add_bar_forces,
     add_bar_tangent,
@@ -28,83 +27,72 @@ from foldyn.dynamics.implicit.discrete_gradient import (
     add_hinge_tangent,
 )
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
+from foldyn.dynamics.implicit.scheme import Scheme, clear_supported, load_square
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
 ORDER = 2
-TOLERANCE = 1e-11  # of the residual: what is left of it is energy
 
 
-class EnergyMomentum:
-    """Steps of the method; see `implicit.scheme.Scheme`."""
+class EnergyMomentum(Scheme):
+    """Steps of the method; see `Scheme`."""
 
     symmetric = False
-    tolerance = TOLERANCE
-    facts: Mapping[str, float] = {}
+    tolerance = 1e-11  # what is left of the residual is energy
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
-        self._stress, self._start = np.zeros((2, len(bench.packed.model.bars)))
+    def __init__(self, packed: Packed, course: Course) -> None:
+        super().__init__(packed, course)
+        self._stress, self._start = np.zeros((2, len(packed.model.bars)))
         self._before = 0.0  # the last step, s
 
     def begin(self, t: float) -> None:
         """See `Scheme`."""
-        self.bench.begin(t)
+        super().begin(t)
         self._before = 0.0
 
     def accept(self, h: float) -> None:
         """See `Scheme`."""
-        self.bench.accept(h)
+        super().accept(h)
         self._before = h
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`."""
-        return Weights(1.0, (2.0 / h + self.bench.packed.system.damping.alpha) / h, 1.0 / h)
+        return Weights(1.0, (2.0 / h + self.packed.system.damping.alpha) / h, 1.0 / h)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
-        b, packed = self.bench, self.bench.packed
         return residual(
-            packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.shift, b.out,
-            b.course.angle, b.work.angle, b.scratch,
+            *self.packed.arrays, h, t, self.old, self.new, self.shift, self.out, self.course.angle,
+            self.work.angle, self.scratch,
         )  # fmt: skip
-
-    def keep_on(
-        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
-        most: int,
-    ) -> tuple[int, float, int] | None:  # fmt: skip
-        """See `Scheme`; its matrices are not symmetric."""
-        return None
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        b, model, pattern = self.bench, self.bench.packed.model, matrix.pattern
-        u0, u1 = b.displacement(), b.moved()
+        model, pattern, angle = self.packed.model, matrix.pattern, self.course.angle
+        u0, u1 = self.displacement(), self.moved()
         expected_stress(model, u0, u0, False, self._start)
         expected_stress(model, u1, before, again, self._stress)
         stress = 0.5 * (self._start + self._stress)
         matrix.stiffness[:] = 0.0
         add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, matrix.stiffness)
-        slots = pattern.hinge_slots
-        add_hinge_tangent(model, u0, u1, b.course.angle, FLOOR, slots, matrix.stiffness)
+        add_hinge_tangent(model, u0, u1, angle, FLOOR, pattern.hinge_slots, matrix.stiffness)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
-        b, packed = self.bench, self.bench.packed
-        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
-        if packed.system.turns:
-            u0, u1 = b.displacement(), b.moved()
-            done += _actuation(packed.model, packed.system, b.old, b.new, u0, u1, b.scratch)
+        (model, system, mass), old, new = self.packed.arrays, self.old, self.new
+        done, lost = _works(system, mass, h, old, new, self.shift, self.scratch)
+        if system.turns:
+            u0, u1 = self.displacement(), self.moved()
+            done += _actuation(model, system, old, new, u0, u1, self.scratch)
         return done, lost
 
     def change(self, h: float) -> NDArray:
         """See `Scheme`: accelerations belong to the middle of the steps."""
-        old, new = self.bench.old, self.bench.new
-        return h**3 / (6.0 * (h + self._before)) * (new.a - old.a)
+        return h**3 / (6.0 * (h + self._before)) * (self.new.a - self.old.a)
 
 
 @kernel

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CALLED
-from foldyn.dynamics.course import Plan
+from foldyn.dynamics.course import StepPlan
 from foldyn.errors import FoldynWarning, InputError
 
 NOTICED = 0.01  # part of a load that is not seen, above which the user is told
@@ -65,7 +65,7 @@ def warn_of_functions(case: Case, stacklevel: int) -> None:
 
 
 def warn_of_coarse_steps(
-    case: Case, plan: Plan, looks: tuple[float, ...], memory: int, jumps: bool, stacklevel: int
+    case: Case, plan: StepPlan, looks: tuple[float, ...], memory: int, jumps: bool, stacklevel: int
 ) -> None:
     """Warn where steps of dt do not see a history as it is.
 
@@ -91,7 +91,7 @@ def warn_of_coarse_steps(
 
 
 def overlooked(
-    history: History, plan: Plan, looks: tuple[float, ...], memory: int, jumps: bool
+    history: History, plan: StepPlan, looks: tuple[float, ...], memory: int, jumps: bool
 ) -> float:
     """Part of a history that fixed steps do not see; see `warn_of_coarse_steps`.
 
@@ -112,7 +112,7 @@ def overlooked(
     return unseen / whole if whole > 0.0 else 0.0
 
 
-def _stretches(history: History, plan: Plan, memory: int) -> list[tuple[int, int]]:
+def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int, int]]:
     """Stretches of steps (first, last) that are looked at: all, or those where most may happen."""
     turns = history.knots()
     most = MOST_CALLS if turns is None else MOST_STEPS

@@ -98,6 +98,11 @@ class Packed(NamedTuple):
         """The arrays of the body's kernels."""
         return self.body.model
 
+    @property
+    def arrays(self) -> tuple[Any, System, Inertia]:
+        """What compiled loops take first."""
+        return self.model, self.system, self.mass
+
 
 def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads.

@@ -8,7 +8,7 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import Plan
+from foldyn.dynamics.course import StepPlan
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
 from foldyn.values import number, show, whole
@@ -19,20 +19,15 @@ SAME_TIME = 1e-12  # of the largest time: stops as near as that are one
 NO_STOPS = np.zeros(0)
 
 
-def positive(name: str, value: object) -> float:
-    """Return a positive finite number, or refuse it."""
-    return number(name, value, above=0.0)
-
-
 def fixed_steps(
     duration: float, dt: float | None, every: int | float, critical: float, start: float = 0.0
-) -> Plan:
+) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
     `every` counts steps if it is an int and seconds if it is a float. Without `dt` the step is
     half the critical one, shortened so that it divides the sampling interval and the duration.
     """
-    duration = positive("duration", duration)
+    duration = number("duration", duration, above=0.0)
     in_seconds = counted_in_seconds(duration, every)
     if dt is None:
         target = DEFAULT_FRACTION * critical
@@ -57,19 +52,19 @@ def fixed_steps(
     if per_sample > steps:
         raise InputError(f" = {every}: longer than the motion of {steps} steps", "every")
     interval = per_sample * dt
-    return Plan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
+    return StepPlan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
 
 
 def variable_steps(
     duration: float, dt: float | None, every: int | float, largest: float, start: float,
     tolerance: float, floor: float = 0.0, knots: NDArray = NO_STOPS,
-) -> Plan:  # fmt: skip
-    """Plan of a motion whose steps follow their error; `dt` is the largest step.
+) -> StepPlan:  # fmt: skip
+    """StepPlan of a motion whose steps follow their error; `dt` is the largest step.
 
     Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that
     lie within the motion and that time can tell apart.
     """
-    duration = positive("duration", duration)
+    duration = number("duration", duration, above=0.0)
     in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
@@ -78,10 +73,10 @@ def variable_steps(
     within = np.sort(knots[(knots > start) & (knots < end)])
     apart = np.diff(within, prepend=start) > SAME_TIME * max(abs(start), abs(end))
     per_sample = 0 if in_seconds else int(every)
-    return Plan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
+    return StepPlan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
 
 
-def expected_samples(plan: Plan) -> int:
+def expected_samples(plan: StepPlan) -> int:
     """Number of samples, the first at the start; where steps vary and are counted, the least."""
     if plan.steps:
         return plan.steps // plan.every + 1
@@ -97,13 +92,13 @@ def counted_in_seconds(duration: float, every: int | float) -> bool:
     if isinstance(every, Integral):
         whole("every", every, least=1, what="steps")
         return False
-    if positive("every", every) > duration * (1.0 + 1e-9):
+    if number("every", every, above=0.0) > duration * (1.0 + 1e-9):
         raise InputError(f" = {every:g} s: longer than the duration of {duration:g} s", "every")
     return True
 
 
 def _given_step(duration: float, dt: float) -> float:
-    dt = positive("dt", dt)
+    dt = number("dt", dt, above=0.0)
     _check_count(duration, dt)
     if dt > duration * (1.0 + 1e-9):
         raise InputError(f" = {dt:g} s: longer than the duration of {duration:g} s", "dt")

@@ -11,14 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.dynamics.implicit.convergence import (
-    GO_ON,
-    NEW_MATRIX,
-    NOT_CONVERGED,
-    SOLVED,
-    Goal,
-    judge,
-)
+from foldyn.dynamics.implicit.convergence import NEW_MATRIX, NOT_CONVERGED, SOLVED, Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.scheme import Scheme
 
@@ -38,15 +31,15 @@ class Newton:
 
     def prepare(self, h: float, t: float) -> None:
         """Have everything compiled that a step needs."""
-        scheme, bench = self.scheme, self.scheme.bench
-        bench.shift[:] = 0.0
+        scheme = self.scheme
+        scheme.shift[:] = 0.0
         scheme.residual(h, t)
-        scheme.tangent(self.matrix, bench.displacement(), False)
+        scheme.tangent(self.matrix, scheme.displacement(), False)
         scheme.works(h)
 
     def renew(self, h: float) -> bool:
         """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
-        self.scheme.tangent(self.matrix, self.scheme.bench.displacement(), False)
+        self.scheme.tangent(self.matrix, self.scheme.displacement(), False)
         try:
             self.matrix.factorize(self.scheme.weights(h))
         except SingularTangentError:
@@ -55,55 +48,35 @@ class Newton:
         return True
 
     def solve(self, h: float, t: float) -> int:
-        """Move bench.shift from its prediction to equilibrium at the end t of a step h (s).
+        """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
 
         Returns `SOLVED`, or why not.
         """
-        scheme, bench, matrix = self.scheme, self.scheme.bench, self.matrix
-        goal = Goal(scheme.tolerance, bench.hinge_forces(), bench.rounding)
+        scheme, matrix = self.scheme, self.matrix
+        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
         kept = self._lasting and abs(h - self._h) < SAME_STEP * h
         last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
-        before, again = bench.displacement().copy(), False
+        before, again = scheme.displacement().copy(), False
         while left > 0:
-            found, norm, steps = self._keep_on(goal, h, t, last, lowest, left)
+            verdict, norm, steps = scheme.iterate(matrix, goal, h, t, last, lowest, left)
             self.iterations += steps
             self.evaluations += steps + 1
             left, again = left - steps, again or steps > 0
-            if found != NEW_MATRIX:
-                self._lasting = found == SOLVED and matrix.factorizations <= made + 1
-                return found
+            if verdict != NEW_MATRIX:
+                self._lasting = verdict == SOLVED and matrix.factorizations <= made + 1
+                return verdict
             lowest = min(lowest, norm)
             if again:
-                before = bench.carried(bench.earlier, bench.new.factor)
+                before = scheme.carried(scheme.earlier, scheme.new.factor)
             scheme.tangent(matrix, before, again)
             try:
                 matrix.factorize(scheme.weights(h))
             except SingularTangentError:
                 break
             self._h, last, again = h, norm, True
-            bench.earlier[:] = bench.new.q
-            bench.shift -= matrix.solve(bench.out, bench.step)
+            scheme.earlier[:] = scheme.new.q
+            scheme.shift -= matrix.solve(scheme.out, scheme.step)
             self.iterations += 1
             left -= 1
         self._lasting = False
         return NOT_CONVERGED
-
-    def _keep_on(
-        self, goal: Goal, h: float, t: float, last: float, lowest: float, most: int
-    ) -> tuple[int, float, int]:
-        """Iterate with the matrix as it is; returns what was found, the residual, and how often."""
-        scheme, bench = self.scheme, self.scheme.bench
-        if self.matrix.band is not None:
-            whole = scheme.keep_on(self.matrix, goal, h, t, last, lowest, most)
-            if whole is not None:
-                return whole
-        norm = np.inf
-        for steps in range(most):
-            norm, reference = scheme.residual(h, t)
-            found = judge(goal, norm, reference, last, lowest)
-            if found != GO_ON:
-                return found, norm, steps
-            lowest, last = min(lowest, norm), norm
-            bench.earlier[:] = bench.new.q
-            bench.shift -= self.matrix.solve(bench.out, bench.step)
-        return NOT_CONVERGED, norm, most

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.implicit.convergence import Goal
+from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
@@ -29,67 +30,8 @@ class Phase(NamedTuple):
     factor: NDArray  # (h, 3) of the histories
 
 
-class Scheme(Protocol):
-    """A step from `old` to `new`, whose unknown is the displacement in it, bench.shift.
-
-    Attributes
-    ----------
-    symmetric : bool
-        Whether its tangent is.
-    tolerance : float
-        Residual, relative to the forces at play, with which a step is accepted.
-    bench : Bench
-    facts : mapping
-        Its parameters, for the result's attributes.
-    """
-
-    symmetric: bool
-    tolerance: float
-    bench: Bench
-    facts: Mapping[str, float]
-
-    def begin(self, t: float) -> None:
-        """Make bench.old the beginning of a motion, or of its part after a jump, at t (s)."""
-        ...
-
-    def weights(self, h: float) -> Weights:
-        """Factors of the matrices for a step h (s)."""
-        ...
-
-    def residual(self, h: float, t: float) -> tuple[float, float]:
-        """Out-of-balance force of the step to the time t (s), into bench.out.
-
-        Makes `new` what belongs to bench.shift. Returns the norm of the force on the free dofs
-        and that of the forces at play, N.
-        """
-        ...
-
-    def keep_on(
-        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
-        most: int,
-    ) -> tuple[int, float, int] | None:  # fmt: skip
-        """`Newton._keep_on` as one compiled function for matrices with a `band`, or None."""
-        ...
-
-    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
-        """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
-        ...
-
-    def works(self, h: float) -> tuple[float, float]:
-        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
-        ...
-
-    def change(self, h: float) -> NDArray:
-        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
-        ...
-
-    def accept(self, h: float) -> None:
-        """Make the end of the step the beginning of the next one."""
-        ...
-
-
-class Bench:
-    """Arrays and compiled parts that the steps of a motion work with.
+class Scheme(ABC):
+    """Steps from `old` to `new`, whose unknown is the displacement in a step, `shift`.
 
     Parameters
     ----------
@@ -97,7 +39,20 @@ class Bench:
         The case.
     course : Course
         Where the motion stands: q, w and a of `old` are its arrays.
+
+    Attributes
+    ----------
+    symmetric : bool
+        Whether the tangent is.
+    tolerance : float
+        Residual, relative to the forces at play, with which a step is accepted.
+    facts : mapping
+        Parameters, for the result's attributes.
     """
+
+    symmetric: ClassVar[bool]
+    tolerance: ClassVar[float]
+    facts: Mapping[str, float] = {}
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
@@ -117,11 +72,50 @@ class Bench:
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
         self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
 
+    @abstractmethod
+    def weights(self, h: float) -> Weights:
+        """Factors of the matrices for a step h (s)."""
+
+    @abstractmethod
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """Out-of-balance force of the step to the time t (s), into `out`.
+
+        Makes `new` what belongs to `shift`. Returns the norm of the force on the free dofs and that
+        of the forces at play, N.
+        """
+
+    @abstractmethod
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
+
+    @abstractmethod
+    def works(self, h: float) -> tuple[float, float]:
+        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
+
+    @abstractmethod
+    def change(self, h: float) -> NDArray:
+        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
+
+    def iterate(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int]:  # fmt: skip
+        """Iterate with the matrix as it is; returns what `judge` says, the residual, how often."""
+        norm = np.inf
+        for steps in range(most):
+            norm, reference = self.residual(h, t)
+            verdict = judge(goal, norm, reference, last, lowest)
+            if verdict != GO_ON:
+                return verdict, norm, steps
+            lowest, last = min(lowest, norm), norm
+            self.earlier[:] = self.new.q
+            self.shift -= matrix.solve(self.out, self.step)
+        return NOT_CONVERGED, norm, most
+
     def begin(self, t: float) -> None:
-        """Make forces and accelerations of `old` those at the time t (s)."""
+        """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        packed = self.packed
-        acceleration(packed.model, packed.system, packed.mass, old.q, old.w, t, old.a, self.work, s)
+        acceleration(*self.packed.arrays, old.q, old.w, t, old.a, self.work, s)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -164,12 +158,11 @@ class Bench:
 
     def push(self, phase: Phase, change: NDArray) -> NDArray:
         """Force (n, 3) that a change (h,) of the factors exerts at a phase, N; uses `out`."""
-        packed, s = self.packed, self.scratch
-        model, system, mass = packed.model, packed.system, packed.mass
+        s = self.scratch
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
             s.factor[:, 0] += moved
-            acceleration(model, system, mass, phase.q, phase.w, 0.0, self.earlier, self.work, s)
+            acceleration(*self.packed.arrays, phase.q, phase.w, 0.0, self.earlier, self.work, s)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out
@@ -184,7 +177,7 @@ class Bench:
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
     def accept(self, h: float) -> None:
-        """Make `new` the `old` one."""
+        """Make the end of a step h (s) the beginning of the next one."""
         speed = self.shift / h
         self._growth[:] = (speed - self._speed) / (0.5 * (h + self._last))
         self._speed[:], self._last = speed, h
