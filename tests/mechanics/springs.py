@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import foldyn as fd
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.jit.compiled import kernel
 from foldyn.materials import hinge_law
 from foldyn.mechanics.body import Body

@@ -23,18 +23,12 @@ def growth(omega, damping, dt):
     Spectral radius of the step as a matrix on (u, v, a).
     """
     w, c = np.broadcast_arrays(omega * dt, damping * dt)
-    one, zero = np.ones_like(w), np.zeros_like(w)
+    one = np.ones_like(w)
     # in units of the step: u' = u + v + a/2, a' = -w^2 u' - c (v + a), v' = v + (a + a')/2
     a_row = [-(w**2), -(w**2) - c, -0.5 * w**2 - c]
-    step = np.stack(
-        [
-            np.stack([one, one, 0.5 * one], -1),
-            np.stack([0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]], -1),
-            np.stack([*a_row[:2], a_row[2] + zero], -1),
-        ],
-        -2,
-    )
-    return np.abs(np.linalg.eigvals(step)).max(axis=-1)
+    v_row = [0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]]
+    step = np.array([[one, one, 0.5 * one], v_row, a_row])
+    return np.abs(np.linalg.eigvals(np.moveaxis(step, (0, 1), (-2, -1)))).max(axis=-1)
 
 
 @shared

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Rayleigh, State
 from foldyn.dynamics import generalized_alpha
 from foldyn.dynamics.course import StepPlan

@@ -11,8 +11,6 @@ Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not r
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,9 +25,9 @@ from foldyn.dynamics.implicit.discrete_gradient import (
     add_hinge_tangent,
 )
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Scheme, clear_supported, load_square
+from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.system import Packed, carry
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
@@ -121,8 +119,8 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     mean = 0.5 * (old.factor + new.factor)
     if system.turns:
         turn(model, system.actuators, mean)
-    _place(system.moved, old, s.displacement)
-    _place(system.moved, new, s.velocity)
+    carry(system.moved, old.factor, 0, old.q, s.displacement)
+    carry(system.moved, new.factor, 0, new.q, s.velocity)
     new.force[:] = 0.0
     add_bar_forces(model, s.displacement, s.velocity, new.force)
     add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
@@ -140,27 +138,13 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     for i in range(q0.size):
         inertia += left[i] * left[i]
         left[i] += bracket[i]
-    reference = max(inertia, clear_supported(system, out), load_square(system, mean))
-    norm = 0.0
-    for i in range(q0.size):
-        norm += left[i] * left[i]
-    return math.sqrt(norm), math.sqrt(reference)
-
-
-@kernel
-def _place(moved, phase, out):
-    """Displacement (n, 3) of a phase with that of the supports."""
-    u, q = flat(out), flat(phase.q)
-    for i in range(u.size):
-        u[i] = q[i]
-    for k in range(moved.dof.size):
-        u[moved.dof[k]] += moved.value[k] * phase.factor[moved.row[k], 0]
+    return norms(system, out, inertia, mean)
 
 
 @kernel
 def _works(system, mass, h, old, new, shift, s):
     """Work put in and energy dissipated in a step."""
-    moved, loads, bracket = system.moved, system.loads, flat(new.force)
+    moved, bracket = system.moved, flat(new.force)
     du, speed = flat(s.displacement), flat(s.moving)
     for i in range(du.size):
         du[i] = flat(shift)[i]
@@ -173,10 +157,7 @@ def _works(system, mass, h, old, new, shift, s):
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
         du[dof] += along
         done += bracket[dof] * along
-    for k in range(loads.dof.size):
-        row = loads.row[k]
-        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
-        done += loads.value[k] * mean * du[loads.dof[k]]
+    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.displacement, s.displacement) / h
 
 

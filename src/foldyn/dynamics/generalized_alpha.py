@@ -30,9 +30,16 @@ from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import drag, drag_works, viscous_work
-from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Scheme, clear_supported, load_square
+from foldyn.dynamics.implicit.scheme import (
+    GO_ON,
+    NOT_CONVERGED,
+    Goal,
+    Scheme,
+    add_load_work,
+    judge,
+    norms,
+)
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
@@ -164,11 +171,7 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     for i in range(q0.size):
         inertia += left[i] * left[i]
         left[i] += (1.0 - af) * b1[i] + af * b0[i]
-    reference = max(inertia, clear_supported(system, out), load_square(system, s.factor))
-    norm = 0.0
-    for i in range(q0.size):
-        norm += left[i] * left[i]
-    return np.sqrt(norm), np.sqrt(reference)
+    return norms(system, out, inertia, s.factor)
 
 
 @kernel
@@ -201,7 +204,7 @@ def _works(system, mass, h, old, new, shift, s):
     """Work put in and energy dissipated in a step."""
     du = flat(s.displacement)
     v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
-    moved, loads = system.moved, system.loads
+    moved = system.moved
     for i in range(du.size):
         du[i] = flat(shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
@@ -214,10 +217,7 @@ def _works(system, mass, h, old, new, shift, s):
         du[dof] += along
         flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
         done += 0.5 * (b0[dof] + b1[dof]) * along
-    for k in range(loads.dof.size):
-        row = loads.row[k]
-        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
-        done += loads.value[k] * mean * du[loads.dof[k]]
+    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
 
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg
 
+from foldyn.algebra.superlu import factorize
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar, summing
 
@@ -67,15 +67,8 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         factor_of_axis, factors = np.zeros(3, np.int64), []
     else:
         inverse = np.zeros((0, 3))
-        free = [np.flatnonzero(~fixed[:, axis]) for axis in range(3)]
-        sets: list[NDArray] = []
-        factor_of_axis = np.zeros(3, np.int64)
-        for axis, nodes in enumerate(free):
-            same = [k for k, known in enumerate(sets) if np.array_equal(known, nodes)]
-            factor_of_axis[axis] = same[0] if same else len(sets)
-            if not same:
-                sets.append(nodes)
-        factors = [_factor(mass, nodes) for nodes in sets]
+        distinct, factor_of_axis = np.unique(fixed, axis=1, return_inverse=True)
+        factors = [_factor(mass, np.flatnonzero(~held)) for held in distinct.T]
     return Inertia(
         lumped,
         diagonal,
@@ -83,7 +76,7 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         mass.indptr.astype(np.int64),
         mass.indices.astype(np.int64),
         mass.data.astype(float),
-        factor_of_axis,
+        factor_of_axis.ravel(),
         *_join(factors),
     )
 
@@ -93,9 +86,7 @@ def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
     if not len(nodes):
         empty = sparse.csc_array((0, 0))
         return nodes, nodes, nodes, empty, empty, np.zeros(0)
-    block = sparse.csc_array(mass[nodes][:, nodes])
-    options = {"SymmetricMode": True}
-    lu = linalg.splu(block, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    lu = factorize(sparse.csc_array(mass[nodes][:, nodes]))
     lower, upper = sparse.csc_array(lu.L), sparse.csc_array(lu.U)
     return (
         nodes,

@@ -14,6 +14,7 @@ from foldyn.cases import Case, State
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
+from foldyn.dynamics.resolution import histories
 from foldyn.dynamics.system import Packed, follow, place, scratch
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.contents import check_variable
@@ -79,16 +80,14 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
 
 def check_steady(case: Case, start: float, end: float) -> None:
     """Refuse a support or a fold that is to move in no time."""
-    moved = [("supports: an imposed displacement", term) for term in case.imposed_terms]
-    moved += [("supports: a base motion", term) for term in case.base_terms]
-    moved += [("loads: an actuation", term) for term in case.actuation_terms]
-    for what, (_, history) in moved:
-        for time in history.jumps():
-            if start < time < end:
-                raise InputError(
-                    f"{what} with the history {history.kind} jumps at t = {time:g} s, but nothing "
-                    "moves in no time: use a ramp, a half sine or a table"
-                )
+    for what, history in histories(case):
+        times = [time for time in history.jumps() if start < time < end]
+        if times and what != "a load":
+            section = "loads" if what == "an actuation" else "supports"
+            raise InputError(
+                f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "
+                "but nothing moves in no time: use a ramp, a half sine or a table"
+            )
 
 
 def warn_of_unstable_damping(case: Case, u: NDArray) -> None:

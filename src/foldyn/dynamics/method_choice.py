@@ -19,6 +19,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.resolution import histories
 from foldyn.dynamics.timing import DEFAULT_FRACTION
 
 AUTO = "auto"
@@ -45,7 +46,7 @@ def choose(
 
     dt, every and tolerance are those of `simulate`, default what implicit methods take without.
     """
-    conserved = case.damping.alpha == case.damping.beta == 0.0 and _steady(case)
+    conserved = case.damping.alpha == case.damping.beta == 0.0 and not any(histories(case))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if massless := case.structure.massless:
         return Choice("generalized_alpha", f"implicit: {massless} have no mass")
@@ -77,12 +78,6 @@ def choose(
     if costs[0] <= costs[1]:
         return Choice(explicit, f"explicit: {estimate}")
     return Choice(implicit, f"implicit: {estimate}")
-
-
-def _steady(case: Case) -> bool:
-    """Whether nothing that acts varies in time."""
-    terms = (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms)
-    return all(history.kind == "constant" for _, history in terms)
 
 
 def _explicit_cost(case: Case, evaluations: int) -> float:
@@ -146,11 +141,10 @@ def vibrating_share(
     """
     if v.any() or _out_of_balance(case, u, start):
         return 1.0
-    terms = (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms)
     step = 0.5 * math.pi / omega if omega > 0.0 else duration
     times = start + np.linspace(0.0, duration, min(MOST_TIMES, 2 + math.ceil(duration / step)))
     share = SMOOTH
-    for _, history in terms:
+    for _, history in histories(case):
         turns = [t for t in history.knots() or () if start < t < start + duration]
         if any(start < jump < start + duration for jump in history.jumps()):
             return 1.0

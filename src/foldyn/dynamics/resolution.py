@@ -26,13 +26,14 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
     """Histories of a case that vary, each with what it drives."""
-    terms = [("a load", term) for term in case.load_terms]
-    terms += [("an imposed displacement", term) for term in case.imposed_terms]
-    terms += [("a base motion", term) for term in case.base_terms]
-    terms += [("an actuation", term) for term in case.actuation_terms]
-    for what, (_, history) in terms:
-        if history.kind != "constant":
-            yield what, history
+    driven = {
+        "a load": case.load_terms,
+        "an imposed displacement": case.imposed_terms,
+        "a base motion": case.base_terms,
+        "an actuation": case.actuation_terms,
+    }
+    for what, terms in driven.items():
+        yield from ((what, history) for _, history in terms if history.kind != "constant")
 
 
 def knots(case: Case) -> NDArray[np.float64]:

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse import linalg
 
+from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case, Rayleigh
+from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError
 
 MARGIN = 0.9  # of the stability limit: room for stiffening
@@ -70,7 +72,7 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
     try:
         return _largest_frequency(k, m)
-    except (linalg.ArpackError, np.linalg.LinAlgError, RuntimeError) as error:
+    except (linalg.ArpackError, np.linalg.LinAlgError, SingularTangentError) as error:
         raise ComputationError(
             f"the largest frequency, which the critical step needs, cannot be computed: {error}"
         ) from error
@@ -79,17 +81,13 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
 def _largest_frequency(k: sparse.csr_array, m: sparse.csr_array) -> float:
     if k.shape[0] <= _DENSE:
         values = _dense(k.toarray(), m.toarray())
-    elif _is_diagonal(m):
+    elif is_lumped(m):
         root = sparse.diags_array(1.0 / np.sqrt(m.diagonal()))
         values = _largest(sparse.csr_array(root @ k @ root))
     else:
-        solve = linalg.splu(sparse.csc_array(m)).solve
+        solve = factorize(sparse.csc_array(m), symmetric=False).solve
         values = _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
     return float(np.sqrt(max(values, 0.0)))
-
-
-def _is_diagonal(m: sparse.csr_array) -> bool:
-    return (m - sparse.diags_array(m.diagonal())).count_nonzero() == 0
 
 
 def _dense(k: NDArray, m: NDArray) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
 from foldyn.errors import FoldynWarning

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.choice import factorizer
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
 
 EPS = float(np.finfo(float).eps)

@@ -30,7 +30,7 @@ from foldyn.mechanics.body import Body
 from foldyn.mechanics.energy import bar_extension
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.renumber import node_order, ranks
-from foldyn.mechanics.tangent import Sparsity, add_tangent, sparsity
+from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
 
 FLOOR = 1e-3  # of a hinge's stiffness: its least slope in steps, as in MERLIN2
 
@@ -95,10 +95,7 @@ def _replace_stress(model, u, stress, slots, data):
             value = stress[e] - bar_stress(code, bar_extension(model, u, e), address[1])
             value *= model.bar_stiffness[e]
             for c in range(3):
-                data[slots[e, 0, 0], c, c] += value
-                data[slots[e, 1, 1], c, c] += value
-                data[slots[e, 0, 1], c, c] -= value
-                data[slots[e, 1, 0], c, c] -= value
+                add_to_bar(data, slots, e, c, c, value)
 
 
 class BarsHingesBlocks:
@@ -169,9 +166,7 @@ class SparseBlocks:
     def _places(self, pattern: Sparsity) -> NDArray:
         """Where the entries stand among those of a pattern's blocks."""
         if self._place is None or self._place[0] is not pattern:
-            rows = len(pattern.indptr) - 1
-            node = np.repeat(np.arange(rows), np.diff(pattern.indptr))
-            keys = node * rows + pattern.indices
+            keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
             block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
             self._place = pattern, 9 * block + 3 * (self._row % 3) + self._column % 3
         return self._place[1]

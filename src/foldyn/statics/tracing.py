@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
 from foldyn.results import path_dataset

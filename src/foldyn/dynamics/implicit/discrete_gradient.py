@@ -34,6 +34,7 @@ from foldyn.materials.switch import (
 )
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
+from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
 
 GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # the first of the two points of Gauss's rule
 NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
@@ -238,10 +239,7 @@ def add_bar_tangent(model, u0, u1, stress, slots, data):
                     if p == q:
                         value += 0.5 * stress[e]
                     value *= model.bar_stiffness[e]
-                    data[slots[e, 0, 0], p, q] += value
-                    data[slots[e, 1, 1], p, q] += value
-                    data[slots[e, 0, 1], p, q] -= value
-                    data[slots[e, 1, 0], p, q] -= value
+                    add_to_bar(data, slots, e, p, q, value)
 
 
 @kernel
@@ -269,11 +267,4 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
                 slope = max(slope, 0.5 * floor)
             block[:] = 0.0
             add_hessian(points, plain, 0.5 * k * moment, block)
-            for v in range(4):
-                for w in range(4):
-                    slot = slots[e, v, w]
-                    for a in range(3):
-                        for b in range(3):
-                            data[slot, a, b] += (
-                                block[v, a, w, b] + k * slope * gradient[v, a] * end[w, b]
-                            )
+            add_to_hinge(data, slots, e, block, k * slope, gradient, end)

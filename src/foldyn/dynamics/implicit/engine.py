@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from foldyn.algebra.banded import one_thread
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
-from foldyn.dynamics.implicit import convergence
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.newton import Newton
-from foldyn.dynamics.implicit.scheme import Scheme
+from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
@@ -36,7 +35,7 @@ WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kep
 NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
 LEAST = 0.2  # share of a refused step that is tried next, at least
 MEMORY = 0.9  # share of an error that counts a step later
-OUTCOMES = {convergence.SOLVED: Outcome.DONE, convergence.NOT_FINITE: Outcome.NOT_FINITE}
+OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
 class Implicit:

@@ -11,9 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.algebra.superlu import SingularTangentError
-from foldyn.dynamics.implicit.convergence import NEW_MATRIX, NOT_CONVERGED, SOLVED, Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix
-from foldyn.dynamics.implicit.scheme import Scheme
+from foldyn.dynamics.implicit.scheme import NEW_MATRIX, NOT_CONVERGED, SOLVED, Goal, Scheme
 
 MOST = 25  # iterations
 SAME_STEP = 1e-3  # relative difference of steps that may share a matrix

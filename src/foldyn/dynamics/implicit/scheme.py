@@ -1,4 +1,4 @@
-"""What an implicit scheme provides, and what its steps share."""
+"""What an implicit scheme provides, what its steps share, and when their equations are solved."""
 
 from __future__ import annotations
 
@@ -11,13 +11,47 @@ from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.implicit.convergence import GO_ON, NOT_CONVERGED, Goal, judge
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 
 EPS = float(np.finfo(float).eps)
+FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
+GROWTH = 1e8  # of the residual, at which the iteration has lost its way
+# what is left where the residual no longer falls: rounding, if it is below one of these
+ENOUGH = 1e-8  # of the forces at play
+ROUNDING = 8.0  # times the rounding of the bars' forces
+STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
+
+SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
+
+
+class Goal(NamedTuple):
+    """What the residual is judged by, N."""
+
+    tolerance: float  # relative to the forces at play
+    least: float  # forces at play at least
+    rounding: float  # of the bars' forces
+
+
+@kernel
+def judge(goal, norm, reference, last, lowest):
+    """What to do next: the residual (N) is `norm`, it was `last`, and `lowest` at its best.
+
+    reference : forces at play, N.
+    last : 0 where there is no matrix yet, inf before the first iteration with an old one.
+    """
+    if not norm < np.inf:
+        return NOT_FINITE
+    forces = max(reference, goal.least)
+    if norm <= goal.tolerance * forces:
+        return SOLVED
+    if norm > STALL * last and norm <= max(ENOUGH * forces, ROUNDING * goal.rounding) and last > 0:
+        return SOLVED
+    if norm > GROWTH * lowest:
+        return NOT_CONVERGED
+    return NEW_MATRIX if norm > FAST * last else GO_ON
 
 
 class Phase(NamedTuple):
@@ -187,21 +221,34 @@ class Scheme(ABC):
 
 
 @kernel
-def clear_supported(system, force):
-    """Sum of squares of a force (n, 3) at the supports, N2, where it becomes zero."""
-    values, total = flat(force), 0.0
+def norms(system, force, inertia, factor):
+    """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
+
+    The force becomes zero at the supports, where it is a reaction.
+
+    inertia : sum of squares of the inertial forces, N2.
+    factor : (h, 3) of the histories, for the loads.
+    """
+    values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
     for k in range(system.supported.size):
         dof = system.supported[k]
-        total += values[dof] * values[dof]
+        reactions += values[dof] * values[dof]
         values[dof] = 0.0
-    return total
+    loads = system.loads
+    for k in range(loads.dof.size):
+        load = loads.value[k] * factor[loads.row[k], 0]
+        pushed += load * load
+    for i in range(values.size):
+        left += values[i] * values[i]
+    return np.sqrt(left), np.sqrt(max(inertia, reactions, pushed))
 
 
 @kernel
-def load_square(system, factor):
-    """Sum of squares of the loads for factors (h, 3), N2."""
-    loads, total = system.loads, 0.0
+def add_load_work(loads, before, after, shift, work):
+    """`work` (J) and that of the loads along a shift (n, 3), for factors (h, 3) at its ends."""
+    along = flat(shift)
     for k in range(loads.dof.size):
-        load = loads.value[k] * factor[loads.row[k], 0]
-        total += load * load
-    return total
+        row = loads.row[k]
+        mean = 0.5 * (before[row, 0] + after[row, 0])
+        work += loads.value[k] * mean * along[loads.dof[k]]
+    return work
