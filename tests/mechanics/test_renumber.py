@@ -10,8 +10,7 @@ from test_blocks import force_of, random_model
 import foldyn as fd
 from foldyn import mechanics
 from foldyn.materials import CustomHingeLaw
-from foldyn.mechanics.model import GROUP
-from foldyn.mechanics.renumber import node_order, renumber
+from foldyn.mechanics.model import GROUP, node_order, renumber
 from foldyn.mechanics.strips import reach
 
 CUBIC = CustomHingeLaw(

@@ -19,7 +19,7 @@ from foldyn.jit.intrinsics import borrowed
 from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics import force as force_module
 from foldyn.mechanics import threads as threads_module
-from foldyn.mechanics.renumber import node_order, renumber
+from foldyn.mechanics.model import node_order, renumber
 from foldyn.mechanics.strips import reach, shares, strips
 from foldyn.mechanics.threads import BROKEN, part, run_together, team, wait
 

@@ -20,7 +20,7 @@ from foldyn.cases import Case
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.renumber import Numbering
+from foldyn.mechanics.body import Numbering
 
 
 class Damping(NamedTuple):
@@ -77,7 +77,8 @@ def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
         return 0.0, 0.0
     carried = moving_energy(moved_mass, before) + moving_energy(moved_mass, after)
     carried *= damping.alpha * h
-    taken = 2.0 * damping.alpha * h * kinetic_energy(mass, velocity, product)
+    kinetic = kinetic_energy(mass, velocity, product, (0, velocity.shape[0]))
+    taken = 2.0 * damping.alpha * h * kinetic
     return carried, taken + carried
 
 

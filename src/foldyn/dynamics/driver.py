@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Rayleigh, State
-from foldyn.dynamics import generalized_alpha
+from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
@@ -20,16 +20,8 @@ from foldyn.dynamics.method_choice import AUTO, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
-from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack
-from foldyn.dynamics.timing import (
-    check_samples,
-    counted_in_seconds,
-    expected_samples,
-    fixed_steps,
-    variable_steps,
-)
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
 from foldyn.values import number
@@ -44,7 +36,6 @@ TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
-MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on: see `resolution`
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -156,7 +147,7 @@ def prepare(
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of("rk4") if method == AUTO else suited(method, case.structure)
-    number("duration", duration, above=0.0)
+    duration = number("duration", duration, above=0.0)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
     if not len(case.free_dofs):
@@ -167,7 +158,7 @@ def prepare(
     u, v = check_start(case, initial)
     reason = ""
     if method == AUTO:
-        counted_in_seconds(duration, every)
+        timing.counted_in_seconds(duration, every)
         method, reason = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE
         )
@@ -191,15 +182,14 @@ def prepare(
             "one or leave dt out (force = true integrates all the same)",
             "dt",
         )
-    check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
+    timing.check_samples(timing.expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
         check_fill(case.structure.fill, case.structure.body.size)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
-        memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY
-        warn_of_coarse_steps(case, plan, integrator.looks, memory, integrator.implicit, 4)
+        timing.warn_of_coarse_steps(case, plan, integrator.looks, integrator.implicit)
     elif integrator.implicit:
-        warn_of_functions(case, 4)
+        timing.warn_of_functions(case)
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
         warnings.warn(
@@ -245,8 +235,10 @@ def _plan(
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
         tolerance, floor = tolerance or default, FLOOR * case.structure.body.longest()
-        return variable_steps(duration, dt, every, largest, start, tolerance, floor, knots(case))
-    return fixed_steps(duration, dt, every, critical, start)
+        return timing.variable_steps(
+            duration, dt, every, largest, start, tolerance, floor, timing.knots(case)
+        )
+    return timing.fixed_steps(duration, dt, every, critical, start)
 
 
 def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:

@@ -18,12 +18,7 @@ from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import add_viscous, drag, drag_works, viscous_work
-from foldyn.dynamics.implicit.discrete_gradient import (
-    add_bar_forces,
-    add_bar_tangent,
-    add_hinge_forces,
-    add_hinge_tangent,
-)
+from foldyn.dynamics.implicit import discrete_gradient
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
@@ -70,14 +65,14 @@ class EnergyMomentum(Scheme):
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        model, pattern, angle = self.packed.model, matrix.pattern, self.course.angle
-        u0, u1 = self.displacement(), self.moved()
+        model, pattern, out = self.packed.model, matrix.pattern, matrix.stiffness
+        u0, u1, slots = self.displacement(), self.moved(), pattern.hinge_slots
         expected_stress(model, u0, u0, False, self._start)
         expected_stress(model, u1, before, again, self._stress)
         stress = 0.5 * (self._start + self._stress)
-        matrix.stiffness[:] = 0.0
-        add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, matrix.stiffness)
-        add_hinge_tangent(model, u0, u1, angle, FLOOR, pattern.hinge_slots, matrix.stiffness)
+        out[:] = 0.0
+        discrete_gradient.add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, out)
+        discrete_gradient.add_hinge_tangent(model, u0, u1, self.course.angle, FLOOR, slots, out)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
@@ -122,8 +117,8 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     carry(system.moved, old.factor, 0, old.q, s.displacement)
     carry(system.moved, new.factor, 0, new.q, s.velocity)
     new.force[:] = 0.0
-    add_bar_forces(model, s.displacement, s.velocity, new.force)
-    add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
+    discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
+    discrete_gradient.add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
     u0, u1 = flat(s.displacement), flat(s.velocity)
     if system.damping.data.size > 0:
         speed = flat(s.product)

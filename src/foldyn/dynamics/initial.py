@@ -14,8 +14,8 @@ from foldyn.cases import Case, State
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
-from foldyn.dynamics.resolution import histories
 from foldyn.dynamics.system import Packed, follow, place, scratch
+from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.contents import check_variable
 

@@ -9,7 +9,6 @@ samples.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS
-from foldyn.dynamics.resolution import histories
-from foldyn.dynamics.timing import DEFAULT_FRACTION
+from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 
 AUTO = "auto"
 LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
@@ -31,27 +29,20 @@ AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in 
 SMOOTH = 1e-3  # the least share of a vibration that is reckoned with
 
 
-class Choice(NamedTuple):
-    """A method and why it was chosen."""
-
-    method: str
-    reason: str
-
-
 def choose(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
     every: int | float, tolerance: float | None, default: float,
-) -> Choice:  # fmt: skip
-    """Choose the method that should be quicker for a motion from u and v (n, 3) at `start`.
+) -> tuple[str, str]:  # fmt: skip
+    """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
 
     dt, every and tolerance are those of `simulate`, default what implicit methods take without.
     """
     conserved = case.damping.alpha == case.damping.beta == 0.0 and not any(histories(case))
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if massless := case.structure.massless:
-        return Choice("generalized_alpha", f"implicit: {massless} have no mass")
+        return "generalized_alpha", f"implicit: {massless} have no mass"
     if (case.structure.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
-        return Choice(implicit, "implicit: nodes without mass have no acceleration")
+        return implicit, "implicit: nodes without mass have no acceleration"
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
     explicit = "central_difference" if lasting else "rk4"
@@ -62,7 +53,7 @@ def choose(
         fits = dt <= critical
         word, name = ("within", explicit) if fits else ("above", implicit)
         kind = "explicit" if fits else "implicit"
-        return Choice(name, f"{kind}: dt is {word} the critical step of {critical:.2g} s")
+        return name, f"{kind}: dt is {word} the critical step of {critical:.2g} s"
     many = duration / (DEFAULT_FRACTION * critical)
     share = vibrating_share(case, u, v, start, duration, omega)
     few = CONTENT * duration * omega * (share / (12.0 * (tolerance or default))) ** (1.0 / 3.0)
@@ -76,8 +67,8 @@ def choose(
         f"{_seconds(costs[0])}, {_round(few)} implicit ones {_seconds(costs[1])}, by estimate"
     )
     if costs[0] <= costs[1]:
-        return Choice(explicit, f"explicit: {estimate}")
-    return Choice(implicit, f"implicit: {estimate}")
+        return explicit, f"explicit: {estimate}"
+    return implicit, f"implicit: {estimate}"
 
 
 def _explicit_cost(case: Case, evaluations: int) -> float:

@@ -15,13 +15,13 @@ from foldyn.dynamics import (
     dormand_prince,
     energy_momentum,
     generalized_alpha,
-    resolution,
     rk4,
 )
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.stability import MARGIN, Growth, largest_frequency, stability_limit
 from foldyn.dynamics.system import Packed, scratches
+from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
 from foldyn.mechanics.threads import run_together
@@ -125,7 +125,7 @@ class Integrator(NamedTuple):
     ) -> Compiled | Implicit:
         """The method with a case, its motion and the memory that it works with."""
         if self.scheme is not None:
-            return Implicit(self.scheme, packed, course, plan, resolution.jumps(case))
+            return Implicit(self.scheme, packed, course, plan, jumps(case))
         return Compiled(self.loop, packed, course, plan, 1 if self.adaptive else threads_of(packed))
 
     def critical_step(self, case: Case, u: ArrayLike | None = None) -> float:

@@ -26,15 +26,13 @@ from foldyn.dynamics.inertia import (
     inertia,
     kinetic_energy,
     moving_energy,
-    own_kinetic_energy,
     substitute,
     times_mass,
 )
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.body import Body
+from foldyn.mechanics.body import Body, Numbering, renumbered
 from foldyn.mechanics.kernels import energies_of, force_of
-from foldyn.mechanics.renumber import Numbering, renumbered
 from foldyn.mechanics.threads import wait
 
 
@@ -279,7 +277,7 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         for i in range(relative.size):
             accelerated[i] = -accelerated[i] - drag(damping, relative[i])
     if damping.alpha > 0.0:
-        kinetic = own_kinetic_energy(mass, v, s.product, work.strips.own)
+        kinetic = kinetic_energy(mass, v, s.product, work.strips.own)
         power_out += drag_power(damping, kinetic)
     if system.moves:
         power_in += _moving_power(system.moved, system.moved_mass, damping, s.force, s.factor)
@@ -307,7 +305,7 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     for k in range(system.supported.size):
         reaction[k] = product[system.supported[k]] + force[system.supported[k]]
     groups = s.energy.size
-    energy[groups] = kinetic_energy(mass, s.velocity, s.product)
+    energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
         reaction[k] += drag(system.damping, product[system.supported[k]])

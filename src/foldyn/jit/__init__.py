@@ -16,7 +16,12 @@ UNREADABLE = "could not be parsed"  # Numba's words for a value that it ignores
 
 def start() -> None:
     """Import Numba; refuse an environment in which kernels cannot run."""
-    _check_threads(os.environ.get("NUMBA_NUM_THREADS"))
+    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
+    if not threads.strip().isdecimal() or int(threads) < 1:
+        raise InputError(
+            f"NUMBA_NUM_THREADS = {threads!r}: must be a whole number from 1 on; unset it for as "
+            "many threads as there are processors"
+        )
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
@@ -35,18 +40,6 @@ def start() -> None:
     if getattr(config, "DISABLE_JIT", 0):
         raise InputError(
             "NUMBA_DISABLE_JIT is set: the kernels run compiled only; unset it, or set it to 0"
-        )
-
-
-def _check_threads(text: str | None) -> None:
-    try:
-        enough = text is None or int(text) >= 1
-    except ValueError:
-        enough = False
-    if not enough:
-        raise InputError(
-            f"NUMBA_NUM_THREADS = {text!r}: must be a whole number from 1 on; unset it for as many "
-            "threads as there are processors"
         )
 
 

@@ -28,8 +28,7 @@ from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import bar_slope, bar_stress
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.energy import bar_extension
-from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.renumber import node_order, ranks
+from foldyn.mechanics.model import BarsHinges, node_order, ranks
 from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
 
 FLOOR = 1e-3  # of a hinge's stiffness: its least slope in steps, as in MERLIN2

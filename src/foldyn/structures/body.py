@@ -13,8 +13,7 @@ from foldyn import mechanics
 from foldyn.materials import HingeLaw, Superlinear
 from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
-from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.renumber import node_order, ranks, renumber
+from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
 
 GROUPS: Mapping[str, str] = {

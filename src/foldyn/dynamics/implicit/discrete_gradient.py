@@ -24,14 +24,7 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.materials.switch import (
-    bar_energy,
-    bar_slope,
-    bar_stress,
-    hinge_energy,
-    hinge_moment,
-    hinge_slope,
-)
+from foldyn.materials import switch
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
 from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
@@ -58,10 +51,10 @@ def mean_stress(code, address, x, change):
     stress, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
         e = _extension(x + 2.0 * point * change)
-        stress += 0.5 * bar_stress(code, e, address[1])
-        slope += 0.5 * point * bar_slope(code, e, address[2])
-    before = bar_energy(code, _extension(x), address[0])
-    after = bar_energy(code, _extension(x + 2.0 * change), address[0])
+        stress += 0.5 * switch.bar_stress(code, e, address[1])
+        slope += 0.5 * point * switch.bar_slope(code, e, address[2])
+    before = switch.bar_energy(code, _extension(x), address[0])
+    after = switch.bar_energy(code, _extension(x + 2.0 * change), address[0])
     missed = after - before - stress * change
     if abs(change) > LEAST and abs(missed) > NOISE * max(abs(before), abs(after)):
         stress += missed / change
@@ -74,10 +67,10 @@ def mean_moment(code, address, p, rest, theta, change):
     moment, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change
-        moment += 0.5 * hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
-        slope += 0.5 * point * hinge_slope(code, t, rest, p[0], p[1], address[2])
-    before = hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
-    after = hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
+        moment += 0.5 * switch.hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
+        slope += 0.5 * point * switch.hinge_slope(code, t, rest, p[0], p[1], address[2])
+    before = switch.hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
+    after = switch.hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
     missed = after - before - moment * change
     size = max(abs(before), abs(after))
     if p[2] != 0.0 or p[3] != 0.0:  # what stress-free laws subtract cancels digits

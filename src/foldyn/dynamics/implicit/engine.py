@@ -18,8 +18,7 @@ from foldyn.algebra.banded import one_thread
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.newton import Newton
-from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
+from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Newton, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
