@@ -79,9 +79,9 @@ class SuperLU:
         if self._pivots is not None:
             return self._pivots
         straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
-        found = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
-        self._pivots = found
-        return found
+        pivots = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
+        self._pivots = pivots
+        return pivots
 
     def negative(self) -> int:
         """Count of negative eigenvalues."""

@@ -52,9 +52,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         powers[0], powers[1] = acceleration(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        found, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
-        if found != Outcome.DONE:
-            return found, hinge
+        outcome, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
+        if outcome != Outcome.DONE:
+            return outcome, hinge
     for step in range(begun + 1, end + 1):
         for i in range(u.size):
             v[i] += 0.5 * dt * fa[i]
@@ -72,7 +72,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         powers[0], powers[1] = power_in, power_out
         if team.number == 0:
             course.tally.evaluations += 1
-        found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-        if found != Outcome.DONE:
-            return found, hinge
+        outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+        if outcome != Outcome.DONE:
+            return outcome, hinge
     return Outcome.DONE, -1

@@ -24,7 +24,7 @@ class Outcome(IntEnum):
     NOT_CONVERGED = 5  # the equations of an implicit step were not solved, however small the step
 
 
-WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
+WORK, DISSIPATED, WRONG, HINGE, OUTCOME = range(5)  # places of a member's notes to its team
 
 
 class StepPlan(NamedTuple):
@@ -148,13 +148,13 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         tally.dissipated += total(team, DISSIPATED)
         tally.time = t
         tally.steps = step
-        found = Outcome.DONE
+        outcome = Outcome.DONE
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            found = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
-        team.note[0, FOUND] = found + 0  # as a number
+            outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
+        team.note[0, OUTCOME] = outcome + 0  # as a number
     wait(team)
     if wrong > 0.0:
         return Outcome.NOT_FINITE, -1
     if hinge >= 0:
         return Outcome.PENETRATION, hinge
-    return int(team.note[0, FOUND]), -1
+    return int(team.note[0, OUTCOME]), -1

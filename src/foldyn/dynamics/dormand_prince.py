@@ -127,11 +127,11 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         )
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            found = sample(
+            outcome = sample(
                 model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
             )
-            if found != Outcome.DONE:
-                return found, -1
+            if outcome != Outcome.DONE:
+                return outcome, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
         for i in range(n):
@@ -197,9 +197,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
             acceleration(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
-            found = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
-            if found != Outcome.DONE:
-                return found, -1
+            outcome = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
+            if outcome != Outcome.DONE:
+                return outcome, -1
             due = plan.start + tally.samples * plan.interval
         tally.work = _integral(begun[0], powers[0], h, A[6], 6)
         tally.dissipated = _integral(begun[1], powers[1], h, A[6], 6)
@@ -223,9 +223,11 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if plan.every > 0 and tally.steps % plan.every == 0:
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
             tally.evaluations += 1
-            found = sample(model, system, mass, course.u, course.v, a, after, course, out, work, s)
-            if found != Outcome.DONE:
-                return found, -1
+            outcome = sample(
+                model, system, mass, course.u, course.v, a, after, course, out, work, s
+            )
+            if outcome != Outcome.DONE:
+                return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
     for i in range(n):
         flat(course.carry)[i] = accelerations[0, i]

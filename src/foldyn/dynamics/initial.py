@@ -46,12 +46,12 @@ def initial_state(result: Any, at: int = -1) -> State:
     if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
         raise InputError(f" = {at!r}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
-    found = {
+    state = {
         name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
         for name in ("displacement", "velocity")
         if name == "displacement" or name in sample
     }
-    return State(**found)
+    return State(**state)
 
 
 def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:

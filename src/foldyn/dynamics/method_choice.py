@@ -108,7 +108,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     k = stiffness[free][:, free]
     m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
     spin, deforming, moving = _split(structure.nodes + u, v)
-    pairs, found = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
+    pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
     softest = (2.0 * math.pi / duration) ** 2
     try:
         x = SuperLU(sparse.csc_array(k + softest * m)).solve(force[free])
@@ -118,8 +118,8 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     for shape, whole in pairs:
         kinetic = float(whole @ (m @ whole))
         if kinetic > 0.0:
-            found = max(found, float(shape @ (k @ shape)) / kinetic)
-    return math.sqrt(found)
+            square = max(square, float(shape @ (k @ shape)) / kinetic)
+    return math.sqrt(square)
 
 
 def vibrating_share(

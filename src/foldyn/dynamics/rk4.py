@@ -54,9 +54,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             work_out += weight * power_out
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
-                found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-                if found != Outcome.DONE or step == end:
-                    return found, hinge
+                outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+                if outcome != Outcome.DONE or step == end:
+                    return outcome, hinge
                 for i in range(u.size):
                     du[i], dv[i] = vt[i], fa[i]
                     ut[i] = u[i] + ahead * vt[i]

@@ -99,7 +99,7 @@ def _largest(
     k: sparse.csr_array, m: sparse.csr_array | None = None, solve: object | None = None
 ) -> float:
     start = np.random.default_rng(0).standard_normal(k.shape[0])  # same answer in every run
-    found = linalg.eigsh(
+    largest = linalg.eigsh(
         k, 1, m, which="LA", v0=start, tol=1e-4, Minv=solve, return_eigenvectors=False
     )
-    return 1.0002 * float(found[0])  # Lanczos values come from below
+    return 1.0002 * float(largest[0])  # Lanczos values come from below

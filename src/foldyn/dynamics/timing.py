@@ -155,11 +155,11 @@ def knots(case: Case) -> NDArray[np.float64]:
 
 def jumps(case: Case) -> tuple[float, ...]:
     """Times (s) at which loads jump, or may: those that the user names of a function."""
-    found: set[float] = set()
+    times: set[float] = set()
     for _, history in case.load_terms:
         called = history.code == CALLED
-        found.update((history.knots() or ()) if called else history.jumps())
-    return tuple(sorted(found))
+        times.update((history.knots() or ()) if called else history.jumps())
+    return tuple(sorted(times))
 
 
 def warn_of_functions(case: Case) -> None:

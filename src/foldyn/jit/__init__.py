@@ -44,10 +44,10 @@ def start() -> None:
 
 
 def _variables() -> str:
-    found = [f"{name} = {value!r}" for name, value in os.environ.items() if name[:6] == "NUMBA_"]
-    if not found:
+    given = [f"{name} = {value!r}" for name, value in os.environ.items() if name[:6] == "NUMBA_"]
+    if not given:
         return "No variable NUMBA_... is set: look for .numba_config.yaml here, or reinstall Numba"
-    return f"Unset or correct {', '.join(sorted(found))}"
+    return f"Unset or correct {', '.join(sorted(given))}"
 
 
 start()

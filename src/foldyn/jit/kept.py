@@ -207,7 +207,7 @@ def _private() -> Path | None:
 
 def _ours(folder: Path) -> bool:
     """Whether a folder is no link, the user's, and closed to all others."""
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or not hasattr(os, "getuid"):
-        return stat.S_ISDIR(found.st_mode)  # folders for temporary files are each user's own there
-    return found.st_uid == os.getuid() and stat.S_IMODE(found.st_mode) & 0o077 == 0
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or not hasattr(os, "getuid"):
+        return stat.S_ISDIR(status.st_mode)  # folders for temporary files are each user's own there
+    return status.st_uid == os.getuid() and stat.S_IMODE(status.st_mode) & 0o077 == 0

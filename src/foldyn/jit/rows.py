@@ -44,13 +44,13 @@ def _row_pointers(context, builder, kinds, values):
     (rows, nodes), (row_values, node_values, start, step, mask) = kinds, values
     row_data = data_of(context, builder, rows, row_values)
     node_data = data_of(context, builder, nodes, node_values)
-    found = []
+    pointers = []
     for lane in range(LANES):
         index = builder.add(start, builder.mul(step, INT64(lane)))
         node = builder.zext(builder.load(builder.gep(node_data, [index])), INT64)
         at = builder.shl(builder.and_(node, mask), INT64(2))
-        found.append(_vector_at(builder, row_data, at, ROW))
-    return found
+        pointers.append(_vector_at(builder, row_data, at, ROW))
+    return pointers
 
 
 def _columns_at(builder, data, at, stride):

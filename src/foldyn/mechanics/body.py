@@ -248,10 +248,10 @@ class Numbering(NamedTuple):
             places = (3 * places[:, None] + np.arange(3)).ravel()
             places = np.concatenate([places, np.arange(len(places), matrix.shape[0])])
             size = 3 * self.rows
-        found = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
-        found.resize((size, size))
-        found.sort_indices()
-        return found
+        placed = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
+        placed.resize((size, size))
+        placed.sort_indices()
+        return placed
 
 
 def renumbered(body: Body) -> tuple[Body, Numbering]:

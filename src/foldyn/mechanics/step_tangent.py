@@ -158,9 +158,9 @@ class SparseBlocks:
 
     def filled(self, pattern: Sparsity) -> NDArray:
         """See `Blocks`; three dofs that share a row of blocks may lie far apart."""
-        found = np.zeros((len(pattern.indices), 3, 3), bool)
-        found.reshape(-1)[self._places(pattern)] = True
-        return found
+        filled = np.zeros((len(pattern.indices), 3, 3), bool)
+        filled.reshape(-1)[self._places(pattern)] = True
+        return filled
 
     def _places(self, pattern: Sparsity) -> NDArray:
         """Where the entries stand among those of a pattern's blocks."""

@@ -37,12 +37,12 @@ def sparsity(model: BarsHinges) -> Sparsity:
     for nodes in (model.bars, model.hinges):
         wide = nodes.astype(np.int64)
         keys.append((wide[:, :, None] * n + wide[:, None, :]).ravel())
-    found, inverse = np.unique(np.concatenate(keys), return_inverse=True)
+    blocks, inverse = np.unique(np.concatenate(keys), return_inverse=True)
     nb = len(model.bars)
     slots = inverse[n:]
     return Sparsity(
-        np.searchsorted(found // n, np.arange(n + 1)).astype(np.int32),
-        (found % n).astype(np.int32),
+        np.searchsorted(blocks // n, np.arange(n + 1)).astype(np.int32),
+        (blocks % n).astype(np.int32),
         np.ascontiguousarray(slots[: 4 * nb].reshape(-1, 2, 2)),
         np.ascontiguousarray(slots[4 * nb :].reshape(-1, 4, 4)),
     )
@@ -104,10 +104,10 @@ def _add_hinges(model, u, slots, data, floor):
             for v in range(4):
                 for c in range(3):
                     points[v, c] = model.rest[model.hinges[e, v], c] + u[model.hinges[e, v], c]
-            found = hinge_dihedral(model, u, e)
+            dihedral = hinge_dihedral(model, u, e)
             for c in range(12):
-                flat[c] = found[1 + c]
-            theta, rest, k = found[0], model.hinge_rest[e], model.hinge_stiffness[e]
+                flat[c] = dihedral[1 + c]
+            theta, rest, k = dihedral[0], model.hinge_rest[e], model.hinge_stiffness[e]
             moment = k * hinge_moment(
                 code, theta, rest, p[e, 0], p[e, 1], p[e, 2], p[e, 3], moment_at
             )

@@ -129,12 +129,12 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
         points[v, 1] = stretch * r1 - along * w1
         points[v, 2] = stretch * r2 - along * w2
     p, flat = points, plain.reshape(12)
-    found = dihedral_gradient(
+    dihedral = dihedral_gradient(
         p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
         p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
     )  # fmt: skip
     for c in range(12):
-        flat[c] = found[1 + c]
+        flat[c] = dihedral[1 + c]
     missed, size = turn, 0.0
     for v in range(4):
         along = w0 * plain[v, 0] + w1 * plain[v, 1] + w2 * plain[v, 2]
@@ -247,11 +247,11 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
     for run in range(model.hinge_runs.shape[0]):
         code, address = model.hinge_runs[run, 2], model.addresses[model.hinge_runs[run, 3]]
         for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
-            found, k = hinge_dihedral(model, u1, e), model.hinge_stiffness[e]
+            dihedral, k = hinge_dihedral(model, u1, e), model.hinge_stiffness[e]
             flat = end.reshape(12)
             for c in range(12):
-                flat[c] = found[1 + c]
-            turn = found[0] - angle0[e]
+                flat[c] = dihedral[1 + c]
+            turn = dihedral[0] - angle0[e]
             _gather(model, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
             parameters, rest = model.hinge_parameters[e], model.hinge_rest[e]
