@@ -42,7 +42,7 @@ class Pardiso:
         return np.asarray(self._solver.solve(self._upper, b)).reshape(b.shape)
 
     def pivots(self) -> None:
-        """PARDISO does not tell its pivots."""
+        """None: PARDISO does not show its pivots."""
         return
 
     def negative(self) -> int:

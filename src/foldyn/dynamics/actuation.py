@@ -32,9 +32,9 @@ class Actuators(NamedTuple):
 def actuators(
     body: Body, law: HingeLaw, folds: NDArray, span: NDArray, row: NDArray
 ) -> tuple[Body, Actuators]:
-    """The body with rest angles of its own, and its folds, of one law, that turn.
+    """A body whose rest angles can be changed, and its actuated folds, all of one law.
 
-    folds, span, row : (f,) numbers of folds, and of each the turn (rad) and the waveform.
+    folds, span, row : (f,) numbers of folds, how far each turns (rad), and its waveform.
     """
     hinge, place = np.zeros(0, np.int64), np.zeros(0, np.int64)
     if len(folds):

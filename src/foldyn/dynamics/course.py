@@ -1,4 +1,4 @@
-"""Where a motion stands, where it goes and what it leaves behind: the arguments of integrators."""
+"""State, step plan and samples of a motion: the arguments of integrators."""
 
 from __future__ import annotations
 
@@ -74,6 +74,10 @@ class Samples(NamedTuple):
     reaction: NDArray  # (k, s)
     energy: NDArray  # (k, columns) as `audit.audited` names them
 
+    def doubled(self) -> Samples:
+        """These, with room for as many again."""
+        return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in self))
+
 
 def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
     """Room for `count` samples."""
@@ -121,18 +125,18 @@ def sample(model, system, mass, u, v, a, t, course, out, work, s):
 
 @scalar
 def tell(team, work_in, work_out, wrong):
-    """Tell the team what a step came to: work, energy dissipated (J), values not finite."""
+    """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
 
 
 @scalar
 def observe(model, system, mass, course, a, step, plan, out, work, s):
-    """What follows `acceleration` at the time of a step, with a fixed step; all of a team call it.
+    """Look at a fixed step after `acceleration` at its end; every member of a team calls it.
 
-    The works that the members have told are added up. Motions that are no longer finite and
-    panels that passed through each other end the motion, and every plan.every steps a sample is
-    written. Returns (outcome, hinge), the same to all.
+    Adds up the work that the members have noted. The motion ends where it is no longer finite and
+    where panels pass through each other; every plan.every steps a sample is written. Returns
+    (outcome, hinge), the same to all.
     """
     team, tally = work.team, course.tally
     wait(team)  # for the others' accelerations, dihedrals and notes

@@ -3,7 +3,7 @@
 alpha M v, the *drag*, is never assembled: it slows every mass by alpha v, and takes v alpha M v or
 2 alpha times the kinetic energy. beta K0 v, the *viscous* force, is a product with a sparse matrix.
 Where supports move, free nodes are slowed by the velocity w without S f' (see `system`), and the
-drag on S f' itself is overcome by those who move the supports.
+drag on S f' itself is overcome by whatever moves the supports.
 
 In the matrix of an implicit step with dw = rate dq, drag adds alpha rate to the factor of M.
 """

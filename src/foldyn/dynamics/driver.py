@@ -1,4 +1,4 @@
-"""`simulate`: the motion of a case from an initial state, and what makes it ready to run."""
+"""`simulate`: the motion of a case from an initial state, and `prepare`, which checks it first."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from foldyn.values import number
 if TYPE_CHECKING:
     import xarray
 
-DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+DAMPING_COST = 10.0  # by how much beta may shrink the critical step before the user is warned
 SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost their digits
-MANY_STEPS = 20_000_000  # beyond which the user is told before the run
+MANY_STEPS = 20_000_000  # beyond which the user is warned before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
@@ -193,7 +193,7 @@ def prepare(
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
         warnings.warn(
-            f"{steps:.3g} steps of {plan.dt:.3g} s are a long way (critical step "
+            f"{steps:.3g} steps of {plan.dt:.3g} s will take a long time (critical step "
             f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
             FoldynWarning,
             stacklevel=3,
@@ -205,7 +205,7 @@ def prepare(
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:
-    """The method with the spectral radius that is asked for."""
+    """The method with a spectral radius, if one is given."""
     if spectral_radius is None:
         return method
     if method.name != "generalized_alpha":

@@ -47,7 +47,6 @@ from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
-NONE: Mapping[str, float] = {}
 
 
 class Parameters(NamedTuple):
@@ -73,7 +72,7 @@ class Alpha(Scheme):
 
     def __init__(
         self, packed: Packed, course: Course, parameters: Parameters,
-        facts: Mapping[str, float] = NONE,
+        facts: Mapping[str, float] = Scheme.facts,
     ) -> None:  # fmt: skip
         super().__init__(packed, course)
         self._p, self.facts = parameters, facts

@@ -79,19 +79,19 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse a support or a fold that is to move in no time."""
+    """Refuse a support or a fold that would have to jump."""
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         if times and what != "a load":
             section = "loads" if what == "an actuation" else "supports"
             raise InputError(
                 f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "
-                "but nothing moves in no time: use a ramp, a half sine or a table"
+                "but nothing can move in no time: use a ramp, a half sine or a table"
             )
 
 
 def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
-    """Warn where the stiffness at the start u (n, 3), by which damping goes, is not positive."""
+    """Warn where damping follows the stiffness at the start u (n, 3), and this is not positive."""
     if case.damping.beta == 0.0 or case.damping.state != "start":
         return
     free = np.asarray(case.free_dofs)

@@ -26,7 +26,7 @@ CONTENT = 2.0  # times the steps of the vibration itself: faster ones ride on it
 FEWEST = 50.0  # steps of an implicit run
 MOST_TIMES = 4000  # at which loads are looked at
 AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in motion
-SMOOTH = 1e-3  # the least share of a vibration that is reckoned with
+SMOOTH = 1e-3  # of a vibration: the least share that is assumed
 
 
 def choose(
@@ -125,10 +125,10 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
 def vibrating_share(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, omega: float
 ) -> float:
-    """Share of the displacement that vibrates: 1 for what is let go, less for what is slow.
+    """Share of the displacement that vibrates: 1 after a release, less under slow loads.
 
-    Of a motion from rest in balance: how far the factors bend within half a period, relative to
-    their size.
+    For a motion from rest in balance it is how far the factors bend within half a period, relative
+    to their size.
     """
     if v.any() or _out_of_balance(case, u, start):
         return 1.0

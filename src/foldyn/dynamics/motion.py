@@ -89,7 +89,7 @@ class Motion:
         )  # fmt: skip
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
-        """Advance in stretches, between which progress is told and the motion is audited."""
+        """Advance in stretches; after each, report the progress and audit the motion."""
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
         engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
@@ -108,13 +108,11 @@ class Motion:
                 self.seconds = time.perf_counter() - began
                 self._sample()
                 if isinstance(callbacks.error, Exception):
-                    raise InstabilityError(
-                        str(callbacks.error), self._dataset()
-                    ) from callbacks.error
+                    self._stop(str(callbacks.error), cause=callbacks.error)
                 if callbacks.error is not None:
                     raise callbacks.error
                 if code == Outcome.FULL:
-                    self._out = _enlarged(self._out)
+                    self._out = self._out.doubled()
                 elif code != Outcome.DONE:
                     self._fail(code, hinge)
                 step, now = int(course.tally.steps), float(course.tally.time)
@@ -141,11 +139,11 @@ class Motion:
         try:
             self._sampler.take(self._out, self.stored)
         except SamplingError as error:
-            raise ComputationError(str(error), self._dataset()) from error
+            self._stop(str(error), ComputationError, error)
 
-    def _stop(self, message: str, kind: type[ComputationError] = InstabilityError) -> NoReturn:
+    def _stop(self, message: str, kind: type = InstabilityError, cause: Any = None) -> NoReturn:
         """End the motion with an error, which carries what was computed until then."""
-        raise kind(message, self._dataset())
+        raise kind(message, self._dataset()) from cause
 
     def _audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
@@ -217,8 +215,8 @@ class Motion:
             )
         if code == Outcome.NOT_CONVERGED:
             self._stop(
-                f"{moment} no end of a step was found that is in equilibrium, however small the "
-                "step: a mass or a stiffness may be missing, or the motion is too violent"
+                f"{moment} no equilibrium was found at the end of a step, however small the step: "
+                "a mass or a stiffness may be missing, or the motion is too violent"
             )
         reason = "a load is not finite"
         if plan.steps and not self.method.implicit:
@@ -273,7 +271,7 @@ class Motion:
         return facts | (engine.facts() if engine else {})
 
     def _doubts(self, error: float) -> str:
-        """What to say of a motion with a relative energy error; empty where nothing."""
+        """Warning about a motion with a relative energy error; empty if there is none."""
         energy, farthest = self._written().energy, self._farthest()
         least = self._rounding.least_motion(INACCURATE)
         if 0.0 < farthest < least:
@@ -296,11 +294,6 @@ class Motion:
         if scale <= rounding:
             return (
                 f"{off}, {scale:.2g} J: they are below the rounding errors of forces and "
-                f"displacements of this size ({rounding:.2g} J), and what moves may be these errors"
+                f"displacements of this size ({rounding:.2g} J), which may be all that moves"
             )
         return f"{off}: {self._smaller_step()}"
-
-
-def _enlarged(out: Samples) -> Samples:
-    """Samples with room for twice as many."""
-    return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in out))

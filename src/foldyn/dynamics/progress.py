@@ -1,4 +1,4 @@
-"""What a long run tells while it runs."""
+"""Progress reports of long runs."""
 
 from __future__ import annotations
 

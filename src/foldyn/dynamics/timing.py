@@ -24,9 +24,8 @@ from foldyn.values import number, show, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
-SAME_TIME = 1e-12  # of the largest time: stops as near as that are one
-NO_STOPS = np.zeros(0)
-NOTICED = 0.01  # part of a load that is not seen, above which the user is told
+SAME_TIME = 1e-12  # of the largest time: stops that are closer are one
+NOTICED = 0.01  # part of a load that is not seen, above which the user is warned
 MOST_LOOKS = 20_000  # that are looked at; of longer motions, the steps about knots and some others
 MOST_CALLS = 500  # the same for functions of the user's, which are slow
 MOST_PLACES = 100
@@ -35,7 +34,7 @@ MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on
 
 
 def fixed_steps(
-    duration: float, dt: float | None, every: int | float, critical: float, start: float = 0.0
+    duration: float, dt: float | None, every: int | float, critical: float, start: float
 ) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
@@ -65,18 +64,18 @@ def fixed_steps(
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
         raise InputError(f" = {every}: longer than the motion of {steps} steps", "every")
-    interval = per_sample * dt
-    return StepPlan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
+    end, interval = start + steps * dt, per_sample * dt
+    return StepPlan(start, end, dt, steps, per_sample, interval, 0.0, 0.0, np.zeros(0))
 
 
 def variable_steps(
     duration: float, dt: float | None, every: int | float, largest: float, start: float,
-    tolerance: float, floor: float = 0.0, knots: NDArray = NO_STOPS,
+    tolerance: float, floor: float, knots: NDArray,
 ) -> StepPlan:  # fmt: skip
-    """StepPlan of a motion whose steps follow their error; `dt` is the largest step.
+    """Plan of a motion whose steps follow their error; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that
-    lie within the motion and that time can tell apart.
+    Without `dt` it is `largest`, at most a tenth of the motion. Knots outside the motion are
+    dropped, and so are those that rounding cannot tell apart from the one before.
     """
     in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
@@ -163,14 +162,13 @@ def jumps(case: Case) -> tuple[float, ...]:
 
 
 def warn_of_functions(case: Case) -> None:
-    """Warn of functions of time in which steps that grow can only look here and there."""
+    """Warn of functions of time, which steps of variable length sample here and there only."""
     for what, history in histories(case):
         if history.knots() is None:
             warnings.warn(
-                f"the history of {what} is a function, and nobody knows when it jumps or turns: "
-                "each step looks at it at eight points, and a pulse that is shorter than their "
-                "distance may be missed; say when: fd.Function(f, at=[0.2, 0.25]), at=[] if it is "
-                "smooth",
+                f"the history of {what} is a function whose jumps and corners are unknown: each "
+                "step looks at it at eight points, and a pulse shorter than their distance may be "
+                "missed; say when they are: fd.Function(f, at=[0.2, 0.25]), at=[] if it is smooth",
                 FoldynWarning,
                 stacklevel=4,
             )
@@ -180,7 +178,7 @@ def warn_of_functions(case: Case) -> None:
 def warn_of_coarse_steps(
     case: Case, plan: StepPlan, looks: tuple[float, ...], implicit: bool
 ) -> None:
-    """Warn where steps of dt do not see a history as it is.
+    """Warn where steps of dt do not resolve a history.
 
     looks : where in a step a method looks at the loads, from 0 to 1.
     """

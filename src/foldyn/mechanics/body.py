@@ -1,4 +1,4 @@
-"""What solvers take of a structure: energies, forces and tangents on a flat vector of dofs.
+"""What solvers need of a structure: energies, forces and tangents on a flat vector of dofs.
 
 The m dofs are 3 node + axis, then the hidden ones: those without mass that a model may have beside
 the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,

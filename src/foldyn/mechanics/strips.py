@@ -1,4 +1,4 @@
-"""In which order the force kernel goes over a sheet: strip after strip of nodes.
+"""The order in which the force kernel passes over a sheet: strip after strip of nodes.
 
 With nodes numbered along the sheet (`model.renumber`) an element's nodes have numbers close to its
 lowest one. A kernel that takes the elements in the order of their lowest nodes then needs the
