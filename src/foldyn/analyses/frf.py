@@ -35,8 +35,7 @@ from foldyn.cases.supports import check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf
-from foldyn.linear.frf import METHODS
-from foldyn.linear.quantity import PER_FORCE
+from foldyn.linear.frf import METHODS, PER_FORCE
 from foldyn.values import number, show, whole
 
 if TYPE_CHECKING:
