@@ -68,7 +68,7 @@ def test_files_of_an_addition_are_those_of_one_that_is_there(title):
         and (re.search(mention, path.read_text("utf-8")) or (old and path.stem == old))
     }
     if title == "An integrator":
-        found -= {"src/foldyn/dynamics/choice.py"}  # which integrator "auto" takes
+        found -= {"src/foldyn/dynamics/method_choice.py"}  # which integrator "auto" takes
     assert {name.replace(new, old) if new else name for name in listed} == found
     assert len(listed) <= 3
 

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.call import call1
 from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import call1
 
 CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
 CALLED = -1

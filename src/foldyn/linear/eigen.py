@@ -24,7 +24,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from foldyn.algebra.choice import factorizer
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import ComputationError, InputError
 

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.special import gamma, hyp2f1
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
 from foldyn.errors import FoldynWarning

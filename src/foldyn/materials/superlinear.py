@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foldyn.jit.bits import bits_of, float_of
 from foldyn.jit.compiled import scalar
+from foldyn.jit.intrinsics import bits_of, float_of
 from foldyn.materials.law import HingeLaw
 
 CODE = 1

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.call import call1, call2
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 

@@ -13,9 +13,9 @@ from scipy.sparse.linalg import splu
 from foldyn import mechanics
 from foldyn.errors import ComputationError, InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.blocks import SparseBlocks
 from foldyn.mechanics.body import Body, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
+from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
 from foldyn.shells.tangent import (
     ShellPattern,

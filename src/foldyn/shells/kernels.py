@@ -14,7 +14,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.memory import check_memory

@@ -1,6 +1,6 @@
 """Statics: equilibrium paths, their stability and branches, and energy landscapes."""
 
-from foldyn.algebra.choice import SOLVERS
+from foldyn.algebra.solvers import SOLVERS
 from foldyn.statics.branch import switch_branch
 from foldyn.statics.energy_landscape import Equilibrium, Landscape, landscape
 from foldyn.statics.mechanism import mechanisms

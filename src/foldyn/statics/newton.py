@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.choice import factorizer
 from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import InputError
 from foldyn.statics.problem import Balance, Problem, balance, converged

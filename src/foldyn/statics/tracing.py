@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
 from foldyn.errors import InputError
 from foldyn.memory import check_memory

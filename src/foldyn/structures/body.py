@@ -11,12 +11,10 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.blocks import BarsHingesBlocks
 from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
-from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.renumber import node_order, ranks, renumber
-from foldyn.mechanics.step_tangent import put_tangent
+from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
+from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
 
 GROUPS: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",

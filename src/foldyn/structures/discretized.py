@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, hinge_law
 from foldyn.mechanics.body import Body

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
 from foldyn.patterns import Pattern
