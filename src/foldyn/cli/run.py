@@ -100,9 +100,9 @@ def _keep(result: xarray.Dataset, one: Computation, results: Results) -> None:
 
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
     """Say which values a result lacks; it has failed where it may lack none."""
-    from foldyn.results.missing import REASONS, told
+    from foldyn.results.quantities import REASONS, missing_values
 
-    for name, text in told(result).items():
+    for name, text in missing_values(result).items():
         if name not in REASONS:
             raise ComputationError(f"{place}{name}: {text}", result)
         say(f"  {name}: {text}")

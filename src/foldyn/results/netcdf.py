@@ -1,7 +1,14 @@
-"""Datasets in NetCDF files: written whole or not at all, and read whole or not at all."""
+"""Datasets in NetCDF files: written whole or not at all, and read whole or not at all.
+
+A seal at the end of a file, the digest of all that comes before it, shows damage. HDF5 ignores what
+follows its own end, and cuts it off when another program changes the file: such a file has no seal,
+like those of older programs, and is read without this check.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
 import warnings
 from pathlib import Path
@@ -14,9 +21,7 @@ from xarray.backends import list_engines
 
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
-from foldyn.results import seal
 from foldyn.results.apart import apart
-from foldyn.results.sink import Sink
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
@@ -26,6 +31,10 @@ LEAST_MEMORY = 2**29
 """Bytes that a file without a seal may take beside what it holds."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
 """Computing time that a file without a seal may take, and the bytes that take a second more."""
+
+_MARK = b"\nfoldyn sha256 "
+_SEAL = len(_MARK) + 64 + 1  # its length
+_PIECE = 1 << 20
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -47,7 +56,7 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         with whole(path) as part:
             with Sink(part, "w+") as sink:
                 _fill(sink, ds)
-            seal.seal(part)
+            _seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
 
@@ -74,7 +83,7 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
     """
     path = check_file(path, "a NetCDF file")
     try:
-        sealed = seal.sound(path)
+        sealed = sound(path)
         if sealed is False:
             raise InputError(
                 f"{path}: is damaged: its checksum does not match its content; restore it from a "
@@ -134,3 +143,79 @@ def _is_bare(item: h5py.Dataset) -> bool:
     """Whether this stands for a dimension alone, without any numbers."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
+
+
+def _seal(path: Path) -> None:
+    """Put a seal at the end of a file."""
+    with path.open("rb+") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(_MARK + digest.encode() + b"\n")
+
+
+def sound(path: Path) -> bool | None:
+    """Whether the seal of a file matches what comes before it; None where it has none."""
+    left = path.stat().st_size - _SEAL
+    if left < 0:
+        return None
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        file.seek(left)
+        found = file.read()
+        if not found.startswith(_MARK):
+            return None
+        file.seek(0)
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
+    return found == _MARK + digest.hexdigest().encode() + b"\n"
+
+
+class Sink(io.FileIO):
+    """A new file, open for reading and writing, whose failures are noted and not raised.
+
+    Where the disk is full, HDF5 cannot close its file, and the process ends in a segmentation
+    fault. So it writes through this, which takes the rest for written; the failure is raised at the
+    end. Nothing but the dataset itself is held in memory.
+
+    Attributes
+    ----------
+    failure : BaseException or None
+        What ended the writing: a full disk, or an interruption that came meanwhile.
+    """
+
+    failure: BaseException | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of it, or note why not."""
+        left = memoryview(data).cast("B")
+        size, end = len(left), self.tell() + len(left)
+        try:
+            while len(left) and self.failure is None:
+                left = left[super().write(left) :]
+        except BaseException as failure:
+            self.failure = failure
+        self.seek(end)
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Set the size, or note why not."""
+        try:
+            if self.failure is None:
+                return super().truncate(size)
+        except BaseException as failure:
+            self.failure = failure
+        return self.tell() if size is None else size
+
+    def readinto(self, buffer: Any, /) -> int:
+        """Read; zeros, where what is to be read could not be written."""
+        room = memoryview(buffer).cast("B")
+        found = 0
+        if self.failure is None:
+            try:
+                found = super().readinto(room) or 0
+            except BaseException as failure:
+                self.failure = failure
+        if self.failure is not None:
+            room[found:] = bytes(len(room) - found)
+            return len(room)
+        return found

@@ -14,9 +14,8 @@ import xarray as xr
 
 from foldyn.errors import InputError
 from foldyn.results import netcdf
-from foldyn.results.contents import whole_attribute
+from foldyn.results.contents import check_result, whole_attribute
 from foldyn.results.dataset import FORMAT
-from foldyn.results.origin import check_result
 
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
