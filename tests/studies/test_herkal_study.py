@@ -12,6 +12,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.structures.discretize import PER_NODE
 from foldyn.studies.herkal import pool, report, runs
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
@@ -381,3 +382,14 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
     assert "synthetic film is left out: pip install foldyn[experiment]" in told
     assert "the specimen: calibrated" not in told
     assert "The paper specimen" not in (tmp_path / "study/report.html").read_text("utf-8")
+
+
+def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("foldyn.memory.memory", lambda: 1.5 * PER_NODE * 13)
+    monkeypatch.setattr(studies, "QUICK", Plan(SHORT, ("case2",), ("panel",)))
+    monkeypatch.setattr(Study, "compute", lambda *_: [])
+    monkeypatch.setattr("foldyn.cli.study._data", lambda *_: None)
+    command = ["study", "herkal", "--quick", "--quiet", "--out", str(tmp_path / "study")]
+    assert main(command) == 2
+    assert "a structure of 13 nodes needs about" in capsys.readouterr().err
+    assert main([*command, "--force"]) == 0

@@ -110,8 +110,9 @@ class Results:
                 self._stamp("running")  # a kill from here on leaves nothing old for new
                 write(file)
             except (OSError, InputError) as error:  # the folder has changed since it was checked
-                self.kept.append(elsewhere(file, write, reason(error)))
-                raise unwritten(file, reason(error)) from None
+                saved, failure = rescued(file, write, error)
+                self.kept.append(saved)
+                raise failure from None
             self.kept.append(str(file))
             self._new.append(name)
             self.clear()
@@ -137,7 +138,7 @@ class Results:
             elif self._begun:
                 stamp.restore(self.folder, self._before)
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """What was kept, for the end of a message."""
         if not self.kept:
             return ""
@@ -149,8 +150,12 @@ class Results:
         self._begun = True
 
 
-def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
-    """Save what cannot be saved as a file in the system's temporary folder; says where.
+def rescued(
+    file: Path, write: Callable[[Path], None], failure: BaseException
+) -> tuple[str, ComputationError]:
+    """Save in the system's temporary folder what could not be saved as a file.
+
+    Returns where it is, and what is to be raised.
 
     Raises
     ------
@@ -158,6 +163,7 @@ def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
         Nor can it be saved there.
     """
     made = None
+    place = f"{file}: cannot be written ({reason(failure)})"
     try:
         made = Path(tempfile.mkdtemp(prefix="foldyn-"))
         write(made / file.name)
@@ -165,16 +171,11 @@ def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)
         raise ComputationError(
-            f"{file}: cannot be written ({why}), nor can a temporary folder ({reason(error)}): it "
-            "is lost; make room, or name another place with --out"
+            f"{place}, nor can a temporary folder ({reason(error)}): it is lost; make room, or "
+            "name another place with --out"
         ) from None
-    return str(made / file.name)
-
-
-def unwritten(file: Path, why: str) -> ComputationError:
-    """What is raised where something has been saved elsewhere."""
-    told = f"{file}: cannot be written ({why}): make room, or name another place with --out"
-    return ComputationError(told)
+    remedy = "make room, or name another place with --out"
+    return str(made / file.name), ComputationError(f"{place}: {remedy}")
 
 
 @contextmanager
@@ -231,12 +232,12 @@ def _naming(results: Results) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as stop:
-        raise KeyboardInterrupt(f"{str(stop) or 'interrupted'}{results.told()}") from None
+        raise KeyboardInterrupt(f"{str(stop) or 'interrupted'}{results.summary()}") from None
     except (FoldynError, OSError, MemoryError) as error:
         if not results.kept and not isinstance(error, ComputationError):
             raise
         partial = getattr(error, "partial", None)
-        raise ComputationError(f"{reason(error)}{results.told()}", partial) from None
+        raise ComputationError(f"{reason(error)}{results.summary()}", partial) from None
 
 
 def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
@@ -258,6 +259,18 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
             "replace them with --replace"
         )
     return list(dict.fromkeys(old))
+
+
+@contextmanager
+def drawing(place: object, kept: str = "") -> Iterator[None]:
+    """Say that figures could not be drawn, whatever kept them from it, and what was kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted while figures were drawn{kept}") from None
+    except Exception as error:
+        kind = "" if isinstance(error, FoldynError | OSError) else f"{type(error).__name__}: "
+        raise ComputationError(f"{place}: figures: {kind}{reason(error)}{kept}") from None
 
 
 def reason(error: BaseException) -> str:

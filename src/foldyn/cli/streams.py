@@ -1,11 +1,12 @@
-"""Standard output and error that a run can rely on, be they closed, full or short of letters."""
+"""What a command prints; standard output and error may be closed, full or short of letters."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, TextIO
 
 
@@ -74,3 +75,15 @@ def _fill_closed() -> None:
         if place > 2:
             os.close(place)
             return
+
+
+def speech(quiet: bool) -> Callable[[str], None]:
+    """Return what prints a line at once, or nothing if the command is to be quiet."""
+    return (lambda text: None) if quiet else partial(print, flush=True)
+
+
+def progress_bar(quiet: bool, **options: Any) -> Any:
+    """Progress bar of tqdm, hidden if the command is to be quiet or nobody watches."""
+    from tqdm import tqdm
+
+    return tqdm(disable=quiet or not sys.stderr.isatty(), leave=False, **options)
