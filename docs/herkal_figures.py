@@ -21,8 +21,8 @@ from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
 from foldyn.studies.herkal.figures import plot_sensitivity
-from foldyn.studies.herkal.models import REFERENCE, label, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
+from foldyn.studies.herkal.sheet_models import REFERENCE, label, rules
 from foldyn.studies.herkal.specimen import page
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import FULL, RESULTS, Study

@@ -19,7 +19,7 @@ from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
-from foldyn.studies.herkal.specimen.agreement import vibration_of
+from foldyn.studies.herkal.specimen.evaluation import vibration_of
 from foldyn.studies.herkal.specimen.measured import Data, data_of
 
 STEP = 1.0 / calibration.RATE
@@ -427,7 +427,7 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
         assert not fit.there(tables)
     fit.make(tables)
     assert fit.there(tables)
-    monkeypatch.setattr(tasks, "specimen_program", lambda: "another")
+    monkeypatch.setattr(tasks, "program", lambda *_: "another")
     assert not fit.there(tables)
 
 

@@ -16,8 +16,11 @@ from foldyn.structures.discretize import PER_NODE
 from foldyn.studies.herkal import pool, report, runs
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
-from foldyn.studies.herkal.metric import best, content, deviation, errors, ranks
-from foldyn.studies.herkal.models import (
+from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best, content, deviation, errors, ranks
+from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
+from foldyn.studies.herkal.pool import Done
+from foldyn.studies.herkal.runs import Job, Numerics
+from foldyn.studies.herkal.sheet_models import (
     MODELS,
     OTHERS,
     REFERENCE,
@@ -27,10 +30,6 @@ from foldyn.studies.herkal.models import (
     paper_rules,
     rules,
 )
-from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.partners import FAR, LEAST_MAC
-from foldyn.studies.herkal.pool import Done
-from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import LINEAR, Plan, Study, mean_ranks, second_table
 from foldyn.studies.targets import Target, Verdict, read_targets

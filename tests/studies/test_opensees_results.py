@@ -15,7 +15,7 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.studies import find_case
 from foldyn.studies.herkal.opensees import compare, model
-from foldyn.studies.herkal.opensees.mesh import panel_mesh
+from foldyn.studies.herkal.opensees.model import panel_mesh
 from foldyn.studies.herkal.opensees.stored import (
     CASES,
     Moved,

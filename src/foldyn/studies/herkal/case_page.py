@@ -14,9 +14,9 @@ from foldyn.report import Heading, Section, Table
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.studies.herkal.figures import plot_statics
-from foldyn.studies.herkal.models import REFERENCE, label, model_of
-from foldyn.studies.herkal.partners import FAR, LEAST_MAC
+from foldyn.studies.herkal.metric import FAR, LEAST_MAC
 from foldyn.studies.herkal.runs import SECANT
+from foldyn.studies.herkal.sheet_models import REFERENCE, label, model_of
 from foldyn.studies.herkal.study import Study
 
 NO_BREAK = "\N{NO-BREAK SPACE}"

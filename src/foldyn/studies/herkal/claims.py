@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.signals import find_peaks, spectrum
 from foldyn.studies.herkal.metric import UP_TO, content
-from foldyn.studies.herkal.models import REFERENCE, paper_rules
+from foldyn.studies.herkal.sheet_models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 

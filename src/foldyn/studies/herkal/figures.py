@@ -9,7 +9,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from foldyn.plots import style
-from foldyn.studies.herkal.models import label
+from foldyn.studies.herkal.sheet_models import label
 from foldyn.studies.herkal.variations import Variations
 
 WIDTH, HEIGHT = 9.0, 3.4  # inches

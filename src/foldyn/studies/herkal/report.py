@@ -15,7 +15,7 @@ from foldyn.studies.herkal import case_page, sensitivity_page, variations
 from foldyn.studies.herkal.case_page import NO_BREAK
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import best
-from foldyn.studies.herkal.models import MODELS, REFERENCE, label, model_of
+from foldyn.studies.herkal.sheet_models import MODELS, REFERENCE, label, model_of
 from foldyn.studies.herkal.specimen import page as specimen_page
 from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks, second_table
 from foldyn.studies.herkal.variations import Variations, likeness, rank_correlation

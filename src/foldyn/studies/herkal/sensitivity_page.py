@@ -12,8 +12,8 @@ from foldyn.studies.herkal import variations
 from foldyn.studies.herkal.claims import paper_table
 from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.metric import best
-from foldyn.studies.herkal.models import OTHERS, label, paper_rules, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
+from foldyn.studies.herkal.sheet_models import OTHERS, label, paper_rules, rules
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
 TURNED = next(iter(OTHERS))

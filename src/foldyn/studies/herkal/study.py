@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from foldyn.analyses import CaseFile, read_case
 from foldyn.studies import find_case
 from foldyn.studies.herkal import metric
-from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.partners import Partners, partners
 from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, stored
+from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
@@ -173,13 +172,13 @@ class Study:
                 found[f"{label}, linear bends"] = self.result(case, model, "path", LINEAR)
         return {label: path for label, path in found.items() if path is not None}
 
-    def frequencies(self, case: str, model: str) -> Partners | None:
+    def frequencies(self, case: str, model: str) -> metric.Partners | None:
         """Modes of a model that belong to the shell's."""
         reference = self.result(case, REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
             return None
-        return partners(reference, ours)
+        return metric.partners(reference, ours)
 
 
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:

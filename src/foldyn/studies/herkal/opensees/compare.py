@@ -21,9 +21,9 @@ from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace
 from foldyn.studies import find_case
-from foldyn.studies.herkal.models import REFERENCE, case_with
 from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.run import DT, SAMPLES
+from foldyn.studies.herkal.sheet_models import REFERENCE, case_with
 
 COUNT = 5  # frequencies
 

@@ -19,7 +19,7 @@ from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
 from foldyn.studies.herkal.case_page import NO_BREAK
-from foldyn.studies.herkal.specimen import agreement, figures, synthetic, tasks
+from foldyn.studies.herkal.specimen import evaluation, figures, synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
 from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
 from foldyn.studies.herkal.specimen.measured import Data
@@ -215,13 +215,13 @@ def _peaks(front: xr.Dataset, data: Data) -> Table:
         ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
     ]
     for name, x in curves.items():
-        one = agreement.vibration_of(x, step)
+        one = evaluation.vibration_of(x, step)
         rows.append([name, *map(cell, (one.peak, one.frequency, 100.0 * one.damping_ratio))])
     return Table(
         ["", "spectrum's peak (Hz)", "maxima (Hz)", "decrement (%)"],
         rows,
         f"Vibration of node {WATCHED} along x: the highest peak of its spectrum between "
-        f"{agreement.NEAR[0]:g} and {agreement.NEAR[1]:g} Hz; the frequency of its maxima over "
+        f"{evaluation.NEAR[0]:g} and {evaluation.NEAR[1]:g} Hz; the frequency of its maxima over "
         "time, and the damping by their logarithmic decrement, as the paper has it.",
         digits=3,
     )  # fmt: skip
@@ -246,7 +246,7 @@ def _glue(front: xr.Dataset) -> str:
     """What the supports do to the frequency, and whether that tells them apart."""
     step = sampling_interval(front["time"].values)
     held, alone = (
-        agreement.vibration_of(front["model"].sel(node=WATCHED, support=support).values, step).peak
+        evaluation.vibration_of(front["model"].sel(node=WATCHED, support=support).values, step).peak
         for support in (FILM_SUPPORT, "glue alone")
     )
     paper = _targets()["release_frequency"].value
@@ -273,8 +273,8 @@ def _agreement(front: xr.Dataset) -> Table:
         both = [front["model"].sel(node=node, support=support).values for support in shown]
         rows.append(
             [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
-             *[100.0 * agreement.misfit(film, x) for x in both],
-             *[cell(100.0 * agreement.content_misfit(whole, x, step)) for x in both]]
+             *[100.0 * evaluation.misfit(film, x) for x in both],
+             *[cell(100.0 * evaluation.content_misfit(whole, x, step)) for x in both]]
         )  # fmt: skip
     return Table(
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",

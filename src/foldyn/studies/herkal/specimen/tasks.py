@@ -20,15 +20,20 @@ from foldyn.experiment import Fit, History, Measurement
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import from_json, read_text
 from foldyn.linear import frf, modes
+from foldyn.program import program
 from foldyn.results import netcdf, save
 from foldyn.store import Store
 from foldyn.studies.herkal import calibration, vibration
-from foldyn.studies.herkal.program import specimen_program
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
 from foldyn.writing import scratch, whole, write_text
 
+COMPUTING = (
+    "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
+    "studies/herkal/specimen", "studies/herkal/cases",
+)  # fmt: skip
+"""Files and folders that the results depend on, beside the solvers."""
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
@@ -76,7 +81,7 @@ class Part:
         data = self.data.digests()
         if self.part == "film":
             data.pop("static", None)
-        return {"program": specimen_program(), "data": data, "shot": shot}
+        return {"program": program(*COMPUTING), "data": data, "shot": shot}
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
