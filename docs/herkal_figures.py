@@ -21,6 +21,7 @@ from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
 from foldyn.studies.herkal.figures import plot_sensitivity
+from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
 from foldyn.studies.herkal.sheet_models import REFERENCE, label, rules
 from foldyn.studies.herkal.specimen import page
@@ -38,7 +39,7 @@ WIDTH = 900  # pixels
 
 def draw(study: Study, found: variations.Variations) -> None:
     """Write the two figures."""
-    nodes, axis = study.reported("case2")
+    nodes, axis, _ = reported("case2")
     names = (REFERENCE, "panel", "circumcenter", "consistent")
     every = {label(m): study.result("case2", m, "motion") for m in names}
     motions = {name: motion for name, motion in every.items() if motion is not None}

@@ -238,7 +238,7 @@ def test_page_of_the_sensitivity(stored, tmp_path):
 
 def test_the_command_varies_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(studies, "CASES", ("case1",))
-    monkeypatch.setattr(studies, "QUICK", studies.Plan(SHORT))
+    monkeypatch.setattr(studies, "QUICK", studies.StudyPlan(SHORT))
     monkeypatch.setattr(sensitivity, "PULSES", (0.5,))
     monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
     monkeypatch.setattr(sensitivity_page, "PULSES", (0.5,))

@@ -12,8 +12,9 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals import find_peaks, spectrum
-from foldyn.studies.herkal.metric import UP_TO, content
+from foldyn.signals import find_peaks
+from foldyn.studies.herkal.metric import UP_TO, content, content_of
+from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sheet_models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
@@ -24,20 +25,20 @@ NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 
 
-def _histories(study: Study, case: str, model: str) -> tuple[NDArray, float] | None:
-    """Displacement (time, nodes) of the reported nodes, and the sampling interval."""
-    motion = study.result(case, model, "motion") if case in study.plan.cases else None
-    if motion is None:
-        return None
-    nodes, axis = study.reported(case)
-    x = motion["displacement"].sel(node=nodes, axis=axis).transpose("time", "node").values
-    return x, float(motion["time"][1] - motion["time"][0])
+def _motion(study: Study, case: str, model: str) -> xarray.Dataset | None:
+    return study.result(case, model, "motion") if case in study.plan.cases else None
+
+
+def _edge(motion: xarray.Dataset) -> NDArray:
+    """Displacement (time, nodes) of the reported nodes of case 1."""
+    nodes, axis, _ = reported("case1")
+    return motion["displacement"].sel(node=nodes, axis=axis).transpose("time", "node").values
 
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
     """How unlike the two nodes of case 1 move with some models, the largest."""
-    motions = [_histories(study, "case1", model) for model in models]
-    moved = [NO_MOTION if found is None else found[0] for found in motions]
+    motions = [_motion(study, "case1", model) for model in models]
+    moved = [NO_MOTION if motion is None else _edge(motion) for motion in motions]
     return max(
         float(np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1))) for x in moved
     )
@@ -45,13 +46,12 @@ def _asymmetry(study: Study, models: Iterable[str]) -> float:
 
 def second_peak_case1(study: Study) -> float:
     """Peak (Hz) of the spectrum of the difference of the two nodes, equi-inertial."""
-    found = _histories(study, "case1", "equi_inertial")
-    if found is None:
+    motion = _motion(study, "case1", "equi_inertial")
+    if motion is None:
         return NO_VALUE
-    x, dt = found
-    frequency, amplitude = spectrum(x[:, 0] - x[:, 1], dt)
-    kept = frequency <= UP_TO
-    return _strongest(frequency[kept], amplitude[kept], (0.0, UP_TO))
+    x = _edge(motion)
+    found = content_of(motion["time"].values, x[:, 0] - x[:, 1])
+    return _strongest(*found, (0.0, UP_TO))
 
 
 def _strongest(frequency: NDArray, amplitude: NDArray, band: tuple[float, float]) -> float:
@@ -64,10 +64,10 @@ def _strongest(frequency: NDArray, amplitude: NDArray, band: tuple[float, float]
 
 def _second_peak(study: Study, case: str) -> float:
     """Second peak (Hz) of the shell, all reported nodes together."""
-    motion = study.result(case, REFERENCE, "motion") if case in study.plan.cases else None
+    motion = _motion(study, case, REFERENCE)
     if motion is None:
         return NO_VALUE
-    frequency, amplitude = content(motion, *study.reported(case))
+    frequency, amplitude = content(motion, *reported(case))
     return _strongest(frequency, np.linalg.norm(amplitude, axis=1), BAND)
 
 

@@ -20,6 +20,7 @@ from foldyn.results import load, save
 from foldyn.statics import trace
 from foldyn.store import Store
 from foldyn.studies import find_case
+from foldyn.studies.herkal.metric import UP_TO
 from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, case_study, case_with
 
 COMPUTING = tuple(
@@ -116,6 +117,12 @@ def program() -> str:
 def case_file_digest(case: str) -> str:
     """Digest of a shipped case file."""
     return hashlib.sha256(find_case(f"herkal/{case}").read_bytes()).hexdigest()[:16]
+
+
+def reported(case: str) -> tuple[list[int], str, float]:
+    """Nodes and axis that a case study reports, and where its spectra end (Hz)."""
+    output = case_study(case).output
+    return output.nodes.tolist(), output.axis or "x", output.max_frequency or UP_TO
 
 
 def compute(job: Job) -> xarray.Dataset:

@@ -20,8 +20,8 @@ import foldyn
 from foldyn.analyses import CaseFile
 from foldyn.input_files import from_json, read_text
 from foldyn.store import Store, stamp_of
-from foldyn.studies.herkal.metric import UP_TO, errors, partners
-from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, program
+from foldyn.studies.herkal.metric import errors, partners
+from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, program, reported
 from foldyn.studies.herkal.sheet_models import (
     AS_FILED,
     LOADS,
@@ -122,8 +122,7 @@ class Comparison:
 
     def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
         """Errors of the frequency content under one load."""
-        output = case_study(self.case).output
-        shown = output.nodes.tolist(), output.axis or "x", output.max_frequency or UP_TO
+        shown = reported(self.case)
         reference = compute(Job(self.case, REFERENCE, "motion", self.numerics, load))
         for variant in stiffnesses(load):
             row = {"case": self.case, **asdict(variant)}

@@ -11,12 +11,10 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.analyses import CaseFile, read_case
-from foldyn.studies import find_case
 from foldyn.studies.herkal import metric
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.pool import Done, run
-from foldyn.studies.herkal.runs import Job, Numerics, stored
+from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
 from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
@@ -28,7 +26,7 @@ LINEAR = Variant(bend_law="linear")
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudyPlan:
     """What a study computes.
 
     Attributes
@@ -48,28 +46,31 @@ class Plan:
 
     def jobs(self) -> list[Job]:
         """All computations, the longest first."""
-        every = (REFERENCE, *self.models)
-        found = [Job(c, m, "motion", self.numerics) for m in every for c in self.cases]
-        found += [Job(c, m, "modes", self.numerics) for m in every for c in self.cases]
-        for case in self.cases:
-            found += [Job(case, m, "path", self.numerics) for m in self.statics().values()]
-            found += [
-                Job(case, m, "path", self.numerics, LINEAR)
-                for m in self.statics().values()
-                if m != REFERENCE
-            ]
+        found = [
+            Job(case, model, kind, self.numerics)
+            for kind in ("motion", "modes")
+            for model in (REFERENCE, *self.models)
+            for case in self.cases
+        ]
+        return found + [
+            Job(case, model, "path", self.numerics, variant)
+            for case in self.cases
+            for model, variant in self.paths().values()
+        ]
+
+    def paths(self) -> dict[str, tuple[str, Variant]]:
+        """Model and variant of each stiffness, by label: mass plays no part in statics."""
+        found: dict[str, tuple[str, Variant]] = {}
+        for name in (REFERENCE, *self.models):
+            stiffness = model_of(name).statics
+            found.setdefault(stiffness, (name, AS_FILED))
+            if name != REFERENCE:
+                found.setdefault(f"{stiffness}, linear bends", (name, LINEAR))
         return found
 
-    def statics(self) -> dict[str, str]:
-        """The model that is computed for each stiffness: mass plays no part in statics."""
-        first: dict[str, str] = {}
-        for name in (REFERENCE, *self.models):
-            first.setdefault(model_of(name).statics, name)
-        return first
 
-
-FULL = Plan()
-QUICK = Plan(Numerics(divisions=8, dt=0.01), shot=COARSE)
+FULL = StudyPlan()
+QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE)
 VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
 
 
@@ -79,14 +80,14 @@ class Study:
 
     Attributes
     ----------
-    plan : Plan
+    plan : StudyPlan
     folder : Path
         Of the study; results are in its folder `runs`.
     data : Data or None
         What was measured of the specimen; None leaves it out.
     """
 
-    plan: Plan
+    plan: StudyPlan
     folder: Path
     data: Data | None = None
 
@@ -123,25 +124,14 @@ class Study:
             self._read[job] = stored(self.folder / RESULTS, job)
         return self._read[job]
 
-    def case_file(self, case: str) -> CaseFile:
-        """Shipped case file of a case study."""
-        return read_case(find_case(f"herkal/{case}"))
-
-    def reported(self, case: str) -> tuple[list[int], str]:
-        """Nodes and axis that a case study reports."""
-        output = self.case_file(case).output
-        return output.nodes.tolist(), output.axis or "x"
-
     # ------------------------------------------------------------------ tables
     def node_errors(self, case: str, model: str, variant: Variant = AS_FILED) -> NDArray | None:
         """Deviation of the frequency content from the shell's, per node."""
-        nodes, axis = self.reported(case)
         reference = self.result(case, REFERENCE, "motion", variant.of_shell)
         motion = self.result(case, model, "motion", variant)
         if reference is None or motion is None:
             return None
-        up_to = self.case_file(case).output.max_frequency or metric.UP_TO
-        return metric.errors(motion, reference, nodes, axis, up_to)
+        return metric.errors(motion, reference, *reported(case))
 
     def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
         """The paper's metric, nan where a motion is missing."""
@@ -157,19 +147,18 @@ class Study:
 
     def displacements(self, case: str) -> dict[str, NDArray]:
         """Static displacement (m) of the reported nodes at full load, by path."""
-        nodes, axis = self.reported(case)
-        found = {}
-        for label, path in self.paths(case).items():
-            found[label] = path["displacement"].sel(node=nodes, axis=axis).values[-1]
-        return found
+        nodes, axis, _ = reported(case)
+        return {
+            label: path["displacement"].sel(node=nodes, axis=axis).values[-1]
+            for label, path in self.paths(case).items()
+        }
 
     def paths(self, case: str) -> dict[str, xarray.Dataset]:
         """Equilibrium paths by stiffness; bars and hinges also with linear bends."""
-        found = {}
-        for label, model in self.plan.statics().items():
-            found[label] = self.result(case, model, "path")
-            if model != REFERENCE:
-                found[f"{label}, linear bends"] = self.result(case, model, "path", LINEAR)
+        found = {
+            label: self.result(case, model, "path", variant)
+            for label, (model, variant) in self.plan.paths().items()
+        }
         return {label: path for label, path in found.items() if path is not None}
 
     def frequencies(self, case: str, model: str) -> metric.Partners | None:
@@ -204,11 +193,10 @@ def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
 
 
 def _second_row(study: Study, case: str, divisions: int, dt: float) -> dict[str, float]:
-    nodes, axis = study.reported(case)
+    nodes, axis, up_to = reported(case)
     theirs = read_motion(case, divisions, dt)
     if theirs.node.tolist() != nodes:
         return {}
-    up_to = study.case_file(case).output.max_frequency or metric.UP_TO
     moved = theirs.displacement[:, :, metric.AXES.index(axis)]
     reference = metric.content_of(theirs.time, moved, up_to)[1]
     row = {}

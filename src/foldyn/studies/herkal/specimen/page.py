@@ -18,7 +18,6 @@ from foldyn.report.sections import cell
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.case_page import NO_BREAK
 from foldyn.studies.herkal.specimen import evaluation, figures, synthetic, tasks
 from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
 from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
@@ -28,6 +27,7 @@ from foldyn.studies.herkal.vibration import ORDINALS, TARGETS, Response
 from foldyn.studies.targets import Target, read_targets
 
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
+NO_BREAK = "\N{NO-BREAK SPACE}"
 POOR = 0.3  # misfit, as a part of what was measured, above which a fit is none
 SYMBOLS = {
     "sheet.length_scale_ratio": "length-scale ratio",
