@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn import __version__
+from foldyn.input_files import file_digest
 from foldyn.studies import shipped_cases
 from foldyn.writing import write_bytes, write_text
 
@@ -40,7 +40,7 @@ class Owner:
     def of(cls, command: str, file: Path, folder: Path) -> Owner:
         """Owner of a folder of results of a file."""
         shipped = [name for name, path in shipped_cases().items() if path == file]
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+        digest = file_digest(file)
         with suppress(ValueError, OSError):  # on another drive; where there is no such place
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
         source = shipped[0] if shipped else file.as_posix()

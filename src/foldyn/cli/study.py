@@ -110,8 +110,8 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
         f"distributions, {n.duration:g} s of motion"
     )
     if data is not None:
-        source = "a synthetic film" if data.synthetic else ", ".join(data.names)
-        say(f"the specimen: calibrated to {source}")
+        names = ", ".join(file.name for file in data.files.values())
+        say(f"the specimen: calibrated to {names or 'a synthetic film'}")
     ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
     return report.write(one), ended

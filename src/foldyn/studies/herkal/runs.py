@@ -6,7 +6,6 @@ sources among it: results of another program are computed again.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +14,7 @@ import xarray
 
 from foldyn import program as programs
 from foldyn.dynamics import simulate
+from foldyn.input_files import file_digest
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
@@ -116,7 +116,7 @@ def program() -> str:
 
 def case_file_digest(case: str) -> str:
     """Digest of a shipped case file."""
-    return hashlib.sha256(find_case(f"herkal/{case}").read_bytes()).hexdigest()[:16]
+    return file_digest(find_case(f"herkal/{case}"))
 
 
 def reported(case: str) -> tuple[list[int], str, float]:

@@ -14,6 +14,7 @@ from foldyn.shells import shell
 from foldyn.structures import discretize
 from foldyn.studies import find_case
 
+CASES = ("case1", "case2", "case3", "case4")
 REFERENCE = "shell"
 LOADS = ("file", "edge")
 

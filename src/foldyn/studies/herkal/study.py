@@ -15,12 +15,11 @@ from foldyn.studies.herkal import metric
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
-from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, model_of, rules
+from foldyn.studies.herkal.sheet_models import AS_FILED, CASES, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
 
-CASES = ("case1", "case2", "case3", "case4")
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
 

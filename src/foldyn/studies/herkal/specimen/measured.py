@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -12,11 +11,11 @@ from foldyn.errors import InputError
 from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
 from foldyn.experiment.tracking.films import PHOTOS
-from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL
+from foldyn.input_files import file_digest
+from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL, SYNTHETIC
 from foldyn.studies.herkal.specimen import evaluation
 from foldyn.studies.herkal.specimen.prepared import prepare
 
-SYNTHETIC = "synthetic"
 AXIS = "x"
 
 
@@ -56,11 +55,6 @@ class Data:
         """The files by what they are."""
         files = {"static": self.static, "release": self.release}
         return {what: file for what, file in files.items() if file is not None}
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the files."""
-        return [file.name for file in self.files.values()]
 
     def digests(self) -> dict[str, str]:
         """Digests of the files, by what they are."""
@@ -119,22 +113,22 @@ def _kind(file: Path) -> str:
     elif suffix != ".csv":
         open_film(str(file))
         return "release"
-    told = measurement(file, "")
-    if isinstance(told, ForceDisplacement):
-        _check_forces(told)
+    given = measurement(file, "")
+    if isinstance(given, ForceDisplacement):
+        _check_forces(given)
         return "static"
-    if not isinstance(told, History):
+    if not isinstance(given, History):
         raise InputError(
             "shapes without forces say nothing of the stiffness; give forces over displacements, "
             "or tracks of photographs with loads (*.nc)"
         )
-    evaluation.press_of(prepare(told))
+    evaluation.press_of(prepare(given))
     return "release"
 
 
-def _check_forces(told: ForceDisplacement) -> None:
+def _check_forces(given: ForceDisplacement) -> None:
     """Refuse points from which the folds cannot be found."""
-    moved, most = told.displacement, FULL * evaluation.FACTORS[-1]
+    moved, most = given.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
         raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
     if not ((moved > 0.0) & (moved <= most)).all():
@@ -142,8 +136,8 @@ def _check_forces(told: ForceDisplacement) -> None:
             f"displacements are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; those of "
             f"the top must be above 0, downwards, and at most {1e3 * most:.3g} mm"
         )
-    if not (told.force > 0.0).all():
-        raise InputError(f"a force is {told.force.min():.3g} N; those that press are positive")
+    if not (given.force > 0.0).all():
+        raise InputError(f"a force is {given.force.min():.3g} N; those that press are positive")
 
 
 def _digest(file: Path) -> str:
@@ -153,6 +147,5 @@ def _digest(file: Path) -> str:
 
 @cache
 def _digest_of(file: Path, size: int, changed: int) -> str:
-    """Digest of a file; that of a long film takes seconds."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()[:16]
+    """Digest of a file in some state; that of a long film takes seconds."""
+    return file_digest(file)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import warnings
@@ -18,7 +17,7 @@ from foldyn import experiment, plots
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import Fit, History, Measurement
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.input_files import from_json, read_text
+from foldyn.input_files import file_digest, from_json, read_text
 from foldyn.linear import frf, modes
 from foldyn.program import program
 from foldyn.results import netcdf, save
@@ -39,13 +38,6 @@ NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
 RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
-WRITES: Mapping[str, tuple[str, ...]] = {
-    "photographs": (PHOTOS,),
-    "film": (FILM, TRUTH),
-    "fit": (FOUND, COMPARED),
-    "response": (*RESPONSES.values(), MODES),
-}
-"""Files that a part leaves for others, or for the page."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +80,12 @@ class Part:
         files = STAMPS.find(self._stamp(folder), self.settings())
         if files is None:
             return False
-        damaged = [name for name, told in files.items() if _digest(folder / FOLDER / name) != told]
-        if damaged:
-            text = f"{folder / FOLDER / damaged[0]}: is damaged or missing; it is computed again"
-            warnings.warn(text, FoldynWarning, stacklevel=2)
-        return not damaged
+        for name, digest in files.items():
+            if _digest(folder / FOLDER / name) != digest:
+                text = f"{folder / FOLDER / name}: is damaged or missing; it is computed again"
+                warnings.warn(text, FoldynWarning, stacklevel=2)
+                return False
+        return True
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder.
@@ -108,9 +101,9 @@ class Part:
         if missing:
             raise ComputationError(f"it needs {missing[0].name}, which failed")
         self._stamp(folder).unlink(missing_ok=True)
-        PARTS[self.part](self, inside)
-        files = [inside / name for name in WRITES[self.part]]
-        kept = {file.name: _digest(file) for file in files if file.is_file()}
+        compute, names = PARTS[self.part]
+        compute(self, inside)
+        kept = {name: _digest(inside / name) for name in names if (inside / name).is_file()}
         STAMPS.keep(self._stamp(folder), self.settings(), kept)
 
     def _needed(self) -> list[Part]:
@@ -136,12 +129,9 @@ STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
     """What needs nothing else, and what comes after it, in order."""
-    seen = []
-    if data.synthetic:
-        seen.append("photographs")
-    if data.synthetic or data.film is not None:
-        seen.append("film")
-    return [Part(p, shot, data) for p in seen], [Part(p, shot, data) for p in ("fit", "response")]
+    first = ["photographs"] if data.synthetic else []
+    first += ["film"] if data.synthetic or data.film is not None else []
+    return [Part(p, shot, data) for p in first], [Part(p, shot, data) for p in ("fit", "response")]
 
 
 def _model() -> experiment.Model:
@@ -261,12 +251,13 @@ def _response(part: Part, folder: Path) -> None:
     save(modes(case, **vibration.analysis("modes")), folder / MODES)
 
 
-PARTS: Mapping[str, Callable[[Part, Path], None]] = {
-    "photographs": _photographs,
-    "film": _film,
-    "fit": _fit,
-    "response": _response,
+PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
+    "photographs": (_photographs, (PHOTOS,)),
+    "film": (_film, (FILM, TRUTH)),
+    "fit": (_fit, (FOUND, COMPARED)),
+    "response": (_response, (*RESPONSES.values(), MODES)),
 }
+"""How each part is computed, and the files that it leaves for others or for the page."""
 
 
 def read_found(folder: Path) -> dict[str, Any]:
@@ -282,7 +273,4 @@ def read_found(folder: Path) -> dict[str, Any]:
 
 def _digest(file: Path) -> str:
     """Digest of a file; "" where there is none."""
-    try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError:
-        return ""
+    return file_digest(file) if file.is_file() else ""
