@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, held
-from foldyn.cli.options import add_results
+from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError
@@ -33,14 +33,9 @@ def add_study(commands: Any) -> None:
         "already is not computed again.",
     )
     study.add_argument("name", choices=("herkal",), help="which: herkal (Herkal et al.)")
-    study.add_argument(
-        "--quick", action="store_true", help="coarser shell, longer steps: minutes, no measure"
-    )
-    study.add_argument(
-        "--sensitivity",
-        action="store_true",
-        help="instead: the same under other pulses, loads, bends and calibrations",
-    )
+    flag(study, "--quick", "coarser shell, longer steps: minutes, no measure")
+    sensitivity = "instead: the same under other pulses, loads, bends and calibrations"
+    flag(study, "--sensitivity", sensitivity)
     study.add_argument(
         "--data",
         nargs="+",

@@ -12,8 +12,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals import find_peaks
-from foldyn.studies.herkal.metric import UP_TO, content, content_of
+from foldyn.studies.herkal.metric import UP_TO, content, content_of, strongest_peak
 from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sheet_models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
@@ -21,6 +20,7 @@ from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
 BAND = (1.4, 2.4)  # Hz, where second peaks are sought
+PROMINENCE = 0.01  # of a peak, as a part of the highest amplitude
 NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 
@@ -51,15 +51,7 @@ def second_peak_case1(study: Study) -> float:
         return NO_VALUE
     x = _edge(motion)
     found = content_of(motion["time"].values, x[:, 0] - x[:, 1])
-    return _strongest(*found, (0.0, UP_TO))
-
-
-def _strongest(frequency: NDArray, amplitude: NDArray, band: tuple[float, float]) -> float:
-    peaks = find_peaks(frequency, amplitude, prominence=0.01)
-    inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
-    if not inside.any():
-        return NO_VALUE
-    return float(peaks.frequency[inside][np.argmax(peaks.height[inside])])
+    return strongest_peak(*found, (0.0, UP_TO), PROMINENCE)
 
 
 def _second_peak(study: Study, case: str) -> float:
@@ -68,7 +60,7 @@ def _second_peak(study: Study, case: str) -> float:
     if motion is None:
         return NO_VALUE
     frequency, amplitude = content(motion, *reported(case))
-    return _strongest(frequency, np.linalg.norm(amplitude, axis=1), BAND)
+    return strongest_peak(frequency, np.linalg.norm(amplitude, axis=1), BAND, PROMINENCE)
 
 
 def _mismatch(study: Study, places: list[int]) -> float:

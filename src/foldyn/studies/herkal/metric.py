@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.linear import mac, pair_modes
-from foldyn.signals import sampling_interval, spectrum
+from foldyn.signals import find_peaks, sampling_interval, spectrum
 
 UP_TO = 5.0  # Hz
 AXES = ("x", "y", "z")
@@ -55,6 +55,20 @@ def content_of(
     frequency, amplitude = spectrum(record, sampling_interval(time))
     kept = frequency <= up_to * (1.0 + 1e-9)
     return frequency[kept], amplitude[kept]
+
+
+def strongest_peak(
+    frequency: NDArray[np.float64],
+    amplitude: NDArray[np.float64],
+    band: tuple[float, float],
+    prominence: float,
+) -> float:
+    """Frequency (Hz) of the highest peak within a band; nan where there is none."""
+    peaks = find_peaks(frequency, amplitude, prominence)
+    inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
+    if not inside.any():
+        return float("nan")
+    return float(peaks.frequency[inside][np.argmax(peaks.height[inside])])
 
 
 def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +88,7 @@ class Study:
     plan: StudyPlan
     folder: Path
     data: Data | None = None
+    _read: dict[Job, xarray.Dataset | None] = field(default_factory=dict, repr=False)
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
@@ -109,10 +109,6 @@ class Study:
         first, then = self.parts
         ended = run([*first, *self.plan.jobs()], results, tell, processes)
         return ended + run(then, results, tell, processes=1)
-
-    @cached_property
-    def _read(self) -> dict[Job, xarray.Dataset | None]:
-        return {}
 
     def result(
         self, case: str, model: str, kind: str, variant: Variant = AS_FILED

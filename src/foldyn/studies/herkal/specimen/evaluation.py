@@ -20,14 +20,15 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
 from foldyn.experiment.calibration.key_paths import replaced
-from foldyn.signals import find_peaks, log_decrement, spectrum
+from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED
-from foldyn.studies.herkal.metric import deviation
+from foldyn.studies.herkal.metric import deviation, strongest_peak
 from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
+PROMINENCE = 0.05  # of a peak, as a part of the highest amplitude
 NEAR = (4.0, 14.0)  # Hz, where the axial vibration is sought
 FINER = 8  # times by which the grid of frequencies is finer than the resolution
 UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
@@ -212,17 +213,10 @@ def fit_release(
     free = prepare(measured)
     press = press_of(free, changes)
     duration = float(free.history.time[-1]) + 2.0 * free.history.align
-    cases = {
-        support: calibration.released_case(
-            models / support.replace(" ", "-"),
-            changes,
-            step,
-            press,
-            support,
-            duration,
-        )
-        for support in SUPPORTS
-    }
+    cases = {}
+    for support in SUPPORTS:
+        place = models / support.replace(" ", "-")
+        cases[support] = calibration.released_case(place, changes, step, press, support, duration)
     others = [node for node in free.nodes if node in FRONT and node != WATCHED]
     film = [free.of([WATCHED], "node 8")]
     if others:
@@ -337,11 +331,9 @@ def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
     found = content(x, step)
     if found is None:
         return Vibration()
-    peaks = find_peaks(*found)
-    near = (peaks.frequency > NEAR[0]) & (peaks.frequency < NEAR[1])
-    if not near.any():
+    peak = strongest_peak(*found, NEAR, PROMINENCE)
+    if math.isnan(peak):
         return Vibration()
-    peak = float(peaks.frequency[near][np.argmax(peaks.height[near])])
     try:
         maxima = log_decrement(x, step, rest=0.0, frequency=peak)
     except InputError:  # fewer than two

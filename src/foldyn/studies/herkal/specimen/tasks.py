@@ -18,7 +18,6 @@ from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import Fit, History, Measurement
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import file_digest, from_json, read_text
-from foldyn.linear import frf, modes
 from foldyn.program import program
 from foldyn.results import netcdf, save
 from foldyn.store import Store
@@ -244,11 +243,9 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
     for name, given in (("published", {}), ("fitted", changes)):
-        case = vibration.specimen("frf", changes=given)
-        save(frf(case, **vibration.analysis("frf")), folder / RESPONSES[name])
+        save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
-    case = vibration.specimen("modes", changes=folds)
-    save(modes(case, **vibration.analysis("modes")), folder / MODES)
+    save(vibration.specimen("modes", changes=folds).run(), folder / MODES)
 
 
 PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
