@@ -84,7 +84,7 @@ def main(folder: Path) -> None:
         )
     table(
         ["claim", "paper or bound", "here", ""],
-        [[v.target.what, v.asked, float(v.computed), v.told] for v in claims(study)],
+        [[v.target.what, v.asked, float(v.computed), v.word] for v in claims(study)],
     )
     for one in (
         report.rank_table(study),

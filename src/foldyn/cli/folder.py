@@ -77,21 +77,21 @@ class Results:
     folder : Path
     kept : list of str
         What has been saved, where it is.
-    goes_on : bool
-        Whether the same command would go on from there.
+    resumable : bool
+        Whether the same command would continue from there.
     """
 
     def __init__(self, folder: Path, owner: Owner, drawn: Sequence[str], old: list[str]) -> None:
         self.folder, self.owner, self.drawn = folder, owner, drawn
         self.kept: list[str] = []
-        self.goes_on = False
+        self.resumable = False
         self._old, self._new = old, list[str]()
         self._before = stamp.raw(folder)
         self._begun = self._cleared = False
 
     def begin(self, name: str) -> None:
         """Note a folder to which results go one by one, so that the same command goes on."""
-        self.goes_on = True
+        self.resumable = True
         self.kept.append(str(self.folder / name))
         self._new.append(name)
         self._stamp("running")
@@ -142,7 +142,7 @@ class Results:
         """What was kept, for the end of a message."""
         if not self.kept:
             return ""
-        further = "; the same command goes on from there" if self.goes_on else ""
+        further = "; the same command goes on from there" if self.resumable else ""
         return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
 
     def _stamp(self, state: str) -> None:

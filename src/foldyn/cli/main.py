@@ -181,14 +181,14 @@ class _Warnings:
     """Writes warnings as the command's own lines, each once: mass rules would repeat them."""
 
     def __init__(self) -> None:
-        self.told: set[str] = set()
+        self.shown: set[str] = set()
 
     def __call__(self, message: Warning | str, category: type[Warning], *_: object) -> None:
         name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
         text = f"foldyn: warning: {name}{message}"
-        if text not in self.told:
+        if text not in self.shown:
             print(text, file=sys.stderr)
-        self.told.add(text)
+        self.shown.add(text)
 
 
 if __name__ == "__main__":

@@ -55,12 +55,12 @@ def read(folder: Path) -> dict[str, Any] | None:
     """Stamp of a folder; None where it has none, or none that can be understood."""
     try:
         found = json.loads(raw(folder) or b"")
-        told = [found[key] for key in ("command", "source", "state")]
+        texts = [found[key] for key in ("command", "source", "state")]
         files = [*found["results"], *found["outdated"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    names = [name for name in files if isinstance(name, str) and Path(name).name == name]
-    return found if all(isinstance(one, str) for one in told) and len(names) == len(files) else None
+    sound = all(isinstance(text, str) for text in (*texts, *files))
+    return found if sound and all(Path(name).name == name for name in files) else None
 
 
 def raw(folder: Path) -> bytes | None:
@@ -93,9 +93,9 @@ def write(
     results, outdated : sequence of str
         Files of this run, and of one before, which go when the first of this one is there.
     """
-    told = {"foldyn_version": __version__, **asdict(owner), "state": state}
-    told |= {"results": list(results), "outdated": list(outdated)}
-    write_text(folder / NAME, json.dumps(told, indent=1) + "\n")
+    stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
+    stamp |= {"results": list(results), "outdated": list(outdated)}
+    write_text(folder / NAME, json.dumps(stamp, indent=1) + "\n")
 
 
 def named(stamp: dict[str, Any], folder: Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from foldyn.cli.options import add_switches
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import progress_bar, speech
 from foldyn.errors import ComputationError, InputError
+from foldyn.input_files import check_file
 from foldyn.studies import find_case
 from foldyn.values import number
 from foldyn.values import whole as whole_number
@@ -205,10 +205,7 @@ def _are_photos(inputs: Sequence[str]) -> bool:
     if not any(photos) and len(inputs) > 1:
         raise InputError(f"{inputs[1]}: one film at a time")
     for name in inputs:
-        if os.path.isdir(name):
-            raise InputError(f"{name}: is a folder; give a film, or all photographs in it")
-        if not os.path.isfile(name):
-            raise InputError(f"{name}: there is no such file")
+        check_file(name, "a film, or all photographs in it")
     if photos == [True]:
         raise InputError(
             f"{inputs[0]}: one photograph alone shows no displacement; give at least two, the "

@@ -1,13 +1,8 @@
 """Results: datasets that carry their own case, in memory and in files."""
 
 from foldyn.results.contents import case_of, check_result
-from foldyn.results.dataset import (
-    frf_dataset,
-    modes_dataset,
-    path_dataset,
-    trajectory_dataset,
-)
-from foldyn.results.files import load, save
+from foldyn.results.dataset import frf_dataset, modes_dataset, path_dataset, trajectory_dataset
+from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
 
 __all__ = [

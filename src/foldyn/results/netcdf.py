@@ -1,8 +1,11 @@
-"""Datasets in NetCDF files: written whole or not at all, and read whole or not at all.
+"""Results, and other datasets, in NetCDF files: written and read whole or not at all.
 
 A seal at the end of a file, the digest of all that comes before it, shows damage. HDF5 ignores what
 follows its own end, and cuts it off when another program changes the file: such a file has no seal,
 like those of older programs, and is read without this check.
+
+NetCDF has no complex numbers: a complex variable of a result is stored as two, its real and its
+imaginary part, and put together again on loading.
 """
 
 from __future__ import annotations
@@ -16,15 +19,20 @@ from typing import Any
 
 import h5netcdf  # noqa: F401  here, and not in the processes that read
 import h5py
+import numpy as np
 import xarray as xr
 from xarray.backends import list_engines
 
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
 from foldyn.results.apart import apart
+from foldyn.results.contents import check_result, whole_attribute
+from foldyn.results.dataset import FORMAT
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
+_PARTS = ("real", "imag")
+_WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 LEAST_MEMORY = 2**29
@@ -35,6 +43,65 @@ LEAST_SECONDS, PER_SECOND = 2, 50_000
 _MARK = b"\nfoldyn sha256 "
 _SEAL = len(_MARK) + 64 + 1  # its length
 _PIECE = 1 << 20
+
+
+def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a result to a NetCDF file.
+
+    The file appears only when it is complete; one of the same name is replaced.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result.
+    path : path
+        The file, usually ``*.nc``; its folder must exist.
+
+    Raises
+    ------
+    InputError
+        Not a result, or the path cannot be written.
+    """
+    check_result(ds, "cannot save: the dataset ")
+    write(_split(ds), path)
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result from a NetCDF file, whole into memory.
+
+    Parameters
+    ----------
+    path : path
+        A file that `save` wrote.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is not a Foldyn result.
+    """
+    path = Path(path)
+    ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)")
+    check_result(ds, f"{path}: ")
+    try:
+        newer = whole_attribute(ds, "foldyn_format") > FORMAT
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if newer:
+        raise InputError(
+            f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
+            "version does not know; update Foldyn"
+        )
+    try:
+        return _joined(ds)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: is damaged: a complex variable lacks its real or imaginary part; restore it "
+            "from a copy, or compute it again"
+        ) from None
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -219,3 +286,32 @@ class Sink(io.FileIO):
             room[found:] = bytes(len(room) - found)
             return len(room)
         return found
+
+
+def _split(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with the two parts of each complex variable instead of it."""
+    split = ds
+    for name, whole in ds.data_vars.items():
+        if np.iscomplexobj(whole.values):
+            own = {**whole.attrs, _WHOLE: str(name)}
+            parts = {f"{name}_{part}": getattr(whole, part).assign_attrs(own) for part in _PARTS}
+            split = split.drop_vars(str(name)).assign(parts)
+    return split
+
+
+def _joined(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with complex variables put together from their parts."""
+    names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
+    for name in names:
+        if name is None:
+            continue
+        real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
+        if real.dims != imag.dims or {real.dtype.kind, imag.dtype.kind} != {"f"}:
+            raise TypeError(name)
+        # not real + 1j * imag: an infinite part would make the other one nan
+        whole = np.empty(real.shape, np.complex128)
+        whole.real, whole.imag = real.values, imag.values
+        own = {key: value for key, value in real.attrs.items() if key != _WHOLE}
+        ds = ds.drop_vars([f"{name}_{part}" for part in _PARTS])
+        ds = ds.assign({name: (real.dims, whole, own)})
+    return ds

@@ -77,12 +77,12 @@ class Verdict:
         """One line for people."""
         return (
             f"{self.target.what}: {self.computed:.4g} {self.target.unit} beside "
-            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.told}"
+            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.word}"
         )
 
     @property
-    def told(self) -> str:
-        """In a word whether they agree."""
+    def word(self) -> str:
+        """Whether they agree."""
         return {True: "holds", False: "fails", None: "beside"}[self.holds]
 
     @property

@@ -158,7 +158,7 @@ def released_case(
         "title": "The paper specimen released",
         "supports": SUPPORTS[support],
         "initial": {"file": "pressed.nc"},
-        "damping": {"alpha": DAMPING["damping.alpha"], "beta": DAMPING["damping.beta"]},
+        "damping": {key.removeprefix("damping."): value for key, value in DAMPING.items()},
         "analysis": {
             "kind": "dynamics",
             "method": "generalized_alpha",
@@ -208,44 +208,23 @@ def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, 
     return float(found.damped_frequency[best]), float(found.damping_ratio[best])
 
 
-def calibrate(
-    folder: Path,
-    static: Sequence[experiment.Measurement] | None = None,
-    film: Sequence[experiment.Measurement] | None = None,
-    seed: int = 1,
-    **how: Any,
-) -> tuple[experiment.Fit, experiment.Fit]:
-    """Fit the folds to the static test, then, with these folds, the damping to the release.
+def calibrate(folder: Path) -> tuple[experiment.Fit, experiment.Fit]:
+    """Fit the folds to the synthetic static test, then, with them, the damping to the release.
 
-    Parameters
-    ----------
-    folder : Path
-        Keeps the evaluations, and the case files of the release.
-    static, film : sequence of Measurement, optional
-        Measured data; synthetic ones by default.
-    seed : int
-        Of the noise of the synthetic data.
-    **how
-        Other arguments of `fit`.
-
-    Returns
-    -------
-    folds, damping : Fit
+    The folder keeps the evaluations, and the case files of the release.
     """
-    kept = folder / "evaluations"
-    draw = np.random.default_rng(seed)
-    if static is None:
-        static = noisy(static_data(), draw)
-    folds = fit_folds(static, folder=kept, **how)
-    if film is None:
-        film = noisy(release_data(released_case(folder / "truth")), draw)
+    kept, draw = folder / "evaluations", np.random.default_rng(1)
+    folds = fit_folds(noisy(static_data(), draw), folder=kept)
+    film = noisy(release_data(released_case(folder / "truth")), draw)
     model = released_case(folder / "fitted", changes_of(folds))
-    return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept, **how)
+    return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept)
 
 
-def fit_folds(static: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
+def fit_folds(static: Sequence[experiment.Measurement], **options: Any) -> experiment.Fit:
     """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
-    return experiment.fit(find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **how)
+    return experiment.fit(
+        find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **options
+    )
 
 
 def changes_of(folds: experiment.Fit) -> dict[str, Any]:
@@ -253,9 +232,11 @@ def changes_of(folds: experiment.Fit) -> dict[str, Any]:
     return folds.problem.space.changes([*folds.values.values()])
 
 
-def fit_damping(case: Path, film: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
+def fit_damping(
+    case: Path, film: Sequence[experiment.Measurement], **options: Any
+) -> experiment.Fit:
     """Fit alpha and beta to a release."""
-    return experiment.fit(case, film, DAMPING_RANGES, **how)
+    return experiment.fit(case, film, DAMPING_RANGES, **options)
 
 
 def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectrum]:

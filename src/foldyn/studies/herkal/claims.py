@@ -73,13 +73,12 @@ def _mismatch(study: Study, places: list[int]) -> float:
 
 def softer_folds_move_more(study: Study) -> float:
     """Displacement of node 7 of the shell, case 4 over case 2."""
-    paths = [study.result(c, REFERENCE, "path") for c in ("case4", "case2")]
-    soft, stiff = (math.nan if p is None else _at_seven(p) for p in paths)
-    return soft / stiff
-
-
-def _at_seven(path: xarray.Dataset) -> float:
-    return float(path["displacement"].sel(node=7, axis="x").values[-1])
+    moved = []
+    for case in ("case4", "case2"):
+        path = study.result(case, REFERENCE, "path")
+        there = None if path is None else path["displacement"].sel(node=7, axis="x").values[-1]
+        moved.append(NO_VALUE if there is None else float(there))
+    return moved[0] / moved[1]
 
 
 def softer_folds_err_less(study: Study) -> float:

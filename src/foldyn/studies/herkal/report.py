@@ -20,13 +20,7 @@ from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.figures import plot_statics
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
 from foldyn.studies.herkal.runs import SECANT, reported
-from foldyn.studies.herkal.sheet_models import (
-    REFERENCE,
-    case_study,
-    label,
-    model_of,
-    paper_rules,
-)
+from foldyn.studies.herkal.sheet_models import REFERENCE, case_study, label, model_of, paper_rules
 from foldyn.studies.herkal.specimen import page as specimen_page
 from foldyn.studies.herkal.specimen.page import NO_BREAK
 from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks, second_table
@@ -226,7 +220,7 @@ def _frequency_error(study: Study, model: str) -> float:
 
 def _claims(study: Study) -> Table:
     rows = [
-        [f"{v.target.what} [{v.target.source}]", v.asked, _computed(v), v.told]
+        [f"{v.target.what} [{v.target.source}]", v.asked, _computed(v), v.word]
         for v in claims(study)
     ]
     return Table(

@@ -13,6 +13,7 @@ from foldyn.errors import InputError
 from foldyn.shells import shell
 from foldyn.structures import discretize
 from foldyn.studies import find_case
+from foldyn.values import choice
 
 CASES = ("case1", "case2", "case3", "case4")
 REFERENCE = "shell"
@@ -40,8 +41,7 @@ class Variant:
 
     def __post_init__(self) -> None:
         """Check what can be checked without a case."""
-        if self.loads not in LOADS:
-            raise InputError(f"loads = {self.loads!r}: choose one of {', '.join(LOADS)}")
+        choice("loads", self.loads, LOADS)
 
     @property
     def name(self) -> str:
@@ -133,9 +133,7 @@ OTHERS: Mapping[str, SheetModel] = {
 def model_of(name: str) -> SheetModel:
     """SheetModel by its name."""
     known = {**MODELS, **OTHERS}
-    if name not in known:
-        raise InputError(f"model = {name!r}: choose one of {', '.join(known)}")
-    return known[name]
+    return known[choice("model", name, known)]
 
 
 def rules() -> tuple[str, ...]:

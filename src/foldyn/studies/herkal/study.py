@@ -133,12 +133,10 @@ class Study:
         found = self.node_errors(case, model, variant)
         return float("nan") if found is None else float(found.mean())
 
-    def table(
-        self, variant: Variant = AS_FILED, models: Iterable[str] | None = None
-    ) -> dict[str, dict[str, float]]:
+    def table(self, models: Iterable[str] | None = None) -> dict[str, dict[str, float]]:
         """The paper's Table 1: its metric by case and model."""
         names = self.plan.models if models is None else tuple(models)
-        return {c: {m: self.error(c, m, variant) for m in names} for c in self.plan.cases}
+        return {c: {m: self.error(c, m) for m in names} for c in self.plan.cases}
 
     def displacements(self, case: str) -> dict[str, NDArray]:
         """Static displacement (m) of the reported nodes at full load, by path."""

@@ -109,16 +109,9 @@ class Release:
     motion: xarray.Dataset
 
 
-def released(damping: Rayleigh = ALONE, **changes: Any) -> Release:
-    """Free vibration of the specimen after its weight is taken away.
-
-    Parameters
-    ----------
-    damping : Rayleigh
-    **changes
-        Other arguments of `simulate`.
-    """
-    motion = specimen("release", damping).run(**changes)
+def released() -> Release:
+    """Free vibration of the specimen after its weight is taken away."""
+    motion = specimen("release").run()
     late = motion.sel(time=slice(RELEASED + SETTLED, None))
     x = late["displacement"].sel(node=WATCHED, axis="x").values
     step = float(late["time"][1] - late["time"][0])

@@ -193,7 +193,7 @@ def fit_release(
     models: Path,
     changes: Mapping[str, Any],
     step: float = calibration.STEP,
-    **how: Any,
+    **options: Any,
 ) -> Released:
     """Fit the damping to node 8 alone, on the plate with node 59 glued and without the glue.
 
@@ -207,7 +207,7 @@ def fit_release(
         What the static test has changed in the case, by key.
     step : float
         Of the simulations (s).
-    **how
+    **options
         Arguments of `foldyn.fit`.
     """
     free = prepare(measured)
@@ -223,7 +223,7 @@ def fit_release(
         film.append(replace(free.of(others, "other front nodes"), held_out=True))
     whole = [found for one in film if (found := free.whole_of(one)) is not None]
     data = [*film, *calibration.spectra_of(whole)]
-    fits = {s: calibration.fit_damping(cases[s], data, **how) for s in (FILM_SUPPORT, "plate")}
+    fits = {s: calibration.fit_damping(cases[s], data, **options) for s in (FILM_SUPPORT, "plate")}
     return Released(free, press, cases, fits)
 
 

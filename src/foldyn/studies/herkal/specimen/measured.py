@@ -11,7 +11,7 @@ from foldyn.errors import InputError
 from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
 from foldyn.experiment.tracking.films import PHOTOS
-from foldyn.input_files import file_digest
+from foldyn.input_files import check_file, file_digest
 from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL, SYNTHETIC
 from foldyn.studies.herkal.specimen import evaluation
 from foldyn.studies.herkal.specimen.prepared import prepare
@@ -73,11 +73,8 @@ def data_of(names: Sequence[str]) -> Data:
     found: dict[str, Path] = {}
     for name in names:
         file = Path(name)
-        if not file.is_file():
-            what = "is a folder; name a file in it" if file.is_dir() else "there is no such file"
-            raise InputError(f"--data {name}: {what}")
         try:
-            kind = _kind(file)
+            kind = _kind(check_file(file, "a file in it"))
         except InputError as error:
             said = str(error)
             raise InputError(f"--data {said if str(file) in said else f'{file}: {said}'}") from None

@@ -140,15 +140,14 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
-def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
+def prepare(measured: History) -> FreeVibration:
     """Prepare the histories of a film in which a specimen is held and released.
 
     Parameters
     ----------
     measured : History
-        Of all nodes that were tracked, along the axis; the watched one among them.
-    watched : int
-        Node by which the release is found.
+        Of all nodes that were tracked, along the axis; `WATCHED`, by which the release is found,
+        among them.
 
     Raises
     ------
@@ -156,10 +155,10 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
         The watched node was not measured, is not still before the release, was lost for long while
         it swings, or does not swing; fewer than 60 frames per second.
     """
-    nodes, name = numbers_of(measured), f"{measured.name}: node {watched}"
-    if watched not in nodes:
+    nodes, name = numbers_of(measured), f"{measured.name}: node {WATCHED}"
+    if WATCHED not in nodes:
         raise InputError(f"{name} was not measured; it tells the release")
-    column, time = nodes.index(watched), _even(measured.time)
+    column, time = nodes.index(WATCHED), _even(measured.time)
     step = float(time[1] - time[0])
     if step * SLOWEST > 1.001:
         raise InputError(
