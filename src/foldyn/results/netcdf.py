@@ -291,10 +291,10 @@ class Sink(io.FileIO):
 def _split(ds: xr.Dataset) -> xr.Dataset:
     """Dataset with the two parts of each complex variable instead of it."""
     split = ds
-    for name, whole in ds.data_vars.items():
-        if np.iscomplexobj(whole.values):
-            own = {**whole.attrs, _WHOLE: str(name)}
-            parts = {f"{name}_{part}": getattr(whole, part).assign_attrs(own) for part in _PARTS}
+    for name, variable in ds.data_vars.items():
+        if np.iscomplexobj(variable.values):
+            own = {**variable.attrs, _WHOLE: str(name)}
+            parts = {f"{name}_{part}": getattr(variable, part).assign_attrs(own) for part in _PARTS}
             split = split.drop_vars(str(name)).assign(parts)
     return split
 
