@@ -18,7 +18,7 @@ from typing import Any
 from foldyn.errors import InputError
 
 DEEPEST = 50
-"""Tables and lists in one another that a TOML or JSON text may have."""
+"""Levels of nested tables and lists that a TOML or JSON text may have."""
 
 MEBI = 2**20
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST},}}""")
@@ -126,7 +126,7 @@ def _why(error: Exception) -> str:
 
 
 def _shallow(value: Any) -> Any:
-    """Return `value` where it is not too deep for the functions that walk through it."""
+    """Return `value` unless it is too deep for the functions that walk through it."""
     level = [value]
     for _ in range(DEEPEST + 1):
         level = [

@@ -27,7 +27,7 @@ def check_folder(folder: Path, out: str | None, names: Sequence[str]) -> None:
 
 @contextmanager
 def _made(folder: Path, out: str | None, names: Sequence[str]) -> Iterator[None]:
-    """Have a folder that can be written to; it goes again where nothing was written."""
+    """Make a folder and check that it can be written to; it is removed again if it stays empty."""
     if out == "":
         raise InputError("--out: is empty; name a folder")
     made: list[Path] = []
@@ -90,7 +90,7 @@ class Results:
         self._begun = self._cleared = False
 
     def begin(self, name: str) -> None:
-        """Note a folder to which results go one by one, so that the same command goes on."""
+        """Note a folder that collects results one by one, from which the same command continues."""
         self.resumable = True
         self.kept.append(str(self.folder / name))
         self._new.append(name)
@@ -120,7 +120,7 @@ class Results:
                 self._stamp("running")
 
     def clear(self) -> None:
-        """Remove the files of an earlier run, and its figures, which would belie this one."""
+        """Remove the files and figures of an earlier run, which would contradict this one."""
         if self._cleared:
             return
         self._cleared = True
@@ -131,7 +131,7 @@ class Results:
         self._old = []
 
     def end(self, state: str) -> None:
-        """Stamp the folder for the last time; as it was before, where nothing was written."""
+        """Stamp the folder for the last time, or restore its stamp if nothing was written."""
         with suppress(OSError):
             if self._new:
                 self._stamp(state)
@@ -228,7 +228,7 @@ def held(
 
 @contextmanager
 def _naming(results: Results) -> Iterator[None]:
-    """Name what was kept where a run ends early."""
+    """Name what was kept if a run ends early."""
     try:
         yield
     except KeyboardInterrupt as stop:
@@ -241,7 +241,7 @@ def _naming(results: Results) -> Iterator[None]:
 
 
 def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
-    """Results in a folder that a run replaces; refuses what is not its own."""
+    """Results in a folder that a run replaces; refuses those of others."""
     found = stamp.read(folder)
     if found is None:
         there = [path.name for path in folder.iterdir() if _RESULT.fullmatch(path.name)]
@@ -263,7 +263,7 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
 
 @contextmanager
 def drawing(place: object, kept: str = "") -> Iterator[None]:
-    """Say that figures could not be drawn, whatever kept them from it, and what was kept."""
+    """Report that figures could not be drawn, for whatever reason, and what was kept."""
     try:
         yield
     except KeyboardInterrupt:
@@ -274,7 +274,7 @@ def drawing(place: object, kept: str = "") -> Iterator[None]:
 
 
 def reason(error: BaseException) -> str:
-    """What an error says; of one of the system what it was about, without its number."""
+    """Message of an error; for one of the system, the file and the reason without its number."""
     if isinstance(error, MemoryError):
         return "not enough memory: take fewer cells, divisions, steps or samples"
     if not isinstance(error, OSError) or not error.strerror:

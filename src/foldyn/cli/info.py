@@ -60,7 +60,7 @@ def info() -> str:
 
 
 def _part(look: Callable[[], object], package: str) -> str:
-    """Say whether a part is there, with where or what it is, or how to install it."""
+    """Say where a part was found, or how to install it."""
     try:
         return f"found: {look()}"
     except InputError:

@@ -26,13 +26,13 @@ from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {"fit": run_fit, "track": track, "study": study}
-"""Commands on something else than a case file."""
+"""Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
-"""Environment of OpenCV: what decoders would say of a broken film is ours to say."""
+"""Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """One whose messages have a length."""
+    """A parser that keeps its messages short."""
 
     def error(self, message: str) -> NoReturn:
         super().error(shortened(message))
@@ -107,7 +107,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
 
 
 def _add_state(command: argparse.ArgumentParser) -> None:
-    """Add what says about which state a structure vibrates."""
+    """Add the options for the state about which a structure vibrates."""
     command.add_argument(
         "--state",
         metavar="rest|equilibrium|FILE",
@@ -164,7 +164,7 @@ def _say(message: str, status: int) -> int:
 
 
 def _call(given: argparse.Namespace) -> None:
-    """Call what the command line asks for."""
+    """Run the command that was named."""
     if given.command == "info":
         from foldyn.cli.info import info
 
@@ -178,7 +178,7 @@ def _call(given: argparse.Namespace) -> None:
 
 
 class _Warnings:
-    """Writes warnings as the command's own lines, each once: mass rules would repeat them."""
+    """Writes each warning once, as a line of the command: mass rules would repeat them."""
 
     def __init__(self) -> None:
         self.shown: set[str] = set()

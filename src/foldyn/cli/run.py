@@ -25,12 +25,12 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
 }
-"""What is counted of the structure of each model."""
+"""What is counted in the structure of each model."""
 DRAWN = (
     "report.html", "structure.png", "laws.png",
     *(name for kind in ANALYSES.values() for name in kind.files),
 )  # fmt: skip
-"""All that pages come with."""
+"""Files of all pages."""
 
 
 def run(given: Namespace) -> Path:
@@ -106,7 +106,7 @@ def _computed(
 
 
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say which values a result lacks; it has failed where it may lack none."""
+    """Say which values a result lacks; raise if it should not lack them."""
     from foldyn.results.quantities import REASONS, missing_values
 
     for name, text in missing_values(result).items():
@@ -133,7 +133,7 @@ def _introduction(
     caught: list[warnings.WarningMessage],
     say: Callable[[str], None],
 ) -> Callable[[], None]:
-    """Return what says, once, what is run; it is called when nothing is left to be refused."""
+    """Return a function that announces the run, once, when nothing is left to be refused."""
 
     @cache
     def introduce() -> None:

@@ -52,7 +52,7 @@ class Owner:
 
 
 def read(folder: Path) -> dict[str, Any] | None:
-    """Stamp of a folder; None where it has none, or none that can be understood."""
+    """Stamp of a folder; None if it has none, or an unreadable one."""
     try:
         found = json.loads(raw(folder) or b"")
         texts = [found[key] for key in ("command", "source", "state")]
@@ -64,7 +64,7 @@ def read(folder: Path) -> dict[str, Any] | None:
 
 
 def raw(folder: Path) -> bytes | None:
-    """Content of the stamp, None where there is none."""
+    """Content of the stamp; None if there is none."""
     try:
         return (folder / NAME).read_bytes()
     except OSError:

@@ -40,7 +40,7 @@ class Outlet:
             self._lose(failure, 0)
 
     def _lose(self, failure: OSError, size: int) -> int:
-        """From now on nothing is written; what waits in the buffer goes nowhere, too."""
+        """Write nothing from now on; drop what waits in the buffer."""
         self.failure = failure
         with suppress(OSError, ValueError):
             place = os.open(os.devnull, os.O_WRONLY)
@@ -54,7 +54,7 @@ class Outlet:
 
 @contextmanager
 def steady_streams() -> Iterator[Outlet]:
-    """Make both streams steady meanwhile; gives standard output."""
+    """Make both streams reliable within the block; yields standard output."""
     _fill_closed()
     before = sys.stdout, sys.stderr
     with open(os.devnull, "w", encoding="utf-8") as nowhere:  # for one that was closed before
@@ -69,7 +69,7 @@ def steady_streams() -> Iterator[Outlet]:
 
 
 def _fill_closed() -> None:
-    """Take the numbers of closed streams: a file that gets one would be written to by others."""
+    """Occupy the numbers of closed streams: output would go to any file that got one."""
     while True:
         place = os.open(os.devnull, os.O_RDWR)
         if place > 2:

@@ -116,7 +116,7 @@ def track(given: Namespace) -> Path:
 
 
 def _save(ds: xarray.Dataset, out: Path) -> None:
-    """Save the tracks and their table, the tracks elsewhere where there is no room."""
+    """Save the tracks and their table; without room for them, save the tracks elsewhere."""
     from foldyn import experiment
 
     try:
@@ -166,7 +166,7 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
 
 
 def model_of(name: str) -> Model:
-    """Model of a result, of a case at rest, or with all states of the path of a static case."""
+    """Model from a result, from a case at rest, or with all states of a static case's path."""
     import foldyn as fd
     from foldyn.experiment import Model
 
@@ -178,7 +178,7 @@ def model_of(name: str) -> Model:
 
 
 def summary(ds: xarray.Dataset) -> str:
-    """What was tracked, in a few words."""
+    """Summary of what was tracked."""
     import numpy as np
 
     along = "photo" if "photo" in ds.dims else "time"
@@ -196,7 +196,7 @@ def summary(ds: xarray.Dataset) -> str:
 
 
 def _are_photos(inputs: Sequence[str]) -> bool:
-    """Whether the inputs are photographs; they are all of a kind, and a film is alone."""
+    """Whether the inputs are photographs; refuses a mixture, and several films."""
     from foldyn.experiment.tracking.films import PHOTOS
 
     photos = [Path(name).suffix.lower() in PHOTOS for name in inputs]

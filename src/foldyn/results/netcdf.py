@@ -36,7 +36,7 @@ _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 LEAST_MEMORY = 2**29
-"""Bytes that a file without a seal may take beside what it holds."""
+"""Bytes that a file without a seal may take besides its content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
 """Computing time that a file without a seal may take, and the bytes that take a second more."""
 
@@ -129,7 +129,7 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 
 def _fill(sink: Sink, ds: xr.Dataset) -> None:
-    """Write a dataset; what went wrong with the file comes before what HDF5 made of it."""
+    """Write a dataset; a failure of the file takes precedence over what HDF5 makes of it."""
     try:
         ds.to_netcdf(sink, engine=ENGINE)
     except Exception:
@@ -207,7 +207,7 @@ def _check_header(path: Path) -> None:
 
 
 def _is_bare(item: h5py.Dataset) -> bool:
-    """Whether this stands for a dimension alone, without any numbers."""
+    """Whether this is only a dimension, without numbers."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
 
@@ -274,7 +274,7 @@ class Sink(io.FileIO):
         return self.tell() if size is None else size
 
     def readinto(self, buffer: Any, /) -> int:
-        """Read; zeros, where what is to be read could not be written."""
+        """Read; zeros for what could not be written."""
         room = memoryview(buffer).cast("B")
         found = 0
         if self.failure is None:

@@ -77,7 +77,7 @@ ESTIMATES: Mapping[str, Quantity] = {
     "swing": Quantity("degrees", "largest amplitude of a superlinear hinge"),
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
-"""and what its method tells beside it."""
+"""and what its method adds to it."""
 
 
 def variables(
@@ -114,7 +114,7 @@ UNEXPECTED = "the computation was no longer finite"
 
 
 def with_reason(name: str, variable: tuple) -> tuple:
-    """Variable (dimensions, values, attributes) with why it lacks values, where it does."""
+    """Variable (dimensions, values, attributes) with the reason if it lacks values."""
     dimensions, values, attributes = variable
     if not _missing(values):
         return variable
@@ -122,13 +122,13 @@ def with_reason(name: str, variable: tuple) -> tuple:
 
 
 def _missing(values: Any) -> int:
-    """How many values there are none of."""
+    """Number of missing values."""
     values = np.asarray(values)
     return int(np.isnan(values).sum()) if values.dtype.kind in "fc" else 0
 
 
 def missing_values(ds: xr.Dataset) -> dict[str, str]:
-    """Say of each variable of a result that lacks values how many, and why, by its name."""
+    """Say how many values each incomplete variable of a result lacks, and why, by name."""
     return {
         str(name): f"{_missing(ds[name].values)} of {ds[name].size} values are missing (nan): "
         f"{ds[name].attrs.get('missing', UNEXPECTED)}"

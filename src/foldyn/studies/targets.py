@@ -1,4 +1,4 @@
-"""Values and claims of a paper beside what was computed: the rows of a study's `targets.toml`."""
+"""Values and claims of a paper next to computed values: the rows of a study's `targets.toml`."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Verdict:
 
     @property
     def asked(self) -> str:
-        """The target's number, with what it is of a claim."""
+        """The target's number; of a claim, as a bound."""
         before = {"least": "at least ", "most": "at most ", None: ""}[self.target.bound]
         return f"{before}{self.target.value:.4g}"
 

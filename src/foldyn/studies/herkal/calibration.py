@@ -32,7 +32,7 @@ from foldyn.writing import write_text
 
 FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
 DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
-"""What the paper found, the truth of the synthetic data."""
+"""What the paper found, and the truth behind the synthetic data."""
 MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
 FOLD_RANGES = (
     experiment.Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
@@ -47,7 +47,7 @@ WEIGHTS = (0.125, 0.226, 0.312)  # N
 TOP = tuple(range(7))
 WATCHED = 8  # the paper's node 9
 FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
-"""Nodes that a camera before the specimen sees, but for the bottom row, which stands still."""
+"""Nodes seen by a camera in front of the specimen, without the bottom row, which stands still."""
 SYNTHETIC = "synthetic"
 FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
 STATIC_ERROR = 5e-5  # m: a corner in a photograph
@@ -78,7 +78,7 @@ rest, and resists the large turns of the panels.
 
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
-    """Path of the specimen whose top is pressed down to fractions of 56 mm."""
+    """Path of the specimen as its top is pressed down to fractions of 56 mm."""
     at = {"method": "newton", "load_factors": list(factors)}
     return shipped("specimen", changes).run(settings=Settings(stability=False), **at)
 
@@ -173,7 +173,7 @@ def released_case(
 
 
 def release_data(case: Path) -> list[experiment.Measurement]:
-    """Histories of node 8, and of all other front nodes held out, as a film has them."""
+    """Histories of node 8 and, held out, of all other front nodes, sampled like a film."""
     motion = read_case(case).run()
     time = np.arange(0.0, SEEN, 1.0 / RATE)
     along = motion["displacement"].sel(axis="x")
@@ -190,7 +190,7 @@ def release_data(case: Path) -> list[experiment.Measurement]:
 def noisy(
     data: Sequence[experiment.Measurement], draw: np.random.Generator
 ) -> list[experiment.Measurement]:
-    """Measurements with random errors of the size that they name."""
+    """Measurements with random errors of the size that they state."""
     result = []
     for one in data:
         field = "force" if isinstance(one, experiment.ForceDisplacement) else "values"

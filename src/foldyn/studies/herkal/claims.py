@@ -36,7 +36,7 @@ def _edge(motion: xarray.Dataset) -> NDArray:
 
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
-    """How unlike the two nodes of case 1 move with some models, the largest."""
+    """Largest difference, among some models, between the motions of the two nodes of case 1."""
     motions = [_motion(study, "case1", model) for model in models]
     moved = [NO_MOTION if motion is None else _edge(motion) for motion in motions]
     return max(
@@ -64,7 +64,7 @@ def _second_peak(study: Study, case: str) -> float:
 
 
 def _mismatch(study: Study, places: list[int]) -> float:
-    """Largest size of the static deviations from the shell in case 2, of some reported nodes."""
+    """Largest static deviation from the shell in case 2 at some of the reported nodes."""
     found = study.displacements("case2") if "case2" in study.plan.cases else {}
     if "shell" not in found or "bars and hinges" not in found:
         return NO_VALUE
@@ -88,7 +88,7 @@ def softer_folds_err_less(study: Study) -> float:
 
 
 def _over_best(study: Study, case: str, model: str) -> float:
-    """Error of a model over the smallest of the five: 1 where it is the best."""
+    """Error of a model over the smallest of the five: 1 if it is the best."""
     row = {m: study.error(case, m) for m in paper_rules()}
     known = all(0.0 < error < math.inf for error in row.values())
     return row[model] / min(row.values()) if known else NO_VALUE
@@ -122,11 +122,11 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
     "best_case4": partial(_over_best, case="case4", model="circumcenter"),
     "best_overall": best_overall,
 }
-"""By the key of their row, each with the number that is measured; nan where it cannot be."""
+"""Claims by the key of their row, with the function that measures each; nan if it cannot."""
 
 
 def claims(study: Study) -> list[Verdict]:
-    """The paper's claims beside what was computed; those that could not be are left out."""
+    """The paper's claims next to what was computed; without those that could not be computed."""
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
 
 
@@ -145,12 +145,12 @@ def paper_table() -> dict[str, dict[str, float]]:
 
 
 def tolerance() -> float:
-    """Deviation, as a fraction, up to which a number of Table 1 is said to agree."""
+    """Deviation, as a fraction, up to which a number of Table 1 counts as reproduced."""
     return max(target.tolerance or 0.0 for target in _table1().values())
 
 
 def table1(study: Study) -> list[Verdict]:
-    """The paper's Table 1 beside ours, a row for each number."""
+    """The paper's Table 1 next to ours, one row for each number."""
     computed = {
         f"{case}_{model}": study.error(case, model)
         for case in study.plan.cases

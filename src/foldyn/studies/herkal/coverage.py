@@ -28,7 +28,7 @@ SEED = 20_000
 def summary(
     fitted: Callable[[np.random.Generator], Fit], draws: int, truth: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Counts of the intervals that contain the truth, and how far off the estimates are."""
+    """How many intervals contain the truth, and how far off the estimates are."""
     fits = [fitted(np.random.default_rng(SEED + number)) for number in range(draws)]
     found = {}
     for key in truth:

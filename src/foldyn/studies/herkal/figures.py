@@ -1,4 +1,4 @@
-"""Figures of the case studies that are not those of any case file."""
+"""Figures that only the case studies have."""
 
 from __future__ import annotations
 

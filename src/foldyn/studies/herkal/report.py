@@ -1,4 +1,4 @@
-"""The page of the study: figures and tables of the four cases, and the paper's numbers beside."""
+"""The page of the study: figures and tables of the four cases, next to the paper's numbers."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ WIDER = {"a pulse half as long": {"pulse": 0.25}, "one twice as long": {"pulse":
 
 
 def _why_so_wide(varied: Variations | None) -> str:
-    """Reason of the tolerance: what the numbers change by with what the paper leaves open."""
+    """Why the tolerance is as it is: how far the numbers move with what the paper leaves open."""
     if varied is None:
         return ""
     filed, names = varied.filed(), paper_rules()

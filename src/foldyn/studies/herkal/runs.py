@@ -26,7 +26,7 @@ from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, cas
 COMPUTING = tuple(
     f"studies/herkal/{name}.py" for name in ("sheet_models", "runs", "metric", "sensitivity")
 )
-"""Files that the results of the case studies depend on, beside the solvers."""
+"""Files that the results of the case studies depend on, besides the solvers."""
 SETTINGS = "study_settings"
 EVERY = 0.01  # s, between samples where the case file does not say
 STEPS = 10  # of the load of a path
@@ -126,7 +126,7 @@ def reported(case: str) -> tuple[list[int], str, float]:
 
 
 def compute(job: Job) -> xarray.Dataset:
-    """Run a computation; the result is that of the pattern's vertices, which all models have."""
+    """Run a computation; the result covers the pattern's vertices, which all models share."""
     case_file = case_study(job.case)
     case = case_with(case_file, job.model, job.variant, job.numerics.divisions)
     of_shell = job.model == REFERENCE

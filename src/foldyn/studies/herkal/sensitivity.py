@@ -162,7 +162,7 @@ def tasks(cases: Iterable[str], numerics: Numerics) -> list[Comparison]:
 
 
 def variations(folder: Path, cases: Iterable[str], numerics: Numerics) -> Variations:
-    """What is in a folder of that of `tasks`."""
+    """Results of `tasks` that are in a folder."""
     motions: list[dict[str, Any]] = []
     frequencies: list[dict[str, Any]] = []
     for task in sorted(tasks(cases, numerics), key=lambda task: task.case):

@@ -45,7 +45,7 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """Of its files; empty for the case file as it is."""
+        """Part of file names; empty for the case file as it is."""
         pulse = "" if self.pulse is None else f"pulse{self.pulse:g}"
         loads = "" if self.loads == "file" else self.loads
         return "-".join(filter(None, (pulse, loads, self.bend_law, self.calibration)))
@@ -58,7 +58,7 @@ class Variant:
 
     @property
     def of_shell(self) -> Variant:
-        """What of it the shell knows: it has neither bends nor a calibration of them."""
+        """What of it applies to the shell, which has neither bends nor their calibration."""
         return replace(self, bend_law=None, calibration=None)
 
 
@@ -93,13 +93,13 @@ class SheetModel:
 def _bars_and_hinges(
     mass: str, case_file: CaseFile, options: Mapping[str, Any], divisions: int
 ) -> Any:
-    """Structure of the case file with a mass rule; `divisions` mean nothing to it."""
+    """Structure of the case file with a mass rule; it has no use for `divisions`."""
     arguments = {**vars(case_file.case().structure.options), "mass": mass, **options}
     return discretize(case_file.pattern, case_file.sheet, **arguments)
 
 
 def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> Any:
-    """Shell with the creases of the case file; `options` are not for it."""
+    """Shell with the creases of the case file; it has no use for `options`."""
     given = vars(case_file.case().structure.options)
     creases = {name: given[name] for name in ("fold_law", "crease_stiffness", "crease_rest")}
     return shell(case_file.pattern, case_file.sheet, divisions, **creases)
@@ -131,7 +131,7 @@ OTHERS: Mapping[str, SheetModel] = {
 
 
 def model_of(name: str) -> SheetModel:
-    """SheetModel by its name."""
+    """Model with this name."""
     known = {**MODELS, **OTHERS}
     return known[choice("model", name, known)]
 

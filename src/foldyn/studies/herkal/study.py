@@ -1,4 +1,4 @@
-"""The four case studies: what is computed, and the tables that come of it."""
+"""The four case studies: what is computed, and the tables made from it."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Study:
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
-        """Computations of the specimen: those that need nothing else, and those after them."""
+        """Computations of the specimen: the independent ones, and those that follow them."""
         return ([], []) if self.data is None else parts(self.plan.shot, self.data)
 
     @property
@@ -155,7 +155,7 @@ class Study:
         return {label: path for label, path in found.items() if path is not None}
 
     def frequencies(self, case: str, model: str) -> metric.Partners | None:
-        """Modes of a model that belong to the shell's."""
+        """Modes of a model matched with those of the shell."""
         reference = self.result(case, REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:

@@ -72,7 +72,7 @@ class Variations:
 
 
 def write(folder: Path, variations: Variations) -> None:
-    """Write the tables into a folder; a first line says what they are of."""
+    """Write the tables into a folder; their first line says how they were computed."""
     for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
         with whole(folder / name) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(f"# {variations.about}\n")

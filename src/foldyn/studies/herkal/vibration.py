@@ -120,7 +120,7 @@ def released() -> Release:
 
 
 def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Dataset:
-    """Modes of the specimen, with what they do: variables `name` and `share_of_name`."""
+    """Modes of the specimen with their character: variables `name` and `share_of_name`."""
     found = specimen("modes-published" if published else "modes").run(mass)
     what = character(found, "x")
     return found.assign(name=what["name"], share_of_name=what["share"].max("kind"))

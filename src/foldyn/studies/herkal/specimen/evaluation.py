@@ -1,4 +1,4 @@
-"""From what was measured of the specimen to its parameters, and back to what the model says."""
+"""From measurements of the specimen to its parameters, and back to the predictions of the model."""
 
 from __future__ import annotations
 
@@ -301,7 +301,7 @@ def compared(
 
 
 def content(x: NDArray[np.float64], step: float) -> tuple[NDArray, NDArray] | None:
-    """Frequencies (Hz) up to the band's end and amplitudes; None where samples are missing."""
+    """Frequencies (Hz) up to the band's end and amplitudes; None if samples are missing."""
     if not np.isfinite(x).all():
         return None
     frequency, amplitude = spectrum(x, step, detrend="constant", pad=FINER)
@@ -327,7 +327,7 @@ class Vibration:
 
 
 def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
-    """Axial vibration of a record of which nothing is missing."""
+    """Axial vibration of a record without gaps."""
     found = content(x, step)
     if found is None:
         return Vibration()
@@ -342,13 +342,13 @@ def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
 
 
 def misfit(film: NDArray[np.float64], model: NDArray[np.float64]) -> float:
-    """Root mean square of the difference over that of what was measured, where it was."""
+    """Root mean square of the difference, relative to that of the measured samples."""
     known = np.isfinite(film)
     return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
 
 
 def content_misfit(film: NDArray[np.float64], model: NDArray[np.float64], step: float) -> float:
-    """The paper's metric; nan where the node was lost for long."""
+    """The paper's metric; nan if the node was lost for long."""
     measured, said = content(film, step), content(model, step)
     if measured is None or said is None:
         return math.nan

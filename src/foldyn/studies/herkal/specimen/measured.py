@@ -1,4 +1,4 @@
-"""What the study of the specimen is given: measured files, or nothing and then synthetic data."""
+"""Data for the study of the specimen: measured files or, without any, synthetic data."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Data:
 
     @property
     def film(self) -> Path | None:
-        """The release, where it is a film that is still to be tracked."""
+        """The release, if it is a film that must still be tracked."""
         is_film = self.release is not None and self.release.suffix.lower() not in (".nc", ".csv")
         return self.release if is_film else None
 
@@ -124,7 +124,7 @@ def _kind(file: Path) -> str:
 
 
 def _check_forces(given: ForceDisplacement) -> None:
-    """Refuse points from which the folds cannot be found."""
+    """Refuse points from which the folds cannot be determined."""
     moved, most = given.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
         raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
@@ -144,5 +144,5 @@ def _digest(file: Path) -> str:
 
 @cache
 def _digest_of(file: Path, size: int, changed: int) -> str:
-    """Digest of a file in some state; that of a long film takes seconds."""
+    """Digest of a file of this size and time; for a long film it takes seconds."""
     return file_digest(file)

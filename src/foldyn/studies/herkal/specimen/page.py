@@ -120,7 +120,7 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
 
 
 def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], data: Data) -> Table:
-    """Fitted parameters with their intervals, beside the paper's; by support, if it has a name."""
+    """Fitted parameters with their intervals, next to the paper's; by support, if it has a name."""
     rows = [
         [*filter(None, [SUPPORT_NAMES.get(support)]), SYMBOLS[one["key"]], one["value"],
          one["lower"], one["upper"], truth[one["key"]], one["note"]]
@@ -134,7 +134,7 @@ def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], d
 
 
 def _doubt(fit: dict[str, Any], what: str) -> list[Section]:
-    """Say in words where a fit is none."""
+    """Say in words why a fit must not be used."""
     doubts = [
         f"the misfit is {one['relative']:.0%} of what was measured"
         for one in fit["measurements"]
@@ -225,7 +225,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:
-    """How far the film is from the motion that was filmed, where that is known."""
+    """How far the tracks are from the true motion, if it is known."""
     if "true" not in front:
         return []
     off = (front["measured"] - front["true"]).values
@@ -239,7 +239,7 @@ def _tracked(front: xr.Dataset) -> list[Section]:
 
 
 def _glue(held: float, alone: float, paper: float) -> str:
-    """What the supports do to the frequency (Hz), and whether that tells them apart."""
+    """How the supports change the frequency (Hz), and whether that tells them apart."""
     if not math.isfinite(held) or not math.isfinite(alone):
         return "With one of the supports the model has no peak where it is sought."
     text = (

@@ -201,7 +201,7 @@ def prepare(measured: History) -> FreeVibration:
 
 
 def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Times at one interval, where they differ from it by what tables round off only."""
+    """Evenly spaced times, provided that they differ from them only by the rounding of tables."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
         signals.sampling_interval(time)  # says what is wrong
@@ -220,7 +220,7 @@ def _turn(swing: NDArray[np.float64], name: str) -> int:
 
 
 def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np.float64]]:
-    """Record of the watched node behind its last long gap, and where that begins."""
+    """Record of the watched node after its last long gap, and where it begins."""
     known = np.flatnonzero(np.isfinite(x))
     long = np.flatnonzero(np.diff(known) - 1 > gap)
     first, last = (int(known[long[-1] + 1]) if len(long) else int(known[0])), int(known[-1])
@@ -233,7 +233,7 @@ def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over time of what was measured, shape (m,); NaN of nodes that were not."""
+    """Mean over time of the measured samples, shape (m,); NaN for nodes without any."""
     known = np.isfinite(x)
     count = known.sum(axis=0)
     return np.where(count > 0, np.where(known, x, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -1,4 +1,4 @@
-"""The computations of the specimen's study, each kept, so that it goes on where it was stopped."""
+"""The computations of the specimen's study, each kept, so that it resumes where it was stopped."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COMPUTING = (
     "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
     "studies/herkal/specimen", "studies/herkal/cases",
 )  # fmt: skip
-"""Files and folders that the results depend on, beside the solvers."""
+"""Files and folders that the results depend on, besides the solvers."""
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
@@ -171,7 +171,7 @@ def _tracked(part: Part, file: Path, folder: Path) -> None:
 def _static(
     part: Part, folder: Path, changes: Mapping[str, Any] | None = None
 ) -> list[Measurement]:
-    """The static test, empty where only a release was measured."""
+    """The static test; empty if only a release was measured."""
     file = part.data.static
     if file is not None and file.suffix.lower() == ".csv":
         return [measurement(file, part.data.label)]
@@ -182,7 +182,7 @@ def _static(
 
 
 def _history(part: Part, folder: Path) -> History | None:
-    """The release, where there is one."""
+    """The release, if there is one."""
     file = part.data.release
     if file is None and not part.data.synthetic:
         return None
@@ -254,7 +254,7 @@ PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
     "fit": (_fit, (FOUND, COMPARED)),
     "response": (_response, (*RESPONSES.values(), MODES)),
 }
-"""How each part is computed, and the files that it leaves for others or for the page."""
+"""How each part is computed, and which files it leaves for others or for the page."""
 
 
 def read_found(folder: Path) -> dict[str, Any]:
