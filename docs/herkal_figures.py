@@ -20,7 +20,6 @@ from foldyn.report import Table
 from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
-from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
 from foldyn.studies.herkal.sheet_models import REFERENCE, label, rules
@@ -45,7 +44,7 @@ def draw(study: Study, found: variations.Variations) -> None:
     motions = {name: motion for name, motion in every.items() if motion is not None}
     plots.plot_history(motions, nodes, axis, 5.0).savefig(IMAGES / "herkal-case2.png", dpi=100)
     models = (*rules(), sensitivity_page.TURNED)
-    plot_sensitivity(found, models, paper_table()).savefig(
+    sensitivity_page.plot_sensitivity(found, models, paper_table()).savefig(
         IMAGES / "herkal-sensitivity.png", dpi=100
     )
 

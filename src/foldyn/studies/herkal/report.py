@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn import plots
 from foldyn.cases import Force
+from foldyn.plots import style
 from foldyn.report import Heading, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.studies.herkal import sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
-from foldyn.studies.herkal.figures import plot_statics
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
 from foldyn.studies.herkal.runs import SECANT, reported
 from foldyn.studies.herkal.sheet_models import REFERENCE, case_study, label, model_of, paper_rules
@@ -260,7 +262,7 @@ def _case(study: Study, case: str, album: Album) -> list[Section]:
                 f"{case}-statics",
                 f"The load applied slowly: force over the {axis} displacement of the reported "
                 "nodes.",
-                lambda: plot_statics(paths, nodes, axis, force),
+                lambda: _plot_statics(paths, nodes, axis, force),
             ),
             _statics(study.displacements(case), nodes, force),
         ]
@@ -301,6 +303,25 @@ def _statics(found: Mapping[str, NDArray], nodes: list[int], force: float) -> Ta
         "over the largest of these displacements.",
         digits=3,
     )  # fmt: skip
+
+
+def _plot_statics(
+    paths: Mapping[str, xarray.Dataset], nodes: Sequence[int], axis: str, force: float
+) -> Figure:
+    """Draw the force (N at factor 1) on each loaded node over the displacement, a frame a node."""
+    figure = style.new_figure(9.0, 3.4)
+    frames = figure.subplots(1, len(nodes), squeeze=False, sharey=True)[0]
+    for frame, node in zip(frames, nodes, strict=True):
+        force_label = "force on each loaded node (N)" if node == nodes[0] else ""
+        style.frame(frame, f"{axis} displacement (m)", force_label, f"node {node}")
+        for index, (name, path) in enumerate(paths.items()):
+            moved = path["displacement"].sel(node=node, axis=axis).values
+            look = style.line_style(index) | {"linewidth": 1.5, "label": name}
+            frame.plot(moved, force * path["load_factor"].values, **look)
+        frame.locator_params(axis="x", nbins=5)
+        style.exponents(frame, ticks=6)
+    style.legend_below(figure, frames[0].get_lines(), columns=3)
+    return style.finish(figure)
 
 
 def _errors(study: Study, case: str, nodes: list[int]) -> Table:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from foldyn.plots import style
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
 from foldyn.studies.herkal.claims import paper_table
-from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.metric import best
 from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
 from foldyn.studies.herkal.sheet_models import OTHERS, label, paper_rules, rules
@@ -24,6 +27,7 @@ from foldyn.studies.herkal.variations import (
 )
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
+SIDES = {"superlinear": (-0.3, style.BLUE), "linear": (0.08, style.ORANGE)}
 TURNED = next(iter(OTHERS))
 STIFFNESSES = tuple(product(BEND_LAWS, CALIBRATIONS))
 CHANGES: Mapping[str, Mapping[str, Any]] = {
@@ -66,6 +70,48 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
         orientations(found),
         frequencies(found),
     ]
+
+
+def plot_sensitivity(
+    found: Variations, models: Sequence[str], paper: Mapping[str, Mapping[str, float]]
+) -> Figure:
+    """Draw the errors under all combinations, a frame a case, a row a model.
+
+    Parameters
+    ----------
+    found : Variations
+    models : sequence of str
+    paper : mapping
+        The paper's errors by case and model.
+    """
+    cases = list(found.filed())
+    figure = style.new_figure(9.0, 1.0 + 0.42 * len(models) * -(-len(cases) // 2))
+    frames = figure.subplots(-(-len(cases) // 2), 2, squeeze=False, sharey=True, sharex=True)
+    for frame, case in zip(frames.flat, cases, strict=False):
+        style.frame(frame, "error", "", f"case {case[-1]}")
+        filed = found.filed()[case]
+        for place, model in enumerate(models):
+            for law, (start, color) in SIDES.items():
+                errors = [row[model] for row in found.chosen(case=case, bend_law=law)]
+                heights = place + start + np.linspace(0.0, 0.22, len(errors))
+                frame.plot(errors, heights, ".", color=color, markersize=3.5, label=f"{law} bends")
+            ring = frame.plot(filed[model], place, "o", markersize=8, mfc="none", mec=style.BLACK)
+            cross = frame.plot([], [], "x", color=style.VERMILLION, markersize=7, mew=1.8)
+            if model in paper.get(case, {}):
+                cross[0].set_data([paper[case][model]], [place])
+            frame.axhline(place, color=style.LIGHT, linewidth=0.6, zorder=0)
+        frame.set_yticks(range(len(models)), [label(m) for m in models], fontsize=style.TICK)
+        frame.set_ylim(len(models) - 0.4, -0.6)
+        frame.grid(False, axis="y")
+    largest = max(row[model] for row in found.motions for model in models)
+    frames.flat[0].set_xlim(0.0, 1.03 * largest)
+    for spare in frames.flat[len(cases) :]:
+        spare.set_visible(False)
+    handles = [line for line in frames.flat[0].get_lines() if "bends" in str(line.get_label())][:2]
+    ring[0].set_label("case files as they are")
+    cross[0].set_label("paper")
+    style.legend_below(figure, [*handles, ring[0], cross[0]], columns=4)
+    return style.finish(figure)
 
 
 def opinion(found: Variations) -> str:
