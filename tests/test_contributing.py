@@ -24,8 +24,8 @@ from foldyn.values import vector
 ROOT = Path(__file__).resolve().parents[1]
 # section, the new name there, one that exists, and what mentions that in code
 EXISTING = {
-    "A pattern": ("pleats", "eggbox", r"\beggbox\b"),
-    "A mass rule": ("halves", "centroid", r"(def|import|:) centroid\b"),
+    "A pattern": ("", "", r"\beggbox\b"),
+    "A mass rule": ("", "", r"(def|import|:) centroid\b"),
     "A history": ("", "", r"\b(Chirp|CHIRP)\b"),
     "An integrator": ("leapfrog", "central_difference", r'(?<!")\bcentral_difference\b(?!")'),
     "A law": ("cubic", "linear", r"\bLinearBar\b|\blinear\.(bar_(energy|stress|slope)|CODE)"),

@@ -14,7 +14,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment import Model
+from foldyn.experiment import TrackedModel
 from foldyn.results import netcdf, trajectory_dataset
 from foldyn.results.apart import apart
 
@@ -192,9 +192,13 @@ def test_variables_must_fit_their_dimensions(file):
             lambda ds: ds.transpose(..., "axis", "node"),
             "displacement must be numbers over node, axis; it has float64 over axis, node",
         ),
-        (Model.of, lambda ds: ds.isel(time=[]), "no finite displacements"),
-        (Model.of, lambda ds: ds.assign(displacement=ds["displacement"] * np.nan), "no finite"),
-        (Model.of, lambda ds: ds.assign(rest_position=ds["displacement"]), "rest|damaged"),
+        (TrackedModel.of, lambda ds: ds.isel(time=[]), "no finite displacements"),
+        (
+            TrackedModel.of,
+            lambda ds: ds.assign(displacement=ds["displacement"] * np.nan),
+            "no finite",
+        ),
+        (TrackedModel.of, lambda ds: ds.assign(rest_position=ds["displacement"]), "rest|damaged"),
     ],
 )
 def test_what_is_made_of_a_result_checks_it(make, change, text, motion):

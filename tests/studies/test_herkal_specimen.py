@@ -14,7 +14,7 @@ from foldyn.analyses import read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.experiment import ForceDisplacement, History
+from foldyn.experiment import ForceDisplacement, TimeHistory
 from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
@@ -81,7 +81,7 @@ LATE = 20.4 * STEP
 
 def film(**nodes):
     columns = {int(name[1:]): values for name, values in nodes.items()}
-    return History(
+    return TimeHistory(
         nodes=list(columns), time=TIME, values=np.stack(list(columns.values()), 1), name="film"
     )
 
@@ -126,7 +126,7 @@ def test_a_film_that_shows_the_pressing_too(duration) -> None:
     late = 0.1 + duration + 0.2 + 0.4 * STEP
     wander = 1e-4 * np.sin(2.0 * np.pi * 0.8 * time)  # of the hand
     x = np.where(time < late, pressing + wander, ringing(time, late) + wander[-1])
-    history = History(nodes=[8], time=time, values=x[:, None], name="film")
+    history = TimeHistory(nodes=[8], time=time, values=x[:, None], name="film")
     found = prepared.prepare(history)
     assert found.released == pytest.approx(late, abs=1.5 * STEP)
     assert found.before[0] == pytest.approx(4e-3, rel=0.05)
@@ -279,7 +279,9 @@ def released(motion, tmp_path_factory):
     along = np.stack(
         [np.interp(time - 0.0321, motion.time, motion.displacement[:, n, 0]) for n in FRONT], axis=1
     )
-    history = History(nodes=FRONT, time=time, values=along + 3e-4, name="film", label="synthetic")
+    history = TimeHistory(
+        nodes=FRONT, time=time, values=along + 3e-4, name="film", label="synthetic"
+    )
     folder = tmp_path_factory.mktemp("released")
     return evaluation.fit_release(history, folder, {}, COARSER)
 

@@ -28,15 +28,13 @@ from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
-from foldyn.cases.decode import check_keys
+from foldyn.cases.decode import check_keys, given_keys
 from foldyn.cases.models import SHELL
-from foldyn.cases.part import given_keys
 from foldyn.cases.supports import check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf
-from foldyn.linear.frf import METHODS
-from foldyn.linear.quantity import PER_FORCE
+from foldyn.linear.frf import METHODS, PER_FORCE
 from foldyn.values import number, show, whole
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
-from foldyn.linear.frf import METHODS
-from foldyn.linear.quantity import PER_FORCE, quantity_of
+from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
 from foldyn.report.album import Album, shown_nodes
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Section, Table, Text, cell

@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from foldyn.cases.damping import STATES
+from foldyn.cases.case import STATES
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
@@ -32,7 +32,7 @@ from foldyn.errors import Faults, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures.options import CALIBRATIONS, SCHEMES
+from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, nearest, number, numbers, show, vector
 
 AXES = ("x", "y", "z")

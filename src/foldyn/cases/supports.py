@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foldyn.cases.function import as_history
-from foldyn.cases.histories import History
-from foldyn.cases.part import Part, given_keys
+from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
 from foldyn.values import number, number_or_list, show
@@ -33,7 +32,6 @@ class Fix(Part):
     axes: str = "xyz"
 
     keys = {"nodes": "nodes", "axes": "axes"}
-    missing = {"nodes": "give its value"}
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -71,7 +69,6 @@ class Impose(Part):
 
     keys = {"nodes": "nodes", "axis": "axis", "displacement": "value"}
     missing = {
-        "nodes": "give its value",
         "axis": 'give the axis of the displacement, as in axis = "x"',
         "displacement": "give it (m), or write axes instead of axis to hold nodes",
     }

@@ -18,7 +18,7 @@ def info() -> str:
     """Text of the command."""
     from foldyn.cases.models import MODELS
     from foldyn.dynamics import METHODS, compiled
-    from foldyn.experiment.opencv import opencv
+    from foldyn.experiment.camera import opencv
     from foldyn.formats import FORMATS
     from foldyn.linear.frf import METHODS as FRF_METHODS
     from foldyn.mechanics.threads import MOST

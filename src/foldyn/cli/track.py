@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from foldyn.experiment import Model, Tracking
+    from foldyn.experiment import TrackedModel, Tracking
 
 _SHOWN = 3  # nodes in the figure of histories
 _KEPT = "\nfoldyn: kept what was computed: "
@@ -165,16 +165,16 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
     return [number(option, value) for value in values]
 
 
-def model_of(name: str) -> Model:
+def model_of(name: str) -> TrackedModel:
     """Model from a result, from a case at rest, or with all states of a static case's path."""
     import foldyn as fd
-    from foldyn.experiment import Model
+    from foldyn.experiment import TrackedModel
 
     if name.endswith(".nc"):
-        return Model.of(fd.load(name))
+        return TrackedModel.of(fd.load(name))
     case_file = fd.read_case(find_case(name))
     static = case_file.analysis.kind == "statics"
-    return Model.of(case_file.run() if static else case_file.case())
+    return TrackedModel.of(case_file.run() if static else case_file.case())
 
 
 def summary(ds: xarray.Dataset) -> str:

@@ -1,7 +1,7 @@
 """The one compiled switch from a law's integer code to its formulas.
 
 A new built-in law adds its line to each function of its kind. A user's law is called at
-`address`; what is not known, having none, gives nan (`Law.check` refuses it before). Hinge
+`address`; an unknown code, which has none, gives nan (`Law.check` refuses it earlier). Hinge
 parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
 """
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from foldyn.cases import Actuate, Case, Impose, resolve_nodes
-from foldyn.cases.actuation import resolve_creases
+from foldyn.cases.selection import resolve_creases
 from foldyn.errors import InputError
 from foldyn.plots import style
 

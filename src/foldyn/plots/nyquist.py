@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.linear import Peak, peaks_of
+from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import SIDES
-from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.plots import style
 from foldyn.plots.modes import hertz
 from foldyn.plots.responses import Curve, curves_of, unit_of

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.linear import convert
-from foldyn.linear.quantity import PER_FORCE, quantity_of
+from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.plots.chosen import AXES, check_nodes_of, directions
 from foldyn.results.quantities import RESPONSES
 

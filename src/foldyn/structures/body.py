@@ -1,4 +1,4 @@
-"""Bars and hinges as solvers take them."""
+"""Bars and hinges as solvers see them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class BarsHingesBody(Body):
     law : HingeLaw
         Law of the folds.
     like : BarsHingesBody, optional
-        One with the same nodes of all elements.
+        One whose elements have the same nodes.
     """
 
     energy_groups = tuple(GROUPS)

@@ -23,7 +23,7 @@ from foldyn import experiment
 from foldyn.analyses import CaseFile, read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.experiment.calibration.key_paths import replaced
+from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings
@@ -179,7 +179,7 @@ def release_data(case: Path) -> list[experiment.Measurement]:
     along = motion["displacement"].sel(axis="x")
     others = tuple(node for node in FRONT if node != WATCHED)
     return [
-        experiment.History(
+        experiment.TimeHistory(
             nodes=nodes, time=time, values=CubicSpline(motion["time"], along[:, list(nodes)])(time),
             axis="x", name=name, label=SYNTHETIC, sigma=FILM_ERROR, held_out=nodes == others,
         )
@@ -244,7 +244,7 @@ def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectr
     return [
         experiment.Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
         for one in film
-        if isinstance(one, experiment.History) and np.isfinite(one.values).all()
+        if isinstance(one, experiment.TimeHistory) and np.isfinite(one.values).all()
     ]
 
 

@@ -18,8 +18,8 @@ from scipy.optimize import minimize_scalar
 from foldyn.analyses import read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
-from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
-from foldyn.experiment.calibration.key_paths import replaced
+from foldyn.experiment import Fit, ForceDisplacement, Measurement, Shapes, TimeHistory
+from foldyn.experiment.calibration.parameters import replaced
 from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED
@@ -189,7 +189,7 @@ class Released:
 
 
 def fit_release(
-    measured: History,
+    measured: TimeHistory,
     models: Path,
     changes: Mapping[str, Any],
     step: float = calibration.STEP,
@@ -199,7 +199,7 @@ def fit_release(
 
     Parameters
     ----------
-    measured : History
+    measured : TimeHistory
         Of the tracked nodes along x, from before the release on.
     models : Path
         Gets the case files of the models, a folder for each support.

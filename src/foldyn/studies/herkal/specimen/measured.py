@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
+from foldyn.experiment import ForceDisplacement, Measurement, TimeHistory, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
 from foldyn.experiment.tracking.films import PHOTOS
 from foldyn.input_files import check_file, file_digest
@@ -114,7 +114,7 @@ def _kind(file: Path) -> str:
     if isinstance(given, ForceDisplacement):
         _check_forces(given)
         return "static"
-    if not isinstance(given, History):
+    if not isinstance(given, TimeHistory):
         raise InputError(
             "shapes without forces say nothing of the stiffness; give forces over displacements, "
             "or tracks of photographs with loads (*.nc)"

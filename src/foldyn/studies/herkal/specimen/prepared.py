@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn import signals
 from foldyn.errors import InputError
-from foldyn.experiment import History
+from foldyn.experiment import TimeHistory
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
 
 GAP = 1 / 30  # s, of a gap that is filled: a third of a period
@@ -36,7 +36,7 @@ class FreeVibration:
 
     Attributes
     ----------
-    history : History
+    history : TimeHistory
         All nodes relative to their final positions, NaN where they were lost; time is 0 at the
         release, as far as it is known.
     whole : ndarray, shape (t, m)
@@ -49,7 +49,7 @@ class FreeVibration:
         The watched node after each step (s, m).
     """
 
-    history: History
+    history: TimeHistory
     whole: NDArray[np.float64]
     before: NDArray[np.float64]
     released: float
@@ -60,12 +60,12 @@ class FreeVibration:
         """Numbers of the nodes."""
         return numbers_of(self.history)
 
-    def of(self, nodes: list[int], name: str) -> History:
-        """History of some of the nodes."""
+    def of(self, nodes: list[int], name: str) -> TimeHistory:
+        """TimeHistory of some of the nodes."""
         columns = [self.nodes.index(node) for node in nodes]
         return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
 
-    def whole_of(self, one: History) -> History | None:
+    def whole_of(self, one: TimeHistory) -> TimeHistory | None:
         """The nodes of a history that were never lost for long, gaps filled; None: there are none.
 
         The model is not moved in time to fit it: spectra do not depend on that.
@@ -78,7 +78,7 @@ class FreeVibration:
         return replace(one, nodes=nodes, values=self.whole[:, kept], align=0.0)
 
 
-def numbers_of(history: History) -> list[int]:
+def numbers_of(history: TimeHistory) -> list[int]:
     """Numbers of the nodes of a history."""
     return np.ravel(history.nodes).astype(int).tolist()
 
@@ -140,12 +140,12 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
-def prepare(measured: History) -> FreeVibration:
+def prepare(measured: TimeHistory) -> FreeVibration:
     """Prepare the histories of a film in which a specimen is held and released.
 
     Parameters
     ----------
-    measured : History
+    measured : TimeHistory
         Of all nodes that were tracked, along the axis; `WATCHED`, by which the release is found,
         among them.
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from foldyn import experiment, plots
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.experiment import Fit, History, Measurement
+from foldyn.experiment import Fit, Measurement, TimeHistory
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.input_files import file_digest, from_json, read_text
 from foldyn.program import program
@@ -133,8 +133,8 @@ def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
     return [Part(p, shot, data) for p in first], [Part(p, shot, data) for p in ("fit", "response")]
 
 
-def _model() -> experiment.Model:
-    return experiment.Model.of(calibration.pressed(evaluation.FACTORS))
+def _model() -> experiment.TrackedModel:
+    return experiment.TrackedModel.of(calibration.pressed(evaluation.FACTORS))
 
 
 def _photographs(part: Part, folder: Path) -> None:
@@ -181,14 +181,14 @@ def _static(
     return evaluation.static_test(tracks, part.data.label, changes)
 
 
-def _history(part: Part, folder: Path) -> History | None:
+def _history(part: Part, folder: Path) -> TimeHistory | None:
     """The release, if there is one."""
     file = part.data.release
     if file is None and not part.data.synthetic:
         return None
     tracked = file is None or part.data.film is not None
     found = measurement(folder / FILM if tracked else file, part.data.label)  # type: ignore[arg-type]
-    assert isinstance(found, History)
+    assert isinstance(found, TimeHistory)
     return replace(found, name="film" if tracked else found.name)
 
 

@@ -1,4 +1,7 @@
-"""Frequency response by superposition of modes, with what the modes left out add statically."""
+"""Frequency responses of linearized cases: one solution for each frequency, or modes superposed.
+
+The static response of the modes left out completes those superposed.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,59 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
-from foldyn.linear.answer import Answer
-from foldyn.linear.direct import warn_of_resonances
-from foldyn.linear.eigen import Spectrum, lowest
-from foldyn.linear.excitation import Drive
+from foldyn.linear.eigen import Pencil, Spectrum, lowest
+from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
 from foldyn.linear.linearized import Linearized
-from foldyn.linear.pencil import Pencil
-from foldyn.linear.rigid_modes import rigid_space, unresisted
-from foldyn.linear.transmissibility import drive_factor, drive_shape
+from foldyn.linear.modes import rigid_space, unresisted
 from foldyn.values import whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
 BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
+RESONANCE = (
+    "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
+    "to move; give the case damping, as Rayleigh(alpha=...), or leave these frequencies out"
+)
+
+
+@dataclass(frozen=True)
+class Direct:
+    """Options of the direct method: none."""
+
+
+def direct(
+    system: Linearized, drive: Drive, frequency: NDArray, options: Direct, report: Reporter
+) -> Answer:
+    """Solve (K - w^2 M + i w C) x = f at each frequency.
+
+    The response is nan where the matrix is singular to rounding: at a resonance without damping,
+    and at 0 Hz of a body that is free to move.
+
+    Warns
+    -----
+    FoldynWarning
+        There are such frequencies.
+    """
+    shape = drive_shape(system, drive)
+    response = np.empty((len(frequency), len(shape)), np.complex128)
+    for k, f in enumerate(frequency):
+        omega = 2.0 * np.pi * f
+        solution = solve(dynamic_stiffness(system, omega), shape)
+        response[k] = solution * drive_factor(system, drive, omega)
+        report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
+    warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
+    return Answer(response, {}, {})
+
+
+def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
+    """K - w^2 M + i w C at an angular frequency (rad/s)."""
+    undamped = system.stiffness - omega**2 * system.mass
+    return sparse.csc_array(undamped + 1j * omega * system.damping)
 
 
 @dataclass(frozen=True)
@@ -68,8 +108,6 @@ def modal(
     """
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
-    if count > pencil.finite:
-        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
     shape = drive_shape(system, drive)
     load = modes.shapes.T @ shape
@@ -84,7 +122,7 @@ def modal(
         q = _amplitudes(modes.values, noise, damping, omega, load)
         response[k] = (modes.shapes @ q + left) * drive_factor(system, drive, omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
-    warn_of_resonances(frequency, response)
+    warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     facts = {"modes": count, "static_correction": options.static_correction}
     return Answer(response, {}, facts)
 

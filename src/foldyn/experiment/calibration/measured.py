@@ -1,10 +1,10 @@
-"""Measurements of a motion: histories of nodes, and their spectra."""
+"""What a fit compares: forces and shapes of a quasi-static test, histories of nodes, spectra."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,17 +14,160 @@ from scipy.interpolate import CubicSpline
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.measurement import NodeValues, axis_number, column
+from foldyn.experiment.calibration.measurement import Measurement, NodeValues, column
 from foldyn.signals import sampling_interval, spectrum
-from foldyn.values import number, numbers, show
+from foldyn.values import choice, number, numbers, show
 
+IMPOSED = "imposed"
+"""Selects all nodes that supports of the case move along the axis."""
+QUANTITIES = ("displacement", "position")
 DETRENDS = (None, "constant", "linear")
 REFINED = 8
 """Steps by which the best place in time is refined: they converge quadratically."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class History(NodeValues):
+class ForceDisplacement(Measurement):
+    """Forces at displacements that supports of the case impose.
+
+    Parameters
+    ----------
+    nodes : sequence of int, or str
+        As of every measurement; "imposed", the default, for all that supports move along the axis.
+    displacement : array_like, shape (n,)
+        Mean displacement of the nodes along the axis (m).
+    force : array_like, shape (n,)
+        Force on all of them together along the axis (N), positive along the axis.
+    axis : {"x", "y", "z"}
+    """
+
+    nodes: Any = IMPOSED
+    displacement: Any = ()
+    force: Any = ()
+    axis: str = "x"
+    kind: ClassVar[str] = "force_displacement"
+    analysis: ClassVar[str] = "statics"
+    unit: ClassVar[str] = "N"
+    word: ClassVar[str] = IMPOSED
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        choice(self._of("axis"), self.axis, AXES)
+        moved = column(self._of("displacement"), self.displacement)
+        self._set(displacement=moved, force=column(self._of("force"), self.force, len(moved)))
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.force
+
+    def where(self, case: Case) -> NDArray[np.int64]:
+        """See `Measurement`."""
+        if self.nodes == IMPOSED:
+            return np.flatnonzero(case.imposed[:, AXES.index(self.axis)])
+        return super().where(case)
+
+    def check(self, case: Case, arguments: Mapping[str, Any]) -> None:
+        """See `Measurement`."""
+        if not len(self.where(case)):
+            raise InputError(f"{self._of('nodes')}: no support moves any node along {self.axis}")
+        held = case.imposed[self.where(case), AXES.index(self.axis)]
+        if not held.all():
+            free = self.where(case)[~held][0]
+            raise InputError(
+                f"{self._of('nodes')}: no support of the case moves node {free} along {self.axis}; "
+                "forces are compared where displacements are imposed (to compare displacements "
+                'under given forces use kind = "shapes")'
+            )
+        if self._full(case) == 0.0:
+            raise InputError(f"{self._of('nodes')}: the supports move these nodes by 0")
+
+    def factors(self, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.displacement / self._full(case)
+
+    def at(self, displacement: NDArray[np.float64]) -> ForceDisplacement:
+        """The same test at other displacements, where no force is known."""
+        return replace(self, displacement=displacement, force=np.zeros(len(displacement)))
+
+    def _full(self, case: Case) -> float:
+        """Mean displacement of the nodes at the load factor 1."""
+        nodes, axis = self.where(case), AXES.index(self.axis)
+        return float(sum(np.mean(term[nodes, axis]) for term, _ in case.imposed_terms))
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        nodes = np.isin(result["support_node"].values, self.where(case))
+        chosen = nodes & (result["support_axis"].values == self.axis)
+        total = result["reaction"].values[:, chosen].sum(axis=1)
+        return total[_steps(result, self.factors(case))]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shapes(NodeValues):
+    """Displacements or positions of nodes at load factors.
+
+    Parameters
+    ----------
+    load_factor : array_like, shape (s,)
+    values : array_like, shape (s, m, a)
+        Of each node along each axis (m); NaN where one was not seen.
+    axes : str
+        The axes measured, "xz" for a picture from the side.
+    quantity : {"displacement", "position"}
+    """
+
+    load_factor: Any = ()
+    axes: str = "xyz"
+    quantity: str = "displacement"
+    kind: ClassVar[str] = "shapes"
+    analysis: ClassVar[str] = "statics"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        choice(self._of("quantity"), self.quantity, QUANTITIES)
+        if not self.axes or set(self.axes) - set(AXES) or len(set(self.axes)) < len(self.axes):
+            raise InputError(f'{self._of("axes")} = {show(self.axes)}: must be letters of "xyz"')
+        factors = column(self._of("load_factor"), self.load_factor)
+        values = np.array(self.values, dtype=np.float64)
+        if values.ndim != 3 or values.shape[::2] != (len(factors), len(self.axes)):
+            raise InputError(
+                f"{self._of('values')}: shape {values.shape}: must be (steps, nodes, axes), here "
+                f"({len(factors)}, nodes, {len(self.axes)})"
+            )
+        if not np.isfinite(values).any() or np.isinf(values).any():
+            raise InputError(f"{self._of('values')}: must be numbers, NaN where a node is not seen")
+        self._set(load_factor=factors, values=values)
+
+    def observed(self) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.values[np.isfinite(self.values)]
+
+    def factors(self, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.load_factor
+
+    def shapes(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """Values of a result, whether they were seen or not, shape (s, m, a)."""
+        nodes, axes = self.where(case), [AXES.index(axis) for axis in self.axes]
+        moved = result["displacement"].values[_steps(result, self.load_factor)][:, nodes][..., axes]
+        if self.quantity == "displacement":
+            return moved
+        return moved + case.structure.nodes[nodes][:, axes]
+
+    def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
+        """See `Measurement`."""
+        return self.shapes(result, case)[np.isfinite(self.values)]
+
+
+def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Steps of a path at load factors that it has been asked for."""
+    return np.abs(result["load_factor"].values[None] - factors[:, None]).argmin(axis=1)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimeHistory(NodeValues):
     """Displacements of nodes along an axis over time.
 
     Parameters
@@ -40,8 +183,8 @@ class History(NodeValues):
         How far (s) the model may be moved beyond `delay`, to where the misfit is least: the instant
         of a release is rarely known to a part of a frame. Not moved by default.
     detrend : {None, "constant", "linear"}
-        What is taken off the misfit: nothing, its mean, or the straight line of best fit. The mean
-        where the zero of the measured displacements means nothing.
+        What is subtracted from the misfit: nothing, its mean, or the straight line of best fit. The
+        mean where the zero of the measured displacements is arbitrary.
     """
 
     time: Any = ()
@@ -55,7 +198,7 @@ class History(NodeValues):
     def __post_init__(self) -> None:
         """Check the arguments."""
         super().__post_init__()
-        axis_number(self._of("axis"), self.axis)
+        choice(self._of("axis"), self.axis, AXES)
         number(self._of("align"), self.align, least=0.0)
         time = column(self._of("time"), self.time)
         if len(time) < 2 or not (np.diff(time) > 0.0).all():
@@ -67,13 +210,12 @@ class History(NodeValues):
             raise InputError(
                 f'{self._of("detrend")} = {show(self.detrend)}: choose "constant", "linear" or none'
             )
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "values", values)
+        self._set(time=time, values=values)
         for node in range(values.shape[1]):
             self._refuse_constant(node)
 
     def _refuse_constant(self, node: int) -> None:
-        """Refuse a history that says nothing of a motion."""
+        """Refuse a history without any motion."""
         seen = self.values[:, node][np.isfinite(self.values[:, node])]
         named = np.ravel(self.nodes)
         one = f"node {named[node]}" if len(named) == self.values.shape[1] else f"column {node}"
@@ -97,15 +239,16 @@ class History(NodeValues):
         _within(self._of("time"), np.array([early - self.align, late + self.align]), arguments)
 
     def curves(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """What a motion says at the measured times, shape (t, m), nothing taken off."""
-        return self._along(result, case)(self.time + self.delay + self.shift(result, case))
+        """Displacements in a motion at the measured times, shape (t, m), no trend removed."""
+        along = _spline(result, self.where(case), self.axis)
+        return along(self.time + self.delay + self.shift(result, case))
 
     def shift(self, result: Any, case: Case) -> float:
         """How far (s) the model is moved, beyond `delay` and at most by `align`, to fit best."""
         if self.align == 0.0:
             return 0.0
-        along, there, observed = self._along(result, case), self.time + self.delay, self.observed()
-        speed = along.derivative()
+        along = _spline(result, self.where(case), self.axis)
+        there, observed, speed = self.time + self.delay, self.observed(), along.derivative()
 
         def misfit(by: float) -> NDArray[np.float64]:
             return self._reduced(along(there + by)) - observed
@@ -123,7 +266,7 @@ class History(NodeValues):
         return self._reduced(self.curves(result, case))
 
     def trend(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What `detrend` takes off curves of shape (t, m), found where the nodes were seen."""
+        """What `detrend` subtracts from curves (t, m), fitted where the nodes were seen."""
         if self.detrend is None:
             return np.zeros(curves.shape)
         degree = DETRENDS.index(self.detrend) - 1
@@ -134,11 +277,8 @@ class History(NodeValues):
             lines.append(line(self.time))
         return np.stack(lines, axis=1)
 
-    def _along(self, result: Any, case: Case) -> CubicSpline:
-        return _spline(result, self.where(case), self.axis)
-
     def _reduced(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Curves where the nodes were seen, with the trend taken off, flat: node after node."""
+        """Curves where the nodes were seen, without their trend, flat: node after node."""
         return (curves - self.trend(curves)).T[np.isfinite(self.values).T]
 
 
@@ -157,7 +297,7 @@ class Spectrum(NodeValues):
         whose spectrum this is, so that both resolve and leak the same.
     axis : {"x", "y", "z"}
     detrend : {None, "constant", "linear"}
-        What is taken off the model's motion before; as it was for the record.
+        What is subtracted from the model's motion first; as it was for the record.
     taper : str, optional
         Window function of both, as `foldyn.signals.spectrum` takes it.
     """
@@ -173,19 +313,18 @@ class Spectrum(NodeValues):
     def __post_init__(self) -> None:
         """Check the arguments."""
         super().__post_init__()
-        axis_number(self._of("axis"), self.axis)
+        choice(self._of("axis"), self.axis, AXES)
         frequency = column(self._of("frequency"), self.frequency)
         values = numbers(self._of("values"), self.values)
         values = self._per_node(values, len(frequency), "frequencies")
         time = column(self._of("time"), self.time)
         sampling_interval(time)
-        for name, value in (("frequency", frequency), ("values", values), ("time", time)):
-            object.__setattr__(self, name, value)
+        self._set(frequency=frequency, values=values, time=time)
 
     @classmethod
     def of(
         cls,
-        history: History,
+        history: TimeHistory,
         band: tuple[float, float],
         detrend: str | None = "constant",
         taper: str | None = None,
