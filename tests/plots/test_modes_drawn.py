@@ -14,7 +14,7 @@ from foldyn.plots import animate_modes, draw_modes, plot_mac
 from foldyn.plots.modes import chosen_modes, describe_mode, main_axis
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
-from foldyn.results.modes import modes_dataset
+from foldyn.results import modes_dataset
 
 EIGENVALUE = np.array([0.0, -4.0, 0.0, (2 * np.pi * 3.8) ** 2, (2 * np.pi * 12.0) ** 2])
 RIGID = np.array([True, False, False, False, False])

@@ -15,7 +15,7 @@ import foldyn as fd
 from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
 from foldyn.experiment import TrackedModel
-from foldyn.results import netcdf, seal, trajectory_dataset
+from foldyn.results import netcdf, trajectory_dataset
 from foldyn.results.apart import apart
 
 SEAL = 80  # bytes at the end
@@ -52,13 +52,13 @@ def refusal(path) -> str:
 
 def test_every_flipped_bit_shows(file, motion):
     sound = file.read_bytes()
-    assert seal.sound(file)
+    assert netcdf.sound(file)
     random = np.random.default_rng(0)
     for place in [*random.integers(0, len(sound), 60), 0, len(sound) - SEAL - 1, len(sound) - 2]:
         damaged = bytearray(sound)
         damaged[place] ^= 1 << int(random.integers(8))
         file.write_bytes(damaged)
-        if seal.sound(file) is None:  # the seal itself: all before it is sound
+        if netcdf.sound(file) is None:  # the seal itself: all before it is sound
             assert place >= len(sound) - SEAL
             xr.testing.assert_identical(fd.load(file), motion)
         else:
@@ -67,7 +67,7 @@ def test_every_flipped_bit_shows(file, motion):
 
 def test_files_without_a_seal_are_read(file, motion):
     xr.testing.assert_identical(fd.load(unsealed(file)), motion)
-    assert seal.sound(file) is None
+    assert netcdf.sound(file) is None
     motion.to_netcdf(file, engine="h5netcdf")
     xr.testing.assert_identical(fd.load(file), motion)
 

@@ -19,7 +19,7 @@ from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
-from foldyn.studies.herkal.specimen.agreement import vibration_of
+from foldyn.studies.herkal.specimen.evaluation import vibration_of
 from foldyn.studies.herkal.specimen.measured import Data, data_of
 
 STEP = 1.0 / calibration.RATE
@@ -343,7 +343,7 @@ def tables(tmp_path):
 
 def test_files_are_sorted_by_what_they_hold(tables) -> None:
     found = data_of([str(tables / "film.csv"), str(tables / "weights.csv")])
-    assert found.names == ["weights.csv", "film.csv"]
+    assert [file.name for file in found.files.values()] == ["weights.csv", "film.csv"]
     assert found.film is None and not found.synthetic and found.label == "measured"
     assert isinstance(measured.measurement(found.static, ""), ForceDisplacement)
     before = found.digests()
@@ -429,7 +429,7 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
         assert not fit.there(tables)
     fit.make(tables)
     assert fit.there(tables)
-    monkeypatch.setattr(tasks, "specimen_program", lambda: "another")
+    monkeypatch.setattr(tasks, "program", lambda *_: "another")
     assert not fit.there(tables)
 
 
@@ -489,11 +489,14 @@ def test_agreement_of_film_and_model_by_node() -> None:
 
 
 def test_what_is_said_of_the_supports_is_what_was_found() -> None:
-    assert "So the plate held the row" in page._glue(front_of(alone=6.0))
-    assert "So the plate held" not in page._glue(front_of(alone=9.4))
+    def told(front):
+        return page._vibrations(front, Data())[-1].text
+
+    assert "So the plate held the row" in told(front_of(alone=6.0))
+    assert "So the plate held" not in told(front_of(alone=9.4))
     flat = front_of()
     flat["model"][2] = 0.0
-    assert "no peak" in page._glue(flat)
+    assert "no peak" in told(flat)
 
 
 def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None:

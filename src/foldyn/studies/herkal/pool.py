@@ -15,7 +15,7 @@ from foldyn.workers import Workers
 
 
 class Task(Protocol):
-    """Something to compute; hashable, and it can be sent to another process."""
+    """Something to compute; it is hashable and can be sent to another process."""
 
     @property
     def name(self) -> str:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from foldyn.analyses import CaseFile
+from foldyn.analyses import CaseFile, read_case
 from foldyn.cases import Case, Force, HalfSine
 from foldyn.errors import InputError
 from foldyn.shells import shell
 from foldyn.structures import discretize
+from foldyn.studies import find_case
+from foldyn.values import choice
 
+CASES = ("case1", "case2", "case3", "case4")
 REFERENCE = "shell"
 LOADS = ("file", "edge")
 
@@ -38,12 +41,11 @@ class Variant:
 
     def __post_init__(self) -> None:
         """Check what can be checked without a case."""
-        if self.loads not in LOADS:
-            raise InputError(f"loads = {self.loads!r}: choose one of {', '.join(LOADS)}")
+        choice("loads", self.loads, LOADS)
 
     @property
     def name(self) -> str:
-        """Of its files; empty for the case file as it is."""
+        """Part of file names; empty for the case file as it is."""
         pulse = "" if self.pulse is None else f"pulse{self.pulse:g}"
         loads = "" if self.loads == "file" else self.loads
         return "-".join(filter(None, (pulse, loads, self.bend_law, self.calibration)))
@@ -56,7 +58,7 @@ class Variant:
 
     @property
     def of_shell(self) -> Variant:
-        """What of it the shell knows: it has neither bends nor a calibration of them."""
+        """What of it applies to the shell, which has neither bends nor their calibration."""
         return replace(self, bend_law=None, calibration=None)
 
 
@@ -65,7 +67,7 @@ AS_FILED = Variant()
 
 
 @dataclass(frozen=True)
-class Model:
+class SheetModel:
     """A model of the sheet.
 
     Attributes
@@ -91,34 +93,26 @@ class Model:
 def _bars_and_hinges(
     mass: str, case_file: CaseFile, options: Mapping[str, Any], divisions: int
 ) -> Any:
-    """Structure of the case file with a mass rule; `divisions` mean nothing to it."""
-    given = case_file.case().structure.options
-    arguments = {item.name: getattr(given, item.name) for item in fields(given)}
-    arguments |= {"mass": mass, **options}
+    """Structure of the case file with a mass rule; it has no use for `divisions`."""
+    arguments = {**vars(case_file.case().structure.options), "mass": mass, **options}
     return discretize(case_file.pattern, case_file.sheet, **arguments)
 
 
 def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> Any:
-    """Shell with the creases of the case file."""
-    given = case_file.case().structure.options
-    return shell(
-        case_file.pattern,
-        case_file.sheet,
-        divisions,
-        fold_law=given.fold_law,
-        crease_stiffness=given.crease_stiffness,
-        crease_rest=given.crease_rest,
-    )
+    """Shell with the creases of the case file; it has no use for `options`."""
+    given = vars(case_file.case().structure.options)
+    creases = {name: given[name] for name in ("fold_law", "crease_stiffness", "crease_rest")}
+    return shell(case_file.pattern, case_file.sheet, divisions, **creases)
 
 
-def _rule(name: str, label: str, paper: bool = False) -> Model:
-    return Model(name, label, partial(_bars_and_hinges, name), paper=paper)
+def _rule(name: str, label: str, paper: bool = False) -> SheetModel:
+    return SheetModel(name, label, partial(_bars_and_hinges, name), paper=paper)
 
 
-MODELS: Mapping[str, Model] = {
+MODELS: Mapping[str, SheetModel] = {
     model.name: model
     for model in (
-        Model(REFERENCE, "shell", _shell, statics="shell"),
+        SheetModel(REFERENCE, "shell", _shell, statics="shell"),
         _rule("equi_inertial", "equi-inertial", paper=True),
         _rule("panel", "panel", paper=True),
         _rule("centroid", "centroid", paper=True),
@@ -130,18 +124,16 @@ MODELS: Mapping[str, Model] = {
 }
 """The reference and what is compared with it, in the order of the tables."""
 
-OTHERS: Mapping[str, Model] = {
+OTHERS: Mapping[str, SheetModel] = {
     "equi_inertial_acute": _rule("equi_inertial_acute", "equi-inertial, other corners"),
 }
 """Models of the sensitivity alone."""
 
 
-def model_of(name: str) -> Model:
-    """Model by its name."""
+def model_of(name: str) -> SheetModel:
+    """Model with this name."""
     known = {**MODELS, **OTHERS}
-    if name not in known:
-        raise InputError(f"model = {name!r}: choose one of {', '.join(known)}")
-    return known[name]
+    return known[choice("model", name, known)]
 
 
 def rules() -> tuple[str, ...]:
@@ -152,6 +144,11 @@ def rules() -> tuple[str, ...]:
 def paper_rules() -> tuple[str, ...]:
     """Names of the paper's models."""
     return tuple(name for name, model in MODELS.items() if model.paper)
+
+
+def case_study(name: str) -> CaseFile:
+    """Shipped case file of a case study, "case1"."""
+    return read_case(find_case(f"herkal/{name}"))
 
 
 def label(name: str) -> str:
@@ -170,9 +167,8 @@ def case_with(
         No such model; the variant changes a pulse that the file does not have.
     """
     structure = model_of(model).structure(case_file, variant.options, divisions)
-    given = case_file.case()
-    loads = [_varied(load, case_file, variant) for load in given.loads]
-    return Case(structure, given.supports, loads, given.damping)
+    loads = [_varied(load, case_file, variant) for load in case_file.case().loads]
+    return replace(case_file.case(), structure=structure, loads=loads)
 
 
 def _varied(load: Any, case_file: CaseFile, variant: Variant) -> Any:
