@@ -21,7 +21,7 @@ from foldyn.plots import (
     style,
     total_reaction,
 )
-from foldyn.plots.along import evenly, main_direction, runs, way
+from foldyn.plots.along import evenly, main_direction, stretches, way
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.results import path_dataset
@@ -221,7 +221,7 @@ def test_the_way_of_the_nodes(path):
 
 
 def test_runs_of_stability(path):
-    assert [tuple(run) for run in runs(path)] == [(0, 2, True), (2, 6, False), (6, 7, True)]
+    assert [tuple(part) for part in stretches(path)] == [(0, 2, True), (2, 6, False), (6, 7, True)]
 
 
 def sheets(figure):

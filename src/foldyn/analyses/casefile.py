@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.analyses.sections import CaseSchema
@@ -19,16 +20,16 @@ from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
 from foldyn.patterns import Pattern
+from foldyn.report.album import Album
+from foldyn.report.page import write_report
+from foldyn.report.sections import Section
 from foldyn.structures import Sheet
 from foldyn.values import choice
 
-if TYPE_CHECKING:
-    import xarray
-
 Begun = Callable[[], None]
-Compute = Callable[[bool, Begun], "xarray.Dataset"]
-"""Computes a result, with or without a bar; calls what it is given when nothing is left to be
-refused."""
+Compute = Callable[[bool, Begun], xarray.Dataset]
+"""Computes a result, with or without a bar; calls what it is given, once or more often, when
+nothing is left to be refused."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +109,21 @@ class Analysis(ABC):
 
     @abstractmethod
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Tell in a line what came of the computation with the mass rule `name`."""
+        """Summarize the computation with the mass rule `name` in a line."""
 
+    @staticmethod
     @abstractmethod
+    def sections(
+        case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
+    ) -> Iterable[Section]:
+        """Sections of the page about results, by mass rule; the album draws their figures."""
+
     def page(
         self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
     ) -> Path:
         """Draw results, by mass rule, into an existing folder; returns the path of report.html."""
+        sections = self.sections(case_file, results, Album(folder))
+        return write_report(folder / "report.html", case_file.heading, sections)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse what the computations of all mass rules cannot do together."""

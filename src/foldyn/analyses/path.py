@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.path_page import path_page
+from foldyn.analyses.path_page import path_sections
 from foldyn.analyses.sections import (
     DIRECTIONS,
-    MOST_SHAPES,
     Animation,
     CaseSchema,
     Count,
@@ -28,6 +26,7 @@ from foldyn.analyses.sections import (
     check_mass,
     one_of,
     part,
+    some_shapes,
 )
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
@@ -36,9 +35,6 @@ from foldyn.cases.supports import AXES, check_axis, support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.values import indices, number, show
-
-if TYPE_CHECKING:
-    import xarray
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys that are settings of the solver."""
@@ -67,17 +63,6 @@ def _load_factors(value: Any) -> list[float]:
     return [number(f"[{i}]", item) for i, item in enumerate(value)]
 
 
-def _shapes(value: Any) -> int | tuple[int, ...]:
-    if isinstance(value, int) and not isinstance(value, bool):
-        if not 1 <= value <= MOST_SHAPES:
-            raise InputError(f" = {value}: give 1 to {MOST_SHAPES} shapes, or a list of points")
-        return value
-    chosen = indices("", value, "point", "or how many shapes to draw")
-    if len(chosen) > MOST_SHAPES:
-        raise InputError(f": {len(chosen)} points; give at most {MOST_SHAPES}")
-    return chosen
-
-
 TIMELESS = (
     "a path has no time; leave it out: what loads and moves the structure grows with the load "
     "factor (or is named in analysis.constant)"
@@ -87,8 +72,17 @@ NO_BASE = (
 )
 
 
-class UntilSection(Section):
-    """Where a path ends: a node's displacement along an axis reaches a value."""
+class Reached(Section):
+    """[analysis.until]: whether a node has moved so far along an axis; `until` of `trace`.
+
+    Attributes
+    ----------
+    node : int
+    axis : {"x", "y", "z"}
+    displacement : float
+        Displacement (m) from the rest position, not zero; reached where the node's own is as far
+        from zero on the same side.
+    """
 
     node: Whole
     axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
@@ -101,24 +95,6 @@ class UntilSection(Section):
                 " = 0: the path begins there; give where it shall end", ".displacement"
             )
         return self
-
-
-@dataclass(frozen=True)
-class Reached:
-    """Whether a node has reached a displacement, as a function for `until` of `trace`.
-
-    Attributes
-    ----------
-    node : int
-    axis : {"x", "y", "z"}
-    displacement : float
-        Displacement (m) from the rest position, not zero; reached where the node's own is as far
-        from zero on the same side.
-    """
-
-    node: int
-    axis: str
-    displacement: float
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
         """Whether it is so for displacements (n, 3), m."""
@@ -135,7 +111,7 @@ class PathSection(Section):
     steps: Count | None = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
-    until: UntilSection | None = None
+    until: Reached | None = None
     inertia_relief: bool = False
     tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn
@@ -147,7 +123,7 @@ class PathOutput(Section):
 
     nodes: Nodes = None
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
-    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 4
+    shapes: Annotated[int | tuple[int, ...], some_shapes("shapes", "point")] = 4
     animation: Animation = "gif"
 
 
@@ -187,7 +163,6 @@ class PathAnalysis(Analysis):
         until = schema.analysis.until
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
-            given["until"] = Reached(**until.model_dump())
         settings = Settings(**{name: given.pop(name) for name in SETTINGS})
         return cls({**given, "settings": settings})
 
@@ -239,12 +214,7 @@ class PathAnalysis(Analysis):
             return np.flatnonzero(case.imposed.any(axis=1))
         return super().shown(case)
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
-        """Draw the path; see `Analysis`."""
-        (path,) = results.values()
-        return path_page(case_file, path, folder)
+    sections = staticmethod(path_sections)
 
 
 def _bar(shown: bool) -> Any:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+import xarray
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
-from foldyn.plots.along import along, evenly, main_direction
-from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
-from foldyn.report.page import write_report
+from foldyn.plots.along import CRITICAL, along, evenly, main_direction
+from foldyn.report.album import Album, enlarged, listed, shown_nodes, visible_scale
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
-
-if TYPE_CHECKING:
-    import xarray
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
@@ -26,66 +22,58 @@ MOST_COLUMNS = 4
 """Nodes whose displacements the table shows at most."""
 
 
-def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path) -> Path:
-    """Draw a case and its path into `folder`; returns the path of report.html."""
-    album, case = Album(folder), case_file.case()
+def path_sections(
+    case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
+) -> Iterator[Section]:
+    """See `Analysis.sections`."""
+    (path,) = results.values()
+    case = case_file.case()
     moved = plots.moved_supports(case)
-    chosen = case_file.output.nodes.tolist()
-    nodes, some = shown_nodes(chosen, MOST_CURVES)
+    nodes, some = shown_nodes(case_file.output.nodes.tolist(), MOST_CURVES)
     direction = case_file.output.axis or main_direction({"": path}, nodes)
-    sections: list[Section] = [*album.structure(case), Heading("The path")]
+    yield from album.structure(case)
+    yield Heading("The path")
     if moved is not None:
-        sections.append(
-            album.figure(
-                "reaction",
-                f"Total force of the supports at {_nodes(moved[0])}, which are moved along "
-                f"{moved[1]}, over their displacement. {_multiplied(path)}",
-                lambda: plots.plot_reaction({"": path}, *moved),
-            )
+        yield album.figure(
+            "reaction",
+            f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
+            f"{moved[1]}, over their displacement. {_multiplied(path)}",
+            lambda: plots.plot_reaction({"": path}, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
-        sections.append(
-            album.figure(
-                "curve",
-                f"Load factor over the displacement of {_nodes(nodes)}{some} along {direction}. "
-                f"{_multiplied(path)}",
-                lambda: plots.plot_load_displacement({"": path}, nodes, direction),
-            )
+        yield album.figure(
+            "curve",
+            f"Load factor over the displacement of {listed('node', nodes)}{some} along "
+            f"{direction}. {_multiplied(path)}",
+            lambda: plots.plot_load_displacement({"": path}, nodes, direction),
         )
     if path.sizes["step"] > 1:
-        sections.append(
-            album.figure(
-                "energies",
-                f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, "
-                "with the work that was done on the structure; below, their shares.",
-                lambda: plots.plot_path_energies(path, *_growing(path, moved)),
-            )
+        yield album.figure(
+            "energies",
+            f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
+            "done on the structure; below, their shares.",
+            lambda: plots.plot_path_energies(path, *_growing(path, moved)),
         )
     scale = visible_scale(case, path)
-    sections.append(
-        album.figure(
-            "shapes",
-            f"The deformed sheet{enlarged(scale)}; the undeformed one in gray.",
-            lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
-        )
+    yield album.figure(
+        "shapes",
+        f"The deformed sheet{enlarged(scale)}; the undeformed one in gray.",
+        lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
     )
     if path.sizes["step"] > 1:
-        file = album.folder / f"path.{case_file.output.animation}"
-        plots.animate(case, path, file, frames=FRAMES, fps=FPS, scale=scale)
-        sections.append(Picture(file, f"Along the path{enlarged(scale)}; at rest in gray."))
-    sections += [
-        Heading("The numbers"),
-        _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved),
-        _run(case_file, path),
-        Text(
-            f"Computed with Foldyn {path.attrs['foldyn_version']}. Stable means that the tangent "
-            "stiffness of the free nodes has no negative eigenvalue: nodes that supports move stay "
-            "where they are. At every point the out-of-balance force is below the tolerance times "
-            "the forces at play, or rounding. The result carries its own case, can be run again "
-            "from it, and motions can start from its points."
-        ),
-    ]
-    return write_report(album.folder / "report.html", case_file.heading, sections)
+        film = album.folder / f"path.{case_file.output.animation}"
+        plots.animate(case, path, film, frames=FRAMES, fps=FPS, scale=scale)
+        yield Picture(film, f"Along the path{enlarged(scale)}; at rest in gray.")
+    yield Heading("The numbers")
+    yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
+    yield _run(case_file, path)
+    yield Text(
+        f"Computed with Foldyn {path.attrs['foldyn_version']}. Stable means that the tangent "
+        "stiffness of the free nodes has no negative eigenvalue: nodes that supports move stay "
+        "where they are. At every point the out-of-balance force is below the tolerance times "
+        "the forces at play, or rounding. The result carries its own case, can be run again "
+        "from it, and motions can start from its points."
+    )
 
 
 def _growing(
@@ -100,8 +88,8 @@ def _growing(
 def _multiplied(path: xarray.Dataset) -> str:
     """What the load factor is."""
     constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
-    but = f", but for {_list('loads', constant)}, which act in full all along" if constant else ""
-    return f"The factor multiplies the loads and displacements that the structure has above{but}."
+    but = f", except {listed('load', constant)} (in full throughout)" if constant else ""
+    return f"The factor multiplies the loads and displacements shown above{but}."
 
 
 def _points(
@@ -129,14 +117,13 @@ def _points(
     header += ["iterations", "stability", "kind"]
     negative = path["negative_eigenvalues"].values
     judged = ["" if n < 0 else "stable" if n == 0 else "unstable" for n in negative.tolist()]
-    kinds = {"regular": "", "limit": "limit point", "bifurcation": "bifurcation"}
     table = [
         [
             k,
             *(None if np.isnan(column[k]) else float(column[k]) for column in columns),
             int(path["iterations"][k]),
             judged[k],
-            kinds[str(path["point"].values[k])],
+            CRITICAL.get(str(path["point"].values[k]), ""),
         ]
         for k in rows
     ]
@@ -144,36 +131,17 @@ def _points(
 
 
 def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
-    a = path.attrs
-    header = [
-        "method",
-        "points",
-        "limit points",
-        "bifurcations",
-        "Newton iterations",
-        "factorizations",
-        "step cuts",
-        "tolerance",
-        "time (s)",
-    ]
     kinds = path["point"].values
-    row = [
-        a["method"],
-        path.sizes["step"],
-        int((kinds == "limit").sum()),
-        int((kinds == "bifurcation").sum()),
-        a["newton_iterations"],
-        a["factorizations"],
-        a["step_cuts"],
-        a["tolerance"],
-        a["wall_seconds"],
-    ]
-    return Table(header, [row], f"{case_file.path.name}: the run", digits=3)
-
-
-def _nodes(nodes: list[int]) -> str:
-    return f"node {nodes[0]}" if len(nodes) == 1 else _list("nodes", nodes)
-
-
-def _list(what: str, numbers: list[int]) -> str:
-    return f"{what} {', '.join(map(str, numbers))}"
+    cells = {
+        "method": path.attrs["method"],
+        "points": path.sizes["step"],
+        "limit points": int((kinds == "limit").sum()),
+        "bifurcations": int((kinds == "bifurcation").sum()),
+        "Newton iterations": path.attrs["newton_iterations"],
+        "factorizations": path.attrs["factorizations"],
+        "step cuts": path.attrs["step_cuts"],
+        "tolerance": path.attrs["tolerance"],
+        "time (s)": path.attrs["wall_seconds"],
+    }
+    caption = f"{case_file.path.name}: the run"
+    return Table(list(cells), [list(cells.values())], caption, digits=3)

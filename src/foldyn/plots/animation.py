@@ -1,30 +1,30 @@
-"""Animation of a motion or a path, as a GIF or an MP4."""
+"""Animations of motions, paths and modes, as a GIF or an MP4."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
-from foldyn.plots.along import check_path, runs, way
+from foldyn.plots.along import check_path, displacements, stretches, way
+from foldyn.plots.modes import ShownModes
 from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.shapes import side_by_side
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
-from foldyn.plots.writers import WRITERS, filmed, find_ffmpeg
+from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
-DPI = {".gif": 100, ".mp4": 200}
-"""Dots per inch of an animation by the end of the file's name."""
-_FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs of shorter frames
 _TRAVELS = 0.25  # path of the center of mass, in sizes of the sheet, that is worth a line
+_WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot be scrolled on a phone
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
 
@@ -80,8 +80,7 @@ def animate(
     ComputationError
         ffmpeg could not write the file.
     """
-    path = Path(path)
-    kind = checked_kind(path, frames, fps)
+    path = checked_file(path, frames, fps)
     sheet = Sheet3D.of(case_or_structure)
     places, displacement = frame_displacements(sheet, result, frames)
     moving = sheet.nodes + scale * displacement
@@ -91,27 +90,20 @@ def animate(
     keys = edge_keys(sheet, actuated=sheet.glows)
     traveled = _center_path(sheet, moving)
     if traveled is not None:
-        keys.append(Line2D([], [], **_PATH, marker="o", markersize=4.0, label="center of mass"))
-    figure, axes = scene.view_figure(
-        extent, sight, title or " ", legend_rows=-(-len(keys) // 3), width=6.0
-    )
+        keys.append(style.key("center of mass", **_PATH, marker="o", markersize=4.0))
+    legend_rows = -(-len(keys) // 3)
+    figure, axes = scene.view_figure(extent, sight, title or " ", legend_rows, _WIDTH)
     add_undeformed(axes, sheet)
     drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.glows)
     dots = [] if traveled is None else [(_draw_path(axes, traveled), traveled)]
-    style.legend_below(figure, keys)
-    clock = figure.text(
-        0.02,
-        1.0 - (0.34 if title else 0.12) / figure.get_figheight(),
-        "",
-        fontsize=style.LABEL,
-        color=style.BLACK,
-        va="top",
-    )
-    style.finish(figure)
-    writer = WRITERS[kind](fps=fps)
-    moments = _times(places, writer.rate) if "time" in result.sizes else _factors(places, result)
+    top = 1.0 - (0.34 if title else 0.12) / figure.get_figheight()
+    look = {"fontsize": style.LABEL, "color": style.BLACK, "va": "top"}
+    clock = figure.text(0.02, top, "", **look)
+    style.finish(figure, keys)
     note = f", displacement times {scale:g}" if scale != 1.0 else ""
-    with filmed(writer, figure, path, DPI[kind]):
+    with filmed(figure, path, fps) as writer:
+        moving_in_time = "time" in result.sizes
+        moments = _times(places, writer.rate) if moving_in_time else _factors(places, result)
         for index, (moment, points) in enumerate(zip(moments, moving, strict=True)):
             drawn.move(points)
             for dot, course in dots:
@@ -119,22 +111,6 @@ def animate(
             clock.set_text(moment + note)
             writer.grab_frame()
     return path
-
-
-def checked_kind(path: Path, frames: int, fps: int) -> str:
-    """Return the end of the file's name, when all that an animation needs is there."""
-    kind = path.suffix.lower()
-    if kind not in WRITERS:
-        raise InputError(f"path: {path.name!r}; an animation is written as {' or '.join(WRITERS)}")
-    if not path.parent.is_dir():
-        raise InputError(f"path: there is no directory {path.parent}; make it first")
-    if not 1 <= fps <= _FASTEST[kind]:
-        raise InputError(f"fps: {fps!r}; give 1 to {_FASTEST[kind]} pictures per second")
-    if frames < 2:
-        raise InputError(f"frames: {frames!r}; an animation has at least two pictures")
-    if kind == ".mp4":
-        find_ffmpeg()
-    return kind
 
 
 def _times(times: NDArray[np.float64], rate: float) -> list[str]:
@@ -147,7 +123,7 @@ def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
     """Return what pictures of a path tell: the load factor, and whether it is unstable there."""
     length = way(path)
     factors = np.interp(places, length, path["load_factor"].values)
-    unstable = [(length[run.start], length[run.stop]) for run in runs(path) if not run.stable]
+    unstable = [(length[a], length[b]) for a, b, stable in stretches(path) if not stable]
     digits = _digits(factors)
     return [
         f"load factor {factor:.{digits}f}"
@@ -199,7 +175,7 @@ def frame_displacements(
     elif "time" not in result.sizes:
         raise InputError("result: has neither times nor steps; give a motion or a path")
     dimension = "time" if "time" in result.sizes else "step"
-    motion = result["displacement"].transpose(dimension, "node", "axis").values
+    motion = displacements(result, dimension)
     sheet.check_nodes("result: it has", motion)
     if len(motion) < 2:
         raise InputError("result: a single sample does not move; store more of them")
@@ -212,3 +188,65 @@ def frame_displacements(
     part = (places - stored[after - 1]) / np.where(gap > 0.0, gap, 1.0)
     part = part[:, None, None]
     return places, (1.0 - part) * motion[after - 1] + part * motion[after]
+
+
+def animate_modes(
+    case_or_structure: Case | Structure,
+    modes: xr.Dataset,
+    path: str | PathLike[str],
+    which: Sequence[int] | None = None,
+    amplitude: float | None = None,
+    names: Mapping[int, str] | xr.Dataset | None = None,
+    frames: int = 40,
+    fps: int = 20,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Path:
+    """Write a GIF or an MP4 of modes that swing, one or several side by side.
+
+    One period that repeats without a seam; all modes swing at the same pace, whatever their
+    frequencies, which stand below them.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What vibrates.
+    modes : xarray.Dataset
+        Modes of `foldyn.modes`.
+    path : path-like
+        File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
+        package imageio-ffmpeg.
+    which, amplitude, names, view, title
+        As in `draw_modes`.
+    frames : int
+        Number of pictures in a period.
+    fps : int
+        Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        Modes of another structure, no such mode, fewer than two frames, a rate out of range, a
+        path that is no GIF or MP4 in an existing directory, or an MP4 without ffmpeg.
+    ComputationError
+        ffmpeg could not write the file.
+    """
+    path = checked_file(path, frames, fps)
+    shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
+    rest, swings = shown.sheet.nodes, shown.swings
+    extent = np.concatenate([rest + swings, rest - swings]).reshape(-1, 3)
+    figure, sheets = side_by_side(
+        shown.sheet, rest + swings, shown.captions, View(*view), shown.notes, title, extent,
+        width=_WIDTH, most_columns=_COLUMNS,
+    )  # fmt: skip
+    with filmed(figure, path, fps) as writer:
+        for phase in 2.0 * np.pi * np.arange(frames) / frames:
+            for drawn, swing in zip(sheets, swings, strict=True):
+                drawn.move(rest + np.cos(phase) * swing)
+            writer.grab_frame()
+    return path

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.chosen import AXES, check_nodes_of, directions
+from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
 
 
@@ -79,14 +79,11 @@ def plot_history(
     handles = []
     for row, (node, direction) in enumerate(zip(numbers, chosen, strict=True)):
         left, right = grid[row]
-        last = row == rows - 1
-        style.frame(
-            left,
-            "time (s)" if last else "",
-            f"{direction} displacement (m)",
-            f"node {node}",
+        time_label, frequency_label = (
+            ("time (s)", "frequency (Hz)") if row == rows - 1 else ("", "")
         )
-        style.frame(right, "frequency (Hz)" if last else "", "amplitude (m)", f"node {node}")
+        style.frame(left, time_label, f"{direction} displacement (m)", f"node {node}")
+        style.frame(right, frequency_label, "amplitude (m)", f"node {node}")
         for index, (label, dataset) in enumerate(trajectories.items()):
             time = dataset["time"].values
             motion = moved[label][:, row, AXES.index(direction)]
@@ -95,16 +92,14 @@ def plot_history(
             )
             shown = frequencies <= max_frequency * (1.0 + 1e-9)
             look = style.line_style(index) | {"label": label}
-            (line,) = left.plot(time, motion, **look)
+            lines = left.plot(time, motion, **look)
             right.plot(frequencies[shown], amplitude[shown], **look)
-            if row == 0:
-                handles.append(line)
+            handles += lines if row == 0 else []
         left.margins(x=0.0)
         right.set_xlim(0.0, max_frequency)
         right.set_ylim(bottom=0.0)
         for frame in (left, right):
             style.exponents(frame, ticks=5)
-    style.legend_below(figure, handles, columns=5)
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
-    return style.finish(figure)
+    return style.finish(figure, handles, columns=5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -113,7 +114,7 @@ def _draw_bar(axes: Axes, law: Any, modulus: float, low: float, high: float) -> 
 
 
 def _legend_below(axes: Axes, note: str) -> None:
-    legend = axes.legend(
+    axes.legend(
         loc="upper left",
         bbox_to_anchor=(-0.2, -0.19),
         borderaxespad=0.0,
@@ -125,13 +126,9 @@ def _legend_below(axes: Axes, note: str) -> None:
         title=note or None,
         title_fontsize=style.NOTE,
     )
-    legend.set_in_layout(True)
 
 
 def _distinct(stiffness: np.ndarray, rest: np.ndarray) -> list[tuple[int, int]]:
     """Return (first index, count) of hinges with equal stiffness and rest, most frequent first."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for index, (k, theta0) in enumerate(zip(stiffness, rest, strict=True)):
-        groups.setdefault((f"{k:.6e}", f"{theta0:.6f}"), []).append(index)
-    found = [(members[0], len(members)) for members in groups.values()]
-    return sorted(found, key=lambda pair: -pair[1])
+    looks = [f"{k:.6e} {theta0:.6f}" for k, theta0 in zip(stiffness, rest, strict=True)]
+    return [(looks.index(look), count) for look, count in Counter(looks).most_common()]

@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
@@ -18,11 +17,13 @@ from foldyn.linear import Peak, peaks_of
 from foldyn.linear.peaks_of import SIDES
 from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.plots import style
+from foldyn.plots.frf import Curve, curves_of, unit_of
 from foldyn.plots.modes import hertz
-from foldyn.plots.responses import Curve, curves_of, unit_of
 
 MOST_CIRCLES = 6
 _COLUMNS = 3
+_POINTS = {"color": style.BLUE, "marker": ".", "markersize": 5.0, "linestyle": "none"}
+_RESONANT = style.ring(style.BLACK, 6.0)
 
 
 class Circle(NamedTuple):
@@ -99,25 +100,24 @@ def plot_nyquist(
     circles = circles_of(f, Y, fitted[:MOST_CIRCLES], rate)
     figure, frames = _frames(max(len(circles), 1), curve, title)
     if not circles:
-        frames[0].plot(Y.real, Y.imag, **_points() | {"linestyle": "solid", "linewidth": 0.8})
+        frames[0].plot(Y.real, Y.imag, **_POINTS | {"linestyle": "solid", "linewidth": 0.8})
         frames[0].set_title("no circle fits", fontsize=style.LABEL, y=1.0, pad=4.0)
     for frame, circle in zip(frames, circles, strict=bool(circles)):
         _draw(frame, Y, circle)
         mode = circle.peak
-        told = f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"
-        frame.set_title(told, fontsize=style.LABEL, y=1.0, pad=4.0, color=style.BLACK)
+        heading = f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"
+        frame.set_title(heading, fontsize=style.LABEL, y=1.0, pad=4.0, color=style.BLACK)
     for frame in frames:
         frame.set_aspect("equal", adjustable="datalim")
         frame.ticklabel_format(axis="both", scilimits=(-3, 4), useMathText=True)
         for offset in (frame.xaxis.get_offset_text(), frame.yaxis.get_offset_text()):
             offset.set(fontsize=style.TICK, color=style.BLACK)
         frame.locator_params(nbins=5)
-    keys = [Line2D([], [], **_points(), label="response")]
+    keys = [style.key("response", **_POINTS)]
     if circles:
-        keys.append(Line2D([], [], color=style.VERMILLION, linewidth=1.2, label="fitted circle"))
-        keys.append(Line2D([], [], **_resonant(), label="natural frequency"))
-    style.legend_below(figure, keys)
-    return style.finish(figure)
+        keys.append(style.key("fitted circle", color=style.VERMILLION, linewidth=1.2))
+        keys.append(style.key("natural frequency", **_RESONANT))
+    return style.finish(figure, keys)
 
 
 def circles_of(
@@ -185,20 +185,6 @@ def _draw(frame: Axes, Y: NDArray, circle: Circle) -> None:
     frame.plot(outline.real, outline.imag, color=style.VERMILLION, linewidth=1.2, zorder=2.0,
                label="fitted circle")  # fmt: skip
     near = Y[circle.band]
-    frame.plot(np.real(near), np.imag(near), **_points(), zorder=3.0, label="response")
+    frame.plot(np.real(near), np.imag(near), **_POINTS, zorder=3.0, label="response")
     top = circle(np.array([circle.natural]))
-    frame.plot(top.real, top.imag, **_resonant(), zorder=4.0, label="natural frequency")
-
-
-def _points() -> dict:
-    return {"color": style.BLUE, "marker": ".", "markersize": 5.0, "linestyle": "none"}
-
-
-def _resonant() -> dict:
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 6.0,
-        "markerfacecolor": "white",
-        "markeredgecolor": style.BLACK,
-    }
+    frame.plot(top.real, top.imag, **_RESONANT, zorder=4.0, label="natural frequency")

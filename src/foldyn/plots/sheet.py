@@ -26,9 +26,9 @@ def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
 
 def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
     """Legend entries of the sheet at rest, and of the factor on displacements if it is not 1."""
-    keys = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label=state)]
+    keys = [style.key(state, color=style.LIGHT, linewidth=1.2)]
     if scale != 1.0:
-        keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+        keys.append(style.key(f"displacement times {scale:g}", linestyle="none"))
     return keys
 
 
@@ -66,8 +66,8 @@ def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[Ed
 def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> list[Line2D]:
     """Return legend entries of a sheet's edges."""
     return [
-        Line2D([], [], color=k.color, linewidth=k.width, linestyle=k.dashes, label=k.name)
-        for k in edge_kinds(sheet, elements, actuated)
+        style.key(kind.name, color=kind.color, linewidth=kind.width, linestyle=kind.dashes)
+        for kind in edge_kinds(sheet, elements, actuated)
     ]
 
 

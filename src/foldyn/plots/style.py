@@ -7,13 +7,16 @@ fonts, colors and widths are set one by one, so the caller's usual settings do n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from numpy.typing import NDArray
 
 # Okabe and Ito's palette: told apart with every common kind of color blindness.
 BLUE = "#0072B2"
@@ -90,6 +93,37 @@ def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> No
         spine.set_linewidth(0.8)
 
 
+def rows(
+    size: tuple[float, float],
+    title: str,
+    xlabel: str,
+    ylabels: Sequence[str],
+    titles: Sequence[str] = (),
+    heights: Sequence[float] | None = None,
+) -> tuple[Figure, NDArray]:
+    """Return a figure of axes in rows that share the horizontal axis, named below the last one.
+
+    Parameters
+    ----------
+    size : tuple of float
+        Width and height of the figure (inches).
+    title, xlabel : str
+    ylabels : sequence of str
+        One for each row.
+    titles : sequence of str, optional
+        Titles of the rows.
+    heights : sequence of float, optional
+        Heights of the rows relative to each other.
+    """
+    figure = new_figure(*size, title)
+    grid = {"height_ratios": heights}
+    axes = figure.subplots(len(ylabels), 1, squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
+    for k, row in enumerate(axes):
+        frame(row, xlabel if row is axes[-1] else "", ylabels[k], titles[k] if titles else "")
+    figure.align_ylabels(list(axes))
+    return figure, axes
+
+
 def line_style(index: int) -> dict:
     """Return color, dashes and width of the curve number `index`."""
     return {
@@ -97,6 +131,22 @@ def line_style(index: int) -> dict:
         "linestyle": DASHES[(index + index // len(CYCLE)) % len(DASHES)],
         "linewidth": 1.1,
     }
+
+
+def ring(color: str, size: float = 4.5) -> dict[str, Any]:
+    """Return the look of a white dot with an outline of a color."""
+    return {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": size,
+        "markerfacecolor": "white",
+        "markeredgecolor": color,
+    }
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Return a legend entry."""
+    return Line2D([], [], label=label, **look)
 
 
 def exponents(axes: Axes, ticks: int = 6) -> None:
@@ -152,8 +202,12 @@ def legend_below(
     )
 
 
-def finish(figure: Figure) -> Figure:
-    """Set family and weight of every text in the figure, and return it."""
+def finish(
+    figure: Figure, handles: Sequence = (), columns: int = 3, width: float | None = None
+) -> Figure:
+    """Add the legend, if it has entries, as `legend_below`; set all fonts; return the figure."""
+    if handles:
+        legend_below(figure, handles, columns, width)
     for text in figure.findobj(Text):
         text.set(fontfamily=FAMILY, fontweight="normal")
     for axes in figure.axes:

@@ -1,8 +1,8 @@
-"""What the pages of motions and paths share: figures in a folder, the part on the structure."""
+"""What the pages of analyses share: figures in a folder, the structure, tables of computations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from foldyn import plots
 from foldyn.cases import Case
-from foldyn.report.sections import Heading, Picture, Section, Text
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
 
@@ -85,3 +85,29 @@ def visible_scale(case: Case, result: xarray.Dataset) -> float:
 def enlarged(scale: float) -> str:
     """What a caption says of an enlargement."""
     return "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
+
+
+def listed(noun: str, numbers: Iterable[Any]) -> str:
+    """Write numbers with their noun: "node 1", "nodes 1, 2"."""
+    words = [str(number) for number in numbers]
+    return f"{noun}{'' if len(words) == 1 else 's'} {', '.join(words)}"
+
+
+def rules(results: Mapping[str, Any]) -> str:
+    """What a caption says of the mass rules of results that a figure shows."""
+    return "all mass rules" if len(results) > 1 else f"mass rule {next(iter(results))}"
+
+
+def computations(
+    results: Mapping[str, xarray.Dataset],
+    columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
+    caption: str,
+) -> Table:
+    """Table of a row for each mass rule, a column's cells being an attribute or a function."""
+    rows = []
+    for rule, result in results.items():
+        cells = (
+            result.attrs.get(of) if isinstance(of, str) else of(result) for of in columns.values()
+        )
+        rows.append([rule, *cells])
+    return Table(["mass rule", *columns], rows, caption, digits=3)
