@@ -362,7 +362,7 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
         (lambda case, path: draw_shapes(case, path, []), "points: empty"),
         (lambda case, path: draw_shapes(case, path, 0), "points: 0; give at least one"),
         (lambda case, path: draw_shapes(case, path.isel(node=slice(9))), "9 nodes, the structure"),
-        (lambda case, path: plot_path_energies(path.drop_vars("point")), "path: is no path"),
+        (lambda case, path: plot_path_energies(path.drop_vars("point")), "path: is not a path"),
         (lambda case, path: energy_shares(path.where(path.step < 3)), "NaN"),
     ],
 )
@@ -372,5 +372,5 @@ def test_bad_input(case, path, call, words):
 
 
 def test_motions_are_no_paths(case, trajectory):
-    with pytest.raises(InputError, match="is no path"):
+    with pytest.raises(InputError, match="is not a path"):
         plot_load_displacement({"a": trajectory}, [7])

@@ -28,8 +28,8 @@ from foldyn.values import choice
 
 Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
-"""Computes a result, with or without a bar; calls what it is given, once or more often, when
-nothing is left to be refused."""
+"""Computes a result, with or without a bar; calls its second argument, once or more often, after
+all input has been accepted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Output:
     nodes : ndarray of int64
         Nodes that figures and spectra show.
     named : bool
-        Whether the file names these nodes, or they are those of the default.
+        Whether the file names these nodes; otherwise they are the default.
     axis : str or None
         Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
         one in which a node moves most.
@@ -102,7 +102,7 @@ class Analysis(ABC):
 
     @abstractmethod
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """Check a computation with one mass rule as far as that is possible before it starts.
+        """Check a computation with one mass rule, as far as possible before it starts.
 
         changes : arguments that take the place of the file's.
         """
@@ -126,10 +126,10 @@ class Analysis(ABC):
         return write_report(folder / "report.html", case_file.heading, sections)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
-        """Refuse what the computations of all mass rules cannot do together."""
+        """Refuse computations of several mass rules that cannot run together."""
 
     def compiles(self, computations: Sequence[Compute]) -> bool:
-        """Whether kernels have to be compiled first and no bar says so."""
+        """Whether kernels have to be compiled first without a bar that says so."""
         return False
 
     def shown(self, case: Case) -> NDArray[np.int64]:
@@ -291,7 +291,7 @@ class CaseFile:
 
 
 class Computation:
-    """One result of a case file, checked as far as that is possible before it is computed.
+    """One result of a case file, checked as far as possible before it is computed.
 
     Attributes
     ----------
@@ -313,6 +313,6 @@ class Computation:
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """Compute it; `begun` is called when nothing is left to be refused."""
+        """Compute it; `begun` is called once all input has been accepted."""
         with self.case_file.placing(self.mass):
             return self.compute(progress, begun)

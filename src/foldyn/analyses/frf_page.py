@@ -14,13 +14,13 @@ from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import METHODS
 from foldyn.linear.quantity import PER_FORCE, quantity_of
-from foldyn.report.album import Album, computations, listed, rules, shown_nodes
+from foldyn.report.album import Album, by_mass_rule, listed, rules, shown_nodes
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 
 MOST_CURVES = 8
 """Responses that one figure shows at most, each in its color."""
 MOST_REASONS = 6
-"""Peaks of which the page says why a number is missing, at most."""
+"""Peaks for which the page explains missing numbers, at most."""
 
 
 def frf_sections(
@@ -109,7 +109,7 @@ def _peaks(
     return Table(
         header,
         rows,
-        f"Peaks of the {quantity} along {axis} and the damping ratios that they tell: from the "
+        f"Peaks of the {quantity} along {axis} and the damping ratios they give: from the "
         "half-power points (3 dB: exact for a single mode; textbook: (f2 - f1) / 2f), and from "
         "fitted circles, with the natural frequency f0 and how far points lie off the circle",
         digits=4,
@@ -137,13 +137,13 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
     columns = {"method": "method", "state": "state"}
     columns |= {title: key for key, title in keys.items() if key in a}
     columns["time (s)"] = "wall_seconds"
-    return computations(results, columns, f"{case_file.path.name}: the computation")
+    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
 def _notes(
     response: xarray.Dataset, case: Case, peaks: Mapping[tuple[str, int], tuple[Peak, ...]]
 ) -> str:
-    """What a reader has to know about the numbers."""
+    """Notes on the numbers."""
     notes = [
         f"Computed with Foldyn {response.attrs['foldyn_version']}. Damping: alpha "
         f"{case.damping.alpha:g} 1/s, beta {case.damping.beta:g} s. The result carries its own "
@@ -183,7 +183,7 @@ def _notes(
 
 
 def _reason(note: str) -> str:
-    """What a note says, without what it would have a programmer do."""
+    """A note without its advice to programmers."""
     parts = [part for part in note.split("; ") if part.startswith(("half power", "circle fit"))]
     return "; ".join(parts or [note]).replace("magnitude: ", "")
 

@@ -16,7 +16,7 @@ from foldyn.analyses.sections import AXES, Animation, Count, Nodes, Section, one
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
-from foldyn.report.album import Album, computations, listed
+from foldyn.report.album import Album, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 
@@ -241,11 +241,11 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
         "solver": "solver",
         "time (s)": "wall_seconds",
     }
-    return computations(results, columns, f"{case_file.path.name}: the computation")
+    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
 def _notes(modes: xarray.Dataset, case: Case) -> str:
-    """What a reader has to know about the numbers."""
+    """Notes on the numbers."""
     notes = [
         f"Computed with Foldyn {modes.attrs['foldyn_version']}. Modes are small vibrations about "
         f"{_about(modes)}, shapes of the modal mass 1. The result carries its own case."

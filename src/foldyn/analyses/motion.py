@@ -18,7 +18,7 @@ from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, compiled, prepare
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import InputError
-from foldyn.report.album import Album, computations, enlarged, rules, shown_nodes, visible_scale
+from foldyn.report.album import Album, by_mass_rule, enlarged, rules, shown_nodes, visible_scale
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
@@ -219,7 +219,7 @@ def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: li
     }
     moved = ", ".join(map(str, nodes))
     caption = f"{case_file.path.name}: the runs; displacement of nodes {moved}"
-    return computations(results, columns, caption)
+    return by_mass_rule(results, columns, caption)
 
 
 def _speed(attributes: Mapping[str, Any]) -> float:

@@ -91,9 +91,7 @@ class Reached(Section):
     @model_validator(mode="after")
     def _moves(self) -> Self:
         if self.displacement == 0.0:
-            raise InputError(
-                " = 0: the path begins there; give where it shall end", ".displacement"
-            )
+            raise InputError(" = 0: the path begins there; say where it ends", ".displacement")
         return self
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
@@ -177,14 +175,14 @@ class PathAnalysis(Analysis):
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             points = _bar(progress)
-            found = 0
+            count = 0
 
             def tell(point: Point) -> None:
-                nonlocal found
-                if not found:
+                nonlocal count
+                if not count:
                     points.clear()
                     begun()
-                found += 1
+                count += 1
                 points.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
                 points.update()
 
@@ -218,7 +216,7 @@ class PathAnalysis(Analysis):
 
 
 def _bar(shown: bool) -> Any:
-    """Bar of points: how many there will be is not known."""
+    """Bar of points, whose number is not known."""
     made = bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
     made.set_postfix_str("first use compiles kernels, up to half a minute")
     return made

@@ -11,7 +11,7 @@ from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
 from foldyn.report.album import Album, enlarged, listed, shown_nodes, visible_scale
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
@@ -104,29 +104,28 @@ def _points(
     rows = sorted({*special, *drawn, *evenly(path, MOST_ROWS)})
     shares = plots.energy_shares(path)
     total = sum(path[f"strain_{name}"].values for name in shares)
-    header = ["point", "load factor"]
-    columns: list[np.ndarray] = [path["load_factor"].values]
+    columns = {"load factor": path["load_factor"].values}
     if moved is not None:
-        header += [f"moved along {moved[1]} (m)", "force (N)"]
-        columns += [along(path, *moved), plots.total_reaction(path, *moved)]
-    shown = [node for node in nodes if moved is None or node not in moved[0]]
-    header += [f"node {node} along {direction} (m)" for node in shown]
-    columns += [along(path, [node], direction) for node in shown]
-    header += ["strain energy (J)", *(f"{name} (%)" for name in shares)]
-    columns += [np.asarray(total), *(100.0 * share for share in shares.values())]
-    header += ["iterations", "stability", "kind"]
+        columns[f"moved along {moved[1]} (m)"] = along(path, *moved)
+        columns["force (N)"] = plots.total_reaction(path, *moved)
+    for node in nodes:
+        if moved is None or node not in moved[0]:
+            columns[f"node {node} along {direction} (m)"] = along(path, [node], direction)
+    columns["strain energy (J)"] = np.asarray(total)
+    columns |= {f"{name} (%)": 100.0 * share for name, share in shares.items()}
     negative = path["negative_eigenvalues"].values
     judged = ["" if n < 0 else "stable" if n == 0 else "unstable" for n in negative.tolist()]
     table = [
         [
             k,
-            *(None if np.isnan(column[k]) else float(column[k]) for column in columns),
+            *(cell(column[k]) for column in columns.values()),
             int(path["iterations"][k]),
             judged[k],
             CRITICAL.get(str(path["point"].values[k]), ""),
         ]
         for k in rows
     ]
+    header = ["point", *columns, "iterations", "stability", "kind"]
     return Table(header, table, "Points of the path, with all limit points and bifurcations")
 
 

@@ -156,15 +156,15 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
             else resolve_nodes(case.structure, chosen, "output.nodes")
         )
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
-    found = CaseFile(
+    case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make, cases,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:
         for mass in masses:
-            found.start(mass)  # a support may hold what the rigid motion moves
-    return found
+            case_file.start(mass)  # a support may hold what the rigid motion moves
+    return case_file
 
 
 def read_document(path: Path) -> dict[str, Any]:

@@ -48,12 +48,12 @@ class Section(BaseModel):
 
 
 def one_of(known: Iterable[str]) -> PlainValidator:
-    """Take one of some words."""
+    """Accept one of the known words."""
     return PlainValidator(lambda value: choice("", value, known))
 
 
 def some_shapes(drawn: str, what: str, least: int = -MOST) -> PlainValidator:
-    """Take how many shapes are drawn, or the numbers of those that are.
+    """Accept how many shapes are drawn, or their numbers.
 
     drawn : their name in messages, "modes"
     what : what the numbers count, "mode"
@@ -121,9 +121,7 @@ def _inline(value: Mapping[str, Any]) -> None:
     if not isinstance(faces, list) or not faces:
         raise InputError(f".faces = {show(faces)}: must be a list of panels, as in [[0, 1, 2]]")
     for i, face in enumerate(faces):
-        if not isinstance(face, list) or any(
-            isinstance(v, bool) or not isinstance(v, int) for v in face
-        ):
+        if not isinstance(face, list) or any(type(vertex) is not int for vertex in face):
             raise InputError(f".faces[{i}] = {show(face)}: must be a list of vertex numbers")
     letters = value.get("assignments", [])
     if not isinstance(letters, list) or any(not isinstance(letter, str) for letter in letters):
@@ -164,7 +162,7 @@ def check_mass(place: str, name: Any, info: ValidationInfo) -> str:
 
 
 def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
-    """Take the table of a load or support; some keys may be refused, each for a reason."""
+    """Accept the table of a load or support; some keys may be refused, each for a reason."""
 
     def read_part(value: Any, info: ValidationInfo) -> Any:
         for key in why:

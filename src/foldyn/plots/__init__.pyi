@@ -13,12 +13,13 @@ from foldyn.plots.loads import plot_load_history as plot_load_history
 from foldyn.plots.modes import draw_modes as draw_modes, plot_mac as plot_mac
 from foldyn.plots.nyquist import plot_nyquist as plot_nyquist
 from foldyn.plots.path import (
+    chosen_points as chosen_points,
+    draw_shapes as draw_shapes,
     moved_supports as moved_supports,
     plot_load_displacement as plot_load_displacement,
     plot_reaction as plot_reaction,
     total_reaction as total_reaction,
 )
-from foldyn.plots.shapes import chosen_points as chosen_points, draw_shapes as draw_shapes
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.tracks import (
     draw_overlay as draw_overlay,

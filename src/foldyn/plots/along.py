@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.values import choice
 
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, "-x", "-y", "-z")
@@ -51,8 +52,7 @@ def directions(axes: str | Sequence[str] | None, count: int, moved: Iterable[NDA
         return [AXES[k] for k in largest.argmax(axis=1)]
     chosen = [axes] if isinstance(axes, str) else list(axes)
     for direction in chosen:
-        if direction not in AXES:
-            raise InputError(f'axes: {direction!r} is no direction; use "x", "y" or "z"')
+        choice("axes", direction, AXES)
     if len(chosen) == 1:
         return chosen * count
     if len(chosen) != count:
@@ -66,7 +66,7 @@ def check_path(path: xr.Dataset, name: str) -> None:
     """Refuse what is not a path, or one with NaN."""
     missing = [key for key in ("displacement", "load_factor", "point") if key not in path]
     if missing or "step" not in path.sizes:
-        raise InputError(f"{name}: is no path (it has no {missing or ['step']}); give one of trace")
+        raise InputError(f"{name}: is not a path of fd.trace; it has no {missing or ['step']}")
     if not np.isfinite(path["displacement"].values).all():
         raise InputError(f"{name}: its displacement contains NaN or infinity")
 
@@ -125,8 +125,7 @@ def stretches(path: xr.Dataset) -> list[Stretch]:
 
 def signed(direction: str) -> tuple[int, float]:
     """Axis number and sign of a direction: "-z" is (2, -1)."""
-    if direction not in DIRECTIONS:
-        raise InputError(f"direction: {direction!r}; use one of {', '.join(DIRECTIONS)}")
+    choice("direction", direction, DIRECTIONS)
     return AXES.index(direction[-1]), -1.0 if direction.startswith("-") else 1.0
 
 

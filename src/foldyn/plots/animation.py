@@ -18,8 +18,7 @@ from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, displacements, stretches, way
 from foldyn.plots.modes import ShownModes
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.shapes import side_by_side
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
@@ -41,9 +40,9 @@ def animate(
     """Write a GIF or an MP4 of the moving sheet, the sheet at rest behind it in gray.
 
     The frame stands still and holds the whole motion, at equal scale along all axes; where a free
-    body travels, a line shows the path of its center of mass. Every picture of a motion tells the
-    simulated time and how much slower or faster than in reality it passes, every picture of an
-    equilibrium path its load factor and whether it is unstable there.
+    body travels, a line shows the path of its center of mass. Pictures of a motion show the
+    simulated time and how much slower or faster than reality it runs; those of an equilibrium
+    path show its load factor and whether it is unstable there.
 
     Parameters
     ----------
@@ -87,18 +86,17 @@ def animate(
 
     sight = View(*view)
     extent = np.vstack([sheet.nodes, moving.reshape(-1, 3)])
-    keys = edge_keys(sheet, actuated=sheet.glows)
+    keys = edge_keys(sheet, actuated=sheet.highlights)
     traveled = _center_path(sheet, moving)
     if traveled is not None:
         keys.append(style.key("center of mass", **_PATH, marker="o", markersize=4.0))
     legend_rows = -(-len(keys) // 3)
     figure, axes = scene.view_figure(extent, sight, title or " ", legend_rows, _WIDTH)
     add_undeformed(axes, sheet)
-    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.glows)
+    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.highlights)
     dots = [] if traveled is None else [(_draw_path(axes, traveled), traveled)]
     top = 1.0 - (0.34 if title else 0.12) / figure.get_figheight()
-    look = {"fontsize": style.LABEL, "color": style.BLACK, "va": "top"}
-    clock = figure.text(0.02, top, "", **look)
+    clock = figure.text(0.02, top, "", va="top", **style.TEXT)
     style.finish(figure, keys)
     note = f", displacement times {scale:g}" if scale != 1.0 else ""
     with filmed(figure, path, fps) as writer:
@@ -114,13 +112,13 @@ def animate(
 
 
 def _times(times: NDArray[np.float64], rate: float) -> list[str]:
-    """Return what pictures of a motion tell: the time, and how fast it passes."""
+    """Texts for pictures of a motion: the time, and how fast it runs."""
     digits, shown = _digits(times), pace(rate * float(times[1] - times[0]))
     return [f"t = {time:.{digits}f} s, {shown}" for time in times]
 
 
 def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
-    """Return what pictures of a path tell: the load factor, and whether it is unstable there."""
+    """Texts for pictures of a path: the load factor, and whether it is unstable there."""
     length = way(path)
     factors = np.interp(places, length, path["load_factor"].values)
     unstable = [(length[a], length[b]) for a, b, stable in stretches(path) if not stable]
@@ -133,13 +131,13 @@ def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
 
 
 def _digits(values: NDArray[np.float64]) -> int:
-    """As many digits as tell two pictures apart: equal pictures would be stored as one."""
+    """Digits with which texts differ from each other: equal pictures would be stored as one."""
     step = float(np.ptp(values)) / (len(values) - 1)
     return max(0, int(np.ceil(-np.log10(step)))) if step > 0.0 else 3
 
 
 def pace(seconds: float) -> str:
-    """Say how fast an animation plays that shows so many seconds of the motion in a second."""
+    """Say how fast an animation plays that shows this many seconds of motion in a second."""
     times = float(f"{max(seconds, 1.0 / seconds):.2g}")
     if times == 1.0:
         return "shown at real speed"
@@ -178,9 +176,9 @@ def frame_displacements(
     motion = displacements(result, dimension)
     sheet.check_nodes("result: it has", motion)
     if len(motion) < 2:
-        raise InputError("result: a single sample does not move; store more of them")
+        raise InputError("result: a single sample has no motion; store more of them")
     if not np.isfinite(motion).all():
-        raise InputError("result: its displacement contains NaN or infinity; cut it before")
+        raise InputError("result: its displacement contains NaN or infinity; cut that off")
     stored = result["time"].values.astype(np.float64) if dimension == "time" else way(result)
     places = np.linspace(stored[0], stored[-1], frames)
     after = np.clip(np.searchsorted(stored, places), 1, len(stored) - 1)

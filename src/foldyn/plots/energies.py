@@ -92,7 +92,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
     if largest > 0.0:
         note += f", {worst / largest:.2g} of the energy at play"
-    lower.set_title(note, fontsize=style.NOTE, color=style.BLACK, loc="right", y=1.0, pad=4.0)
+    lower.set_title(note, **style.FINE, loc="right", y=1.0, pad=4.0)
     upper.margins(x=0.0)
     style.exponents(upper)
     style.exponents(lower, ticks=4)

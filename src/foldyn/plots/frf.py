@@ -20,9 +20,10 @@ from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.modes import hertz
 from foldyn.results.quantities import RESPONSES
 from foldyn.signals import find_peaks
+from foldyn.values import number
 
 PROMINENCE = 0.05
-"""Least prominence of a peak that is marked, as a part of the curve's maximum."""
+"""Least prominence of a peak that is marked, as a fraction of the curve's maximum."""
 _APART = 0.07  # of the frequency axis: peaks nearer than that share one label
 _FEW = 60  # frequencies that are drawn as dots, too
 _DECADES = 5.0  # below the highest value that the magnitude shows at least
@@ -51,7 +52,7 @@ def plot_frf(
         What is drawn of a response to forces; by default the receptance. A response to a moving
         base is drawn as transmissibility.
     prominence : float
-        Least prominence of the peaks that are marked, as a part of the curve's maximum.
+        Least prominence of the peaks that are marked, as a fraction of the curve's maximum.
     title : str
         Title of the figure.
 
@@ -67,8 +68,7 @@ def plot_frf(
         No response or node, a node, direction or quantity that a response does not have.
     """
     curves, shown = curves_of(responses, nodes, axes, quantity)
-    if not 0.0 <= prominence < 1.0:
-        raise InputError(f"prominence: {prominence!r}; give a part of the maximum, 0 to below 1")
+    number("prominence", prominence, least=0.0, below=1.0)
     coherent = any(curve.coherence is not None for curve in curves)
     heights = [2.6, 1.3, 1.0][: 3 if coherent else 2]
     along = {curve.axis for curve in curves}
@@ -216,7 +216,6 @@ def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:
             xytext=(0.0, 5.0),
             textcoords="offset points",
             ha="left" if part < 0.04 else "right" if part > 0.96 else "center",
-            fontsize=style.NOTE,
-            color=style.BLACK,
             zorder=5.0,
+            **style.FINE,
         )

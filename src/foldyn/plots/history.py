@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -12,6 +11,7 @@ from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
+from foldyn.values import number
 
 
 def plot_history(
@@ -63,13 +63,11 @@ def plot_history(
         for label, one in trajectories.items()
     }
     chosen = directions(axes, len(numbers), moved.values())
-    intervals = {
-        label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
-    }
+    times = {label: dataset["time"].values for label, dataset in trajectories.items()}
+    intervals = {label: sampling_interval(time) for label, time in times.items()}
     if max_frequency is None:
         max_frequency = 0.5 / max(intervals.values())
-    elif not (np.isfinite(max_frequency) and max_frequency > 0.0):
-        raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
+    number("max_frequency", max_frequency, above=0.0, unit="Hz")
 
     rows = len(numbers)
     figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
@@ -84,8 +82,7 @@ def plot_history(
         )
         style.frame(left, time_label, f"{direction} displacement (m)", f"node {node}")
         style.frame(right, frequency_label, "amplitude (m)", f"node {node}")
-        for index, (label, dataset) in enumerate(trajectories.items()):
-            time = dataset["time"].values
+        for index, (label, time) in enumerate(times.items()):
             motion = moved[label][:, row, AXES.index(direction)]
             frequencies, amplitude = spectrum(
                 motion, intervals[label], window=window, detrend=detrend

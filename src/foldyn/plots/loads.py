@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.actuation import resolve_creases
-from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.values import number
 
 _SAMPLES = 2001
 _LISTED = 3
@@ -63,8 +63,7 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     InputError
         Where the duration is not positive.
     """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise InputError(f"duration: {duration!r}; give a positive number of seconds")
+    number("duration", duration, above=0.0, unit="s")
     forces = [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
     gravity = [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
     panels = [
@@ -93,8 +92,8 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
         style.exponents(axes)
     rows[-1].set_xlim(time[0], time[-1])
     if not handles:
-        look = {"ha": "center", "fontsize": style.LABEL, "color": style.BLACK}
-        rows[0].text(0.5, 0.6, "no loads", transform=rows[0].transAxes, **look)
+        place = {"transform": rows[0].transAxes, "ha": "center"}
+        rows[0].text(0.5, 0.6, "no loads", **place, **style.TEXT)
     return style.finish(figure, handles, columns=1)
 
 

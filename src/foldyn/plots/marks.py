@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d import Axes3D
@@ -172,7 +170,5 @@ def along_lines(segments: NDArray[np.float64], samples: int = 9) -> NDArray[np.f
 
 def outline(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return points along the outlines of triangles (k, 3, 3)."""
-    sides: Sequence[tuple[int, int]] = ((0, 1), (1, 2), (2, 0))
-    return np.concatenate(
-        [along_lines(triangles[:, list(side)], 4) for side in sides] or [np.zeros((0, 3))]
-    )
+    sides = [0, 1], [1, 2], [2, 0]
+    return np.concatenate([along_lines(triangles[:, side], 4) for side in sides])

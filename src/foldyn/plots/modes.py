@@ -17,9 +17,9 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.shapes import side_by_side
-from foldyn.plots.sheet import rest_keys
+from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
+from foldyn.values import length
 
 MOST_MODES = 12
 """Modes that one figure shows at most."""
@@ -112,8 +112,8 @@ class ShownModes:
         """Choose modes and scale them."""
         sheet = Sheet3D.of(case_or_structure)
         numbers = chosen_modes(modes, which)
-        if amplitude is not None and not (np.isfinite(amplitude) and amplitude > 0.0):
-            raise InputError(f"amplitude: {amplitude!r}; give a positive length in m")
+        if amplitude is not None:
+            length("amplitude", amplitude)
         moved = modes["displacement"].transpose("node", "axis").values
         sheet.check_nodes("modes: they have", moved)
         state = "undeformed" if not moved.any() else "equilibrium"
@@ -129,7 +129,7 @@ def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
     """Numbers of the modes to show: those asked for, else the first that are not rigid."""
     missing = [key for key in _NEEDED if key not in modes]
     if missing:
-        raise InputError(f"modes: are no modes (they have no {missing[0]}); give those of fd.modes")
+        raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
     stored = modes["mode"].values.tolist()
     if which is None:
         rigid = modes["rigid"].values.astype(bool)
@@ -160,14 +160,9 @@ def mode_names(
     if not hasattr(names, "data_vars"):
         return cast("Mapping[int, str]", names)
     words = cast("xr.Dataset", names)
-    told = zip(
-        modes["mode"].values.tolist(),
-        words["name"].values.tolist(),
-        words["share"].max("kind").values.tolist(),
-        modes["rigid"].values.tolist(),
-        strict=True,
-    )
-    return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in told if not rigid}
+    columns = modes["mode"], words["name"], words["share"].max("kind"), modes["rigid"]
+    rows = zip(*(column.values.tolist() for column in columns), strict=True)
+    return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in rows if not rigid}
 
 
 def main_axis(sheet: Sheet3D) -> str:
@@ -186,17 +181,17 @@ def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:
     mode = modes.sel(mode=number)
     eigenvalue = float(mode["eigenvalue"])
     if bool(mode["rigid"]):
-        said = "rigid motion"
+        text = "rigid motion"
     elif eigenvalue < 0.0:
-        said = f"unstable, grows e-fold in {1.0 / np.sqrt(-eigenvalue):.3g} s"
+        text = f"unstable, grows e-fold in {1.0 / np.sqrt(-eigenvalue):.3g} s"
     elif eigenvalue == 0.0:
-        said = "0 Hz, nothing resists it"
+        text = "0 Hz, nothing resists it"
     else:
-        said = f"{hertz(float(mode['frequency']))} Hz"
+        text = f"{hertz(float(mode['frequency']))} Hz"
         ratio = float(mode["damping_ratio"]) if "damping_ratio" in mode else 0.0
         if np.isfinite(ratio) and ratio > 0.0:
-            said += f", damping {100.0 * ratio:.3g} %"
-    return f"mode {number}: {said}" + (f"\n{name}" if name else "")
+            text += f", damping {100.0 * ratio:.3g} %"
+    return f"mode {number}: {text}" + (f"\n{name}" if name else "")
 
 
 def hertz(frequency: float) -> str:
@@ -280,17 +275,11 @@ def plot_mac(
     axes.tick_params(length=0.0)
     if max(down, across) <= _MOST_NUMBERS:
         for (row, column), value in np.ndenumerate(values):
-            axes.text(
-                column,
-                row,
-                f"{value:.2f}" if value >= 0.005 else "0",
-                ha="center",
-                va="center",
-                fontsize=style.NOTE,
-                color="white" if value > 0.5 else style.BLACK,
-            )
+            text = f"{value:.2f}" if value >= 0.005 else "0"
+            ink = "white" if value > 0.5 else style.BLACK
+            axes.text(column, row, text, ha="center", va="center", fontsize=style.NOTE, color=ink)
     bar = figure.colorbar(image, ax=axes, fraction=0.08, shrink=0.9)
-    bar.set_label("MAC", fontsize=style.LABEL, color=style.BLACK)
+    bar.set_label("MAC", **style.TEXT)
     bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     return style.finish(figure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -101,13 +101,9 @@ def plot_nyquist(
     figure, frames = _frames(max(len(circles), 1), curve, title)
     if not circles:
         frames[0].plot(Y.real, Y.imag, **_POINTS | {"linestyle": "solid", "linewidth": 0.8})
-        frames[0].set_title("no circle fits", fontsize=style.LABEL, y=1.0, pad=4.0)
-    for frame, circle in zip(frames, circles, strict=bool(circles)):
-        _draw(frame, Y, circle)
-        mode = circle.peak
-        heading = f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"
-        frame.set_title(heading, fontsize=style.LABEL, y=1.0, pad=4.0, color=style.BLACK)
-    for frame in frames:
+    for frame, circle in zip_longest(frames, circles):
+        heading = "no circle fits" if circle is None else _draw(frame, Y, circle)
+        frame.set_title(heading, **style.TEXT, y=1.0, pad=4.0)
         frame.set_aspect("equal", adjustable="datalim")
         frame.ticklabel_format(axis="both", scilimits=(-3, 4), useMathText=True)
         for offset in (frame.xaxis.get_offset_text(), frame.yaxis.get_offset_text()):
@@ -180,7 +176,8 @@ def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     return figure, frames[:count]
 
 
-def _draw(frame: Axes, Y: NDArray, circle: Circle) -> None:
+def _draw(frame: Axes, Y: NDArray, circle: Circle) -> str:
+    """Draw a circle and the points near it, and return its title."""
     outline = circle.outline()
     frame.plot(outline.real, outline.imag, color=style.VERMILLION, linewidth=1.2, zorder=2.0,
                label="fitted circle")  # fmt: skip
@@ -188,3 +185,5 @@ def _draw(frame: Axes, Y: NDArray, circle: Circle) -> None:
     frame.plot(np.real(near), np.imag(near), **_POINTS, zorder=3.0, label="response")
     top = circle(np.array([circle.natural]))
     frame.plot(top.real, top.imag, **_RESONANT, zorder=4.0, label="natural frequency")
+    mode = circle.peak
+    return f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"

@@ -1,4 +1,4 @@
-"""Load against displacement along paths, with their stability."""
+"""Paths: load against displacement with its stability, and the deformed shapes along them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,21 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import CRITICAL, along, asked, check_paths, farthest, signed, stretches
+from foldyn.plots.along import (
+    CRITICAL,
+    along,
+    asked,
+    check_path,
+    check_paths,
+    displacements,
+    evenly,
+    farthest,
+    signed,
+    stretches,
+)
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import rest_keys, side_by_side
+from foldyn.structures import Structure
 
 _UNSTABLE = (0, (4, 2))
 _MARKS: Mapping[str, dict[str, Any]] = {
@@ -216,3 +230,78 @@ def moved_supports(case: Case) -> tuple[list[int], str] | None:
     moved = motion[:, signed(direction)[0]]
     together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
     return np.flatnonzero(together).tolist(), direction
+
+
+def draw_shapes(
+    case_or_structure: Case | Structure,
+    path: xr.Dataset,
+    points: int | Sequence[int] = 4,
+    scale: float = 1.0,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw the deformed sheet at points of a path, over the undeformed one in gray.
+
+    All shapes are drawn at the same scale.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What moves.
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+    points : int or sequence of int
+        How many points, spread evenly over the way of the nodes with the first and the last among
+        them; or their numbers, negative ones from the end.
+    scale : float
+        Factor on the displacement in the picture.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One orthographic view for each point; below it the number of the point, its load factor
+        and what kind of point it is.
+
+    Raises
+    ------
+    InputError
+        A path of another structure, or no such point.
+    """
+    check_path(path, "path")
+    sheet = Sheet3D.of(case_or_structure)
+    numbers = chosen_points(path, points)
+    moved = displacements(path)[numbers]
+    sheet.check_nodes("path: it has", moved, "traced")
+    captions = [describe_point(path, number) for number in numbers]
+    notes = rest_keys(scale)
+    return side_by_side(sheet, sheet.nodes + scale * moved, captions, View(*view), notes, title)[0]
+
+
+def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
+    """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
+    count = path.sizes["step"]
+    if isinstance(points, int | np.integer):
+        if points < 1:
+            raise InputError(f"points: {points}; give at least one")
+        return evenly(path, int(points))
+    for number in points:
+        if not -count <= number < count:
+            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
+    if not len(points):
+        raise InputError("points: empty; give at least one")
+    return [int(number) % count for number in points]
+
+
+def describe_point(path: xr.Dataset, number: int) -> str:
+    """Text for a point: its number, load factor, and what is special about it."""
+    point = path.isel(step=number)
+    kind = str(point["point"].values)
+    remark = CRITICAL.get(kind, "")
+    if not remark and int(point["negative_eigenvalues"]) > 0:
+        remark = "unstable"
+    text = f"point {number}: load factor {float(point['load_factor']):.4g}"
+    return f"{text}, {remark}" if remark else text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,22 +55,14 @@ class Sheet3D:
     def of(cls, thing: Any) -> Sheet3D:
         """Take a case, a structure or a pattern apart."""
         case = thing if hasattr(thing, "structure") else None
-        structure = case.structure if case is not None else thing
-        if not hasattr(structure, "pattern"):
-            pattern = structure
-            fans = [
-                (face[0], face[k], face[k + 1])
-                for face in pattern.faces
-                for k in range(1, len(face) - 1)
-            ]
-            return cls(pattern, None, None, pattern.vertices, np.array(fans))
-        return cls(
-            structure.pattern,
-            structure,
-            case,
-            np.asarray(structure.nodes, dtype=np.float64),
-            np.asarray(structure.triangles, dtype=np.int64),
-        )
+        structure = thing if case is None else case.structure
+        if hasattr(structure, "pattern"):
+            pattern, nodes, triangles = structure.pattern, structure.nodes, structure.triangles
+        else:
+            pattern, structure, nodes = structure, None, structure.vertices
+            triangles = [(face[0], *side) for face in pattern.faces for side in pairwise(face[1:])]
+        nodes = np.asarray(nodes, dtype=np.float64)
+        return cls(pattern, structure, case, nodes, np.asarray(triangles, dtype=np.int64))
 
     @cached_property
     def size(self) -> float:
@@ -116,8 +108,8 @@ class Sheet3D:
         return self.edges[self.case.actuated_creases]
 
     @property
-    def glows(self) -> bool:
-        """Whether actuated creases are marked: a glow of all would tell nothing and hide panels."""
+    def highlights(self) -> bool:
+        """Whether to highlight actuated creases: all of them would say nothing and hide panels."""
         return len(self.actuated) < len(self.pattern.creases)
 
     def check_nodes(self, result: str, moved: NDArray[np.float64], done: str = "computed") -> None:
@@ -132,11 +124,7 @@ class Sheet3D:
         """Return the creases (k, p) of each assignment that occurs."""
         creases = self.edges[: len(self._creases)]
         kinds = np.array(self.pattern.assignments, dtype=str)
-        return {
-            kind: creases[kinds == kind]
-            for kind in style.CREASES
-            if np.count_nonzero(kinds == kind)
-        }
+        return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
 
     @property
     def _creases(self) -> NDArray[np.int64]:
@@ -221,10 +209,9 @@ def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: flo
     )
     figure.add_axes(axes)
     axes.view_init(elev=seen.view.elevation, azim=seen.view.azimuth)
+    low, high = seen.middle - 0.5 * seen.box, seen.middle + 0.5 * seen.box
     for axis, name in enumerate("xyz"):
-        reach = 0.5 * seen.box[axis]
-        limits = seen.middle[axis] - reach, seen.middle[axis] + reach
-        getattr(axes, f"set_{name}lim")(*limits, view_margin=0)
+        getattr(axes, f"set_{name}lim")(low[axis], high[axis], view_margin=0)
     # copies: matplotlib scales what it is given
     axes.set_box_aspect(seen.box.copy(), zoom=1.0)
     flat = np.array(proj_transform(*seen.corners.T, axes.get_proj())[:2])
@@ -258,7 +245,7 @@ def _frame(
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
     for name, pad in zip("xyz", _LABEL_PADS, strict=True):
         label = getattr(axes, f"set_{name}label")
-        label(f"{name} (m)", fontsize=style.LABEL, color=style.BLACK, labelpad=pad)
+        label(f"{name} (m)", **style.TEXT, labelpad=pad)
 
 
 def _ticks(

@@ -48,6 +48,9 @@ GRAVITY = BLACK
 DPI = 150
 FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
 TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
+TEXT: dict[str, Any] = {"fontsize": LABEL, "color": BLACK}
+FINE: dict[str, Any] = {"fontsize": NOTE, "color": BLACK}
+"""Look of labels, and of notes inside a frame."""
 
 
 def new_figure(width: float, height: float, title: str = "", constrained: bool = True) -> Figure:
@@ -78,11 +81,11 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
 
 def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> None:
     """Give axes their labels, grid and colors."""
-    axes.set_xlabel(xlabel, fontsize=LABEL, color=BLACK)
-    axes.set_ylabel(ylabel, fontsize=LABEL, color=BLACK)
+    axes.set_xlabel(xlabel, **TEXT)
+    axes.set_ylabel(ylabel, **TEXT)
     if title:
         # A fixed height: left to itself, a title moves above the exponent of the axis.
-        axes.set_title(title, fontsize=LABEL, y=1.0, pad=4.0, color=BLACK)
+        axes.set_title(title, **TEXT, y=1.0, pad=4.0)
     axes.set_facecolor("white")
     axes.grid(True, color="#E4E4E4", linewidth=0.6, linestyle="solid")
     axes.set_axisbelow(True)

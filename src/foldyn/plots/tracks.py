@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import check_nodes_of
+from foldyn.plots.along import AXES, check_nodes_of
+from foldyn.values import choice
 
 _MARGIN = 0.08  # of the model's size, around it in an overlay
 _WIDTH = 8.0  # inches
@@ -54,9 +55,8 @@ def plot_tracks(
     moved = tracks["displacement"]
     if axis is None:
         size = np.nan_to_num(moved.sel(node=nodes).values)
-        axis = "xyz"[int(np.ptp(size.reshape(-1, 3), axis=0).argmax())]
-    if axis not in ("x", "y", "z"):
-        raise InputError(f'axis: {axis!r} is no direction; use "x", "y" or "z"')
+        axis = AXES[int(np.ptp(size.reshape(-1, 3), axis=0).argmax())]
+    choice("axis", axis, AXES)
     along = _dimension(tracks)
     shown = "load" if along == "photo" and "load" in tracks.coords else along
     across = tracks[shown].values

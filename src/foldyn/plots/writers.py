@@ -18,6 +18,8 @@ from PIL import Image
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import ANIMATIONS
+from foldyn.values import number
+from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
 DPI = {".gif": 100, ".mp4": 200}
@@ -28,7 +30,7 @@ _SAMPLES = 8  # pictures from which these colors are taken
 
 
 class GifWriter(PillowWriter):
-    """A GIF that plays for ever, all its pictures in the same few colors.
+    """A GIF that loops forever, all its pictures in the same few colors.
 
     Attributes
     ----------
@@ -115,10 +117,8 @@ def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:
         raise InputError(f"path: {path.name!r}; an animation is written as {' or '.join(WRITERS)}")
     if not path.parent.is_dir():
         raise InputError(f"path: there is no directory {path.parent}; make it first")
-    if not 1 <= fps <= _FASTEST[kind]:
-        raise InputError(f"fps: {fps!r}; give 1 to {_FASTEST[kind]} pictures per second")
-    if frames < 2:
-        raise InputError(f"frames: {frames!r}; an animation has at least two pictures")
+    number("fps", fps, least=1, most=_FASTEST[kind], unit="pictures per second")
+    whole_number("frames", frames, least=2, what="pictures")
     if kind == ".mp4":
         find_ffmpeg()
     return path

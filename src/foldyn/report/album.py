@@ -58,24 +58,24 @@ class Album:
 
 
 def described_shell(shell: Shell) -> str:
-    """What a reader has to know of a shell."""
+    """Notes on a shell."""
     return (
         "A shell: panels that stretch and bend as thin sheets, in "
         f"{len(shell.triangles)} triangles ({shell.options.divisions} divisions of every edge), "
         "turning against each other along exact creases. The sides of the triangles are not drawn. "
-        "With half the divisions one sees how far the numbers depend on the mesh: the difference "
-        "is about three times the error that is left."
+        "A run with half the divisions shows how far the numbers depend on the mesh: the "
+        "difference is about three times the remaining error."
     )
 
 
 def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], str]:
-    """Nodes that a figure shows, and what to say where there were more."""
+    """Nodes that a figure shows, and a remark where there are more."""
     nodes = chosen[:most]
     return nodes, f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
 
 
 def visible_scale(case: Case, result: xarray.Dataset) -> float:
-    """Enlargement with which a small motion can be seen: 1, 2, 5, 10, ... at most 1000."""
+    """Enlargement that makes a small motion visible: 1, 2, 5, 10, ... at most 1000."""
     largest = float(np.abs(result["displacement"].to_numpy()).max())
     wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
@@ -83,7 +83,7 @@ def visible_scale(case: Case, result: xarray.Dataset) -> float:
 
 
 def enlarged(scale: float) -> str:
-    """What a caption says of an enlargement."""
+    """Remark on an enlargement, for a caption."""
     return "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
 
 
@@ -94,16 +94,16 @@ def listed(noun: str, numbers: Iterable[Any]) -> str:
 
 
 def rules(results: Mapping[str, Any]) -> str:
-    """What a caption says of the mass rules of results that a figure shows."""
+    """The mass rules of results, for a caption."""
     return "all mass rules" if len(results) > 1 else f"mass rule {next(iter(results))}"
 
 
-def computations(
+def by_mass_rule(
     results: Mapping[str, xarray.Dataset],
     columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
     caption: str,
 ) -> Table:
-    """Table of a row for each mass rule, a column's cells being an attribute or a function."""
+    """Table with a row for each mass rule; columns are attributes or functions of its result."""
     rows = []
     for rule, result in results.items():
         cells = (
