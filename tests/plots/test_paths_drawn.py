@@ -353,7 +353,7 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
         (lambda case, path: plot_load_displacement(path, [7]), "paths: give a mapping"),
         (lambda case, path: plot_load_displacement({"a": path}, []), "nodes: empty"),
         (lambda case, path: plot_load_displacement({"a": path}, [13]), "13 is not in 'a'"),
-        (lambda case, path: plot_load_displacement({"a": path}, [7], "w"), "direction: 'w'; use"),
+        (lambda case, path: plot_load_displacement({"a": path}, [7], "w"), 'direction = "w"'),
         (
             lambda case, path: plot_reaction({"a": path}, [7], "z"),
             "no support holds node 7 along z",

@@ -20,7 +20,7 @@ from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
 from foldyn.patterns import Pattern
-from foldyn.report.album import Album
+from foldyn.report.album import Album, ByRule
 from foldyn.report.page import write_report
 from foldyn.report.sections import Section
 from foldyn.structures import Sheet
@@ -113,14 +113,10 @@ class Analysis(ABC):
 
     @staticmethod
     @abstractmethod
-    def sections(
-        case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
-    ) -> Iterable[Section]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterable[Section]:
         """Sections of the page about results, by mass rule; the album draws their figures."""
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path
-    ) -> Path:
+    def page(self, case_file: CaseFile, results: ByRule, folder: Path) -> Path:
         """Draw results, by mass rule, into an existing folder; returns the path of report.html."""
         sections = self.sections(case_file, results, Album(folder))
         return write_report(folder / "report.html", case_file.heading, sections)

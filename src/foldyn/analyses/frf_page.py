@@ -14,7 +14,7 @@ from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import METHODS
 from foldyn.linear.quantity import PER_FORCE, quantity_of
-from foldyn.report.album import Album, by_mass_rule, listed, rules, shown_nodes
+from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 
 MOST_CURVES = 8
@@ -23,9 +23,7 @@ MOST_REASONS = 6
 """Peaks for which the page explains missing numbers, at most."""
 
 
-def frf_sections(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
-) -> Iterator[Section]:
+def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
     """See `Analysis.sections`."""
     from foldyn.plots.frf import PROMINENCE
 
@@ -116,7 +114,7 @@ def _peaks(
     )
 
 
-def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
+def _run(case_file: CaseFile, results: ByRule) -> Table:
     keys = {
         "secant": "secant (degrees)",
         "modes": "modes",

@@ -16,7 +16,7 @@ from foldyn.analyses.sections import AXES, Animation, Count, Nodes, Section, one
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
-from foldyn.report.album import Album, by_mass_rule, listed
+from foldyn.report.album import Album, ByRule, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 
@@ -98,9 +98,7 @@ class ModesAnalysis(Analysis):
         )
 
     @staticmethod
-    def sections(
-        case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
-    ) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
         """See `Analysis`."""
         (first, modes), *others = results.items()
         case = case_file.case(first)
@@ -148,10 +146,8 @@ def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> 
 
 def _about(modes: xarray.Dataset) -> str:
     """About which state the modes swing."""
-    return {
-        "rest": "the undeformed sheet",
-        "equilibrium": "the equilibrium under the loads",
-    }.get(str(modes.attrs["state"]), "the stored state")
+    states = {"rest": "the undeformed sheet", "equilibrium": "the equilibrium under the loads"}
+    return states.get(str(modes.attrs["state"]), "the stored state")
 
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
@@ -180,7 +176,7 @@ def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Any:
     return plots.plot_mac(whole, None, columns, first, "")
 
 
-def _compared(results: Mapping[str, xarray.Dataset], same: Mapping[str, NDArray]) -> Table:
+def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
     """Frequencies of modes that belong together, by mass rule."""
     first, modes = next(iter(results.items()))
     header = ["mode", f"{first} (Hz)"]
@@ -211,7 +207,7 @@ def _table(modes: xarray.Dataset, names: xarray.Dataset, rule: str) -> Table:
             cell(100.0 * modes["damping_ratio"].values[k]),
         ]
         row += [str(names["name"].values[k]), round(100.0 * float(names["share"][k].max()))]
-        rows.append([*row, *(_share(share) for share in shares[k].tolist())])
+        rows.append([*row, *(cell(round(share, 1)) for share in shares[k].tolist())])
     return Table(
         header,
         rows,
@@ -227,12 +223,7 @@ def _frequency(modes: xarray.Dataset, k: int) -> float | str:
     return value if np.isfinite(value) else "unstable"
 
 
-def _share(percent: float) -> float | None:
-    """A share to 0.1 %."""
-    return round(percent, 1) if np.isfinite(percent) else None
-
-
-def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
+def _run(case_file: CaseFile, results: ByRule) -> Table:
     columns = {
         "free dofs": "free_dofs",
         "state": "state",

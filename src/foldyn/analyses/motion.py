@@ -18,7 +18,7 @@ from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, compiled, prepare
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import InputError
-from foldyn.report.album import Album, by_mass_rule, enlarged, rules, shown_nodes, visible_scale
+from foldyn.report.album import Album, ByRule, by_mass_rule, rules, shown_nodes, visible_scale
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
@@ -148,16 +148,14 @@ class MotionAnalysis(Analysis):
         )
 
     @staticmethod
-    def sections(
-        case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
-    ) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
         """See `Analysis`."""
         first = next(iter(results))
         case, trajectory = case_file.case(first), results[first]
         shown = case_file.output
         nodes, some = shown_nodes(shown.nodes.tolist())
         start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
-        scale = visible_scale(case, trajectory)
+        scale, enlarged = visible_scale(case, trajectory)
         yield from album.structure(case)
         if case.loads or case.imposed_terms or case.base_terms:
             yield album.figure(
@@ -177,7 +175,7 @@ class MotionAnalysis(Analysis):
         film = album.folder / f"motion.{shown.animation}"
         yield Picture(
             plots.animate(case, trajectory, film, scale=scale),
-            f"The motion with mass rule {first}{enlarged(scale)}; at rest in gray.",
+            f"The motion with mass rule {first}{enlarged}; at rest in gray.",
         )
         yield album.figure(
             "energies",
@@ -204,7 +202,7 @@ class _Prepared:
         return self.motion.run(progress)
 
 
-def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: list[int]) -> Table:
+def _table(case_file: CaseFile, results: ByRule, nodes: list[int]) -> Table:
     def largest(result: xarray.Dataset) -> float:
         moved = result["displacement"].to_numpy()[:, nodes]
         return float(np.linalg.norm(moved, axis=-1).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -174,7 +175,6 @@ class PathAnalysis(Analysis):
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            points = _bar(progress)
             count = 0
 
             def tell(point: Point) -> None:
@@ -186,10 +186,8 @@ class PathAnalysis(Analysis):
                 points.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
                 points.update()
 
-            try:
+            with closing(_bar(progress)) as points:
                 return trace(case, progress=tell, **given)
-            finally:
-                points.close()
 
         return compute
 

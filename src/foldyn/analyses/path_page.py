@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import xarray
@@ -10,7 +10,7 @@ import xarray
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
-from foldyn.report.album import Album, enlarged, listed, shown_nodes, visible_scale
+from foldyn.report.album import Album, ByRule, listed, shown_nodes, visible_scale
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
 FRAMES, FPS = 60, 15
@@ -22,9 +22,7 @@ MOST_COLUMNS = 4
 """Nodes whose displacements the table shows at most."""
 
 
-def path_sections(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], album: Album
-) -> Iterator[Section]:
+def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
     """See `Analysis.sections`."""
     (path,) = results.values()
     case = case_file.case()
@@ -54,16 +52,16 @@ def path_sections(
             "done on the structure; below, their shares.",
             lambda: plots.plot_path_energies(path, *_growing(path, moved)),
         )
-    scale = visible_scale(case, path)
+    scale, enlarged = visible_scale(case, path)
     yield album.figure(
         "shapes",
-        f"The deformed sheet{enlarged(scale)}; the undeformed one in gray.",
+        f"The deformed sheet{enlarged}; the undeformed one in gray.",
         lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
     )
     if path.sizes["step"] > 1:
         film = album.folder / f"path.{case_file.output.animation}"
         plots.animate(case, path, film, frames=FRAMES, fps=FPS, scale=scale)
-        yield Picture(film, f"Along the path{enlarged(scale)}; at rest in gray.")
+        yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
     yield Heading("The numbers")
     yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
     yield _run(case_file, path)

@@ -13,14 +13,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
 from foldyn.cases.damping import STATES
 from foldyn.cases.decode import check_keys, law_from

@@ -78,9 +78,8 @@ class VibrationSchema(CaseSchema):
 
 def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
     """Arguments for the stored state that a case file names; none where it names none."""
-    start = case_file.start(mass)
-    given = {"state": start.state, "load_factor": start.load_factor}
-    return {key: value for key, value in given.items() if value is not None}
+    start = case_file.start(mass)._asdict()
+    return {key: value for key, value in start.items() if value is not None}
 
 
 @contextmanager

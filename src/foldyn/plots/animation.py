@@ -17,7 +17,7 @@ from foldyn.errors import InputError
 from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, displacements, stretches, way
 from foldyn.plots.modes import ShownModes
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
@@ -144,7 +144,7 @@ def pace(seconds: float) -> str:
     return f"shown {times:g} times {'faster' if seconds > 1.0 else 'slower'}"
 
 
-def _center_path(sheet: Sheet3D, moving: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _center_path(sheet: Sheet3D, moving: Points) -> Points | None:
     """Return the positions (frames, 3) of a free body's center of mass, None where it stays."""
     if sheet.case is None or np.asarray(sheet.case.fixed).any():
         return None
@@ -153,7 +153,7 @@ def _center_path(sheet: Sheet3D, moving: NDArray[np.float64]) -> NDArray[np.floa
     return path if np.linalg.norm(np.ptp(path, axis=0)) > _TRAVELS * sheet.size else None
 
 
-def _draw_path(axes: Axes3D, path: NDArray[np.float64]) -> Any:
+def _draw_path(axes: Axes3D, path: Points) -> Any:
     """Draw the path of the center of mass, and return the dot that moves on it."""
     axes.plot(*path.T, **_PATH, zorder=0.7)
     (dot,) = axes.plot(*path[:1].T, "o", color=style.GREEN, markersize=4.0, zorder=9.0)
@@ -162,7 +162,7 @@ def _draw_path(axes: Axes3D, path: NDArray[np.float64]) -> Any:
 
 def frame_displacements(
     sheet: Sheet3D, result: xr.Dataset, frames: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], Points]:
     """Return evenly spaced times, or places on the way of a path, and displacements (frames, n, 3).
 
     The way of a path is that of `plots.along`, so that shapes change evenly from picture to

@@ -81,13 +81,12 @@ def _draw_hinges(
         j, m = hinges[first][:2]
         label = f"{kind} {j}-{m}"
         label += f" and {count - 1} more" if count > 1 else ""
-        label += f": k {k:.4g} N m/rad, rest {np.degrees(theta0):.4g}°"
+        angle = float(np.degrees(theta0))
+        label += f": k {k:.4g} N m/rad, rest {angle:.4g}°"
         axes.plot(degrees, moment, label=label, **look)
         at_rest = k * float(law.moment(theta0, theta0))
-        axes.plot([np.degrees(theta0)], [at_rest], "o", color=look["color"], markersize=5, zorder=4)
-        axes.axvline(
-            np.degrees(theta0), color=look["color"], linewidth=0.8, linestyle=":", zorder=1
-        )
+        axes.plot([angle], [at_rest], "o", color=look["color"], markersize=5, zorder=4)
+        axes.axvline(angle, color=look["color"], linewidth=0.8, linestyle=":", zorder=1)
         reach = max(reach, float(np.abs(moment[framed]).max()))
     axes.set_xlim(0.0, 360.0)
     axes.set_xticks(np.arange(0, 361, 60))

@@ -11,12 +11,12 @@ import xarray as xr
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
 from foldyn.values import length
@@ -96,7 +96,7 @@ class ShownModes:
     """
 
     sheet: Sheet3D
-    swings: NDArray[np.float64]
+    swings: Points
     captions: list[str]
     notes: list[Line2D]
 
@@ -201,9 +201,7 @@ def hertz(frequency: float) -> str:
     return f"{frequency:#.4g}".rstrip(".") if frequency else "0"
 
 
-def _readable(
-    sheet: Sheet3D, shape: NDArray[np.float64], amplitude: float | None
-) -> NDArray[np.float64]:
+def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
     """Scale a shape to an amplitude (m), or to one at which it can be read."""
     largest = float(np.linalg.norm(shape, axis=1).max())
     if largest == 0.0:

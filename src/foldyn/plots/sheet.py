@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
 from foldyn.plots import scene, style
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Indices, Points, Sheet3D, View
 from foldyn.plots.visibility import hidden_points, split_edges
 
 _HIDDEN = 0.3  # opacity of what lies behind a panel
@@ -40,7 +40,7 @@ class EdgeKind(NamedTuple):
     """Edges that look alike: the nodes along them (k, p), look and name."""
 
     name: str
-    edges: NDArray[np.int64]
+    edges: Indices
     color: str
     width: float
     dashes: Any
@@ -98,7 +98,7 @@ class DrawnSheet:
         self,
         axes: Axes3D,
         sheet: Sheet3D,
-        points: NDArray[np.float64],
+        points: Points,
         view: View,
         elements: bool = False,
         actuated: bool = True,
@@ -107,7 +107,7 @@ class DrawnSheet:
         hidden, visible = self._pieces(points)
         self._behind = scene.add_panels(axes, *hidden, zorder=0.9)
         self._panels = scene.add_panels(axes, *visible)
-        self._lines: list[tuple[Any, Any, NDArray[np.int64]]] = []
+        self._lines: list[tuple[Any, Any, Indices]] = []
         for kind in edge_kinds(sheet, elements, actuated):
             visible, hidden = self._split(kind.edges, points)
             look = kind.color, 0.7 * kind.width, kind.dashes
@@ -116,7 +116,7 @@ class DrawnSheet:
             front.set_label(kind.name)
             self._lines.append((front, behind, kind.edges))
 
-    def move(self, points: NDArray[np.float64]) -> None:
+    def move(self, points: Points) -> None:
         """Put the nodes in other positions (n, 3)."""
         for panels, (corners, colors) in zip(
             (self._behind, self._panels), self._pieces(points), strict=True
@@ -128,7 +128,7 @@ class DrawnSheet:
             front.set_segments(visible)
             behind.set_segments(hidden)
 
-    def _pieces(self, points: NDArray[np.float64]) -> list[tuple[NDArray, NDArray]]:
+    def _pieces(self, points: Points) -> list[tuple[NDArray, NDArray]]:
         """Return corners and colors of the hidden pieces of panels, and of the others."""
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
@@ -138,20 +138,18 @@ class DrawnSheet:
         )
         return [(corners[chosen], colors[chosen]) for chosen in (hidden, ~hidden)]
 
-    def _split(
-        self, edges: NDArray[np.int64], points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _split(self, edges: Indices, points: Points) -> tuple[Points, Points]:
         return split_edges(edges, points, self._sheet.triangles, self._view, self._sheet.size)
 
 
 def side_by_side(
     sheet: Sheet3D,
-    shapes: NDArray[np.float64],
+    shapes: Points,
     captions: Sequence[str],
     view: View,
     notes: Sequence[Line2D] = (),
     title: str = "",
-    extent: NDArray[np.float64] | None = None,
+    extent: Points | None = None,
     width: float = 9.0,
     most_columns: int = 3,
 ) -> tuple[Figure, list[DrawnSheet]]:

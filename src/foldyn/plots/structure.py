@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import loads as histories
 from foldyn.plots import marks, scene, style
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure
 
@@ -119,7 +119,7 @@ def draw_structure(
     return style.finish(figure, keys, columns)
 
 
-def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDArray[np.float64]:
+def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> Points:
     """Return displacements of all nodes (n, 3), zero for None."""
     if displacement is None:
         return np.zeros_like(sheet.nodes)
@@ -137,7 +137,7 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDAr
 class _Supports(NamedTuple):
     """Marks of one kind of support: triangles (k, 3, 3), and the axes of each node."""
 
-    triangles: NDArray[np.float64]
+    triangles: Points
     axes: list[tuple[int, str]]
     color: str
     ink: str  # of the axes' names
@@ -147,15 +147,13 @@ class _Supports(NamedTuple):
 class _Arrows(NamedTuple):
     """Arrows of one color, and their legend entries."""
 
-    shafts: NDArray[np.float64]
-    heads: NDArray[np.float64]
+    shafts: Points
+    heads: Points
     color: str
     keys: list[Line2D]
 
 
-def _supports(
-    sheet: Sheet3D, points: NDArray[np.float64], size: float, sight: View
-) -> list[_Supports]:
+def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Supports]:
     """Return the marks of the nodes that are held, and of those that are moved."""
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
     moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
@@ -170,9 +168,7 @@ def _supports(
     ]
 
 
-def _motions(
-    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
-) -> list[_Arrows]:
+def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
     imposed = [(points, vectors) for vectors, _ in sheet.case.imposed_terms]
     base = [
@@ -185,9 +181,7 @@ def _motions(
     ]
 
 
-def _loads(
-    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
-) -> list[_Arrows]:
+def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of forces, and of gravity at the center of mass."""
     forces = [(points, vectors) for vectors, _ in sheet.case.force_terms]
     gravity = [
@@ -201,11 +195,11 @@ def _loads(
 
 
 def _arrows(
-    terms: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    terms: list[tuple[Points, Points]],
     length: float,
     sight: View,
     color: str,
-    describe: Callable[[NDArray[np.float64]], str],
+    describe: Callable[[Points], str],
 ) -> list[_Arrows]:
     """Return arrows from points along vectors, both (k, 3) in each term, one key for each term."""
     terms = [(points, vectors) for points, vectors in terms if vectors.any()]
@@ -225,7 +219,7 @@ def _arrows(
     return [_Arrows(shafts, heads, color, keys)]
 
 
-def _center_of_mass(sheet: Sheet3D, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
     """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
     mass = np.asarray(sheet.structure.mass.sum(axis=0)).ravel()
     return mass @ points / mass.sum()
@@ -234,10 +228,10 @@ def _center_of_mass(sheet: Sheet3D, points: NDArray[np.float64]) -> NDArray[np.f
 def _write_labels(
     axes: Axes3D,
     sheet: Sheet3D,
-    points: NDArray[np.float64],
+    points: Points,
     numbers: bool | str,
     groups: list[_Supports],
-    drawn: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    drawn: tuple[Points, Points, Points],
     sight: View,
 ) -> None:
     """Write node numbers and the directions of supports where they hide least."""

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
@@ -185,14 +184,14 @@ def _constrained(figure: Figure) -> bool:
 
 def legend_below(
     figure: Figure, handles: Sequence, columns: int = 3, width: float | None = None
-) -> Legend:
+) -> None:
     """Put one legend for the whole figure below its axes, where it hides no data.
 
     With a width (inches) it has as many columns, at most so many, as `columns_that_fit`.
     """
     if width is not None:
         columns = columns_that_fit(handles, width, columns)
-    return figure.legend(
+    figure.legend(
         handles=list(handles),
         # "outside" makes room, which only the layout engine can do.
         loc="outside lower center" if _constrained(figure) else "lower center",

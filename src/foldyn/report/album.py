@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 
 from foldyn import plots
 from foldyn.cases import Case
@@ -14,9 +15,8 @@ from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
 
-if TYPE_CHECKING:
-    import xarray
-
+ByRule = Mapping[str, xarray.Dataset]
+"""Results by mass rule."""
 DPI = 150
 MOST_NODES = 12
 """Nodes that one figure shows at most."""
@@ -74,17 +74,13 @@ def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], s
     return nodes, f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
 
 
-def visible_scale(case: Case, result: xarray.Dataset) -> float:
-    """Enlargement that makes a small motion visible: 1, 2, 5, 10, ... at most 1000."""
+def visible_scale(case: Case, result: xarray.Dataset) -> tuple[float, str]:
+    """Enlargement that makes a small motion visible, at most 1000, and a remark on it."""
     largest = float(np.abs(result["displacement"].to_numpy()).max())
     wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
-    return max((s for s in steps if s <= wanted), default=1.0)
-
-
-def enlarged(scale: float) -> str:
-    """Remark on an enlargement, for a caption."""
-    return "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
+    scale = max((s for s in steps if s <= wanted), default=1.0)
+    return scale, "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
 
 
 def listed(noun: str, numbers: Iterable[Any]) -> str:
@@ -93,13 +89,13 @@ def listed(noun: str, numbers: Iterable[Any]) -> str:
     return f"{noun}{'' if len(words) == 1 else 's'} {', '.join(words)}"
 
 
-def rules(results: Mapping[str, Any]) -> str:
+def rules(results: ByRule) -> str:
     """The mass rules of results, for a caption."""
     return "all mass rules" if len(results) > 1 else f"mass rule {next(iter(results))}"
 
 
 def by_mass_rule(
-    results: Mapping[str, xarray.Dataset],
+    results: ByRule,
     columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
     caption: str,
 ) -> Table:
