@@ -19,7 +19,7 @@ from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
 from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import AXES, Nodes, Positive, Section, one_of, part
+from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, part
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys
@@ -140,11 +140,9 @@ NO_HISTORY = (
 )
 
 
-class FrfOutput(Section):
+class FrfOutput(ShownSection):
     """[output] of a frequency response: what is shown."""
 
-    nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
     quantity: Annotated[Any, one_of(PER_FORCE)] = None
 
 

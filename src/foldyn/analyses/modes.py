@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.sections import AXES, Animation, Count, Nodes, Section, one_of, some_shapes
+from foldyn.analyses.sections import Animation, Count, Section, ShownSection, some_shapes
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
@@ -36,11 +36,9 @@ class ModesSection(Section):
     secant: Secant = None
 
 
-class ModesOutput(Section):
+class ModesOutput(ShownSection):
     """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
 
-    nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
     shapes: Annotated[int | tuple[int, ...], some_shapes("modes", "mode", least=1)] = 6
     animation: Animation = "gif"
 

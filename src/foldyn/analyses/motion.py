@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
-from foldyn.analyses.sections import AXES, Animation, CaseSchema, Nodes, Positive, Section, one_of
+from foldyn.analyses.sections import Animation, CaseSchema, Positive, Section, ShownSection, one_of
 from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
@@ -49,11 +49,9 @@ class MotionSection(Section):
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
-class MotionOutput(Section):
+class MotionOutput(ShownSection):
     """[output] of a motion: what is kept and shown."""
 
-    nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
     every: Annotated[Any, PlainValidator(_every)] = None
     max_frequency: Positive | None = None
     animation: Animation = "gif"

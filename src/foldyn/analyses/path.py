@@ -20,9 +20,9 @@ from foldyn.analyses.sections import (
     CaseSchema,
     Count,
     ModelSection,
-    Nodes,
     Positive,
     Section,
+    ShownSection,
     Whole,
     check_mass,
     one_of,
@@ -117,10 +117,9 @@ class PathSection(Section):
     stability: bool = Settings.stability
 
 
-class PathOutput(Section):
+class PathOutput(ShownSection):
     """[output] of a path: what is shown."""
 
-    nodes: Nodes = None
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
     shapes: Annotated[int | tuple[int, ...], some_shapes("shapes", "point")] = 4
     animation: Animation = "gif"

@@ -46,11 +46,14 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             lambda: plots.plot_load_displacement({"": path}, nodes, direction),
         )
     if path.sizes["step"] > 1:
+        over: tuple[list[int], str] | tuple[None, None] = None, None
+        if moved is not None and (np.diff(along(path, *moved)) > 0.0).all():
+            over = moved  # they only move forward
         yield album.figure(
             "energies",
             f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
             "done on the structure; below, their shares.",
-            lambda: plots.plot_path_energies(path, *_growing(path, moved)),
+            lambda: plots.plot_path_energies(path, *over),
         )
     scale, enlarged = visible_scale(case, path)
     yield album.figure(
@@ -72,15 +75,6 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
         "the forces at play, or rounding. The result carries its own case, can be run again "
         "from it, and motions can start from its points."
     )
-
-
-def _growing(
-    path: xarray.Dataset, moved: tuple[list[int], str] | None
-) -> tuple[list[int], str] | tuple[None, None]:
-    """The moved supports, if they only move forward."""
-    if moved is None or not (np.diff(along(path, *moved)) > 0.0).all():
-        return None, None
-    return moved
 
 
 def _multiplied(path: xarray.Dataset) -> str:

@@ -117,7 +117,6 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
     masses = list(schema.model.mass or [model.mass])
-    cases: dict[str, Case] = {}
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
     pattern: Any = None
     sheet: Any = None
@@ -143,7 +142,8 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         with within("", path):
             return Case(structure, schema.supports, schema.loads, damping)
 
-    cases[masses[0]] = case = make(masses[0])
+    case = make(masses[0])
+    cases = {masses[0]: case}
     with warnings.catch_warnings():  # the other rules would only repeat them
         warnings.simplefilter("ignore", FoldynWarning)
         cases |= {mass: make(mass) for mass in masses[1:]}

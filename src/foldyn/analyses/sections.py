@@ -225,6 +225,13 @@ class ModelSection(Section):
         return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
 
 
+class ShownSection(Section):
+    """[output]: nodes that figures show, and the axis along which they do."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(AXES)] = None
+
+
 class DampingSection(Section):
     """[damping]: Rayleigh coefficients."""
 

@@ -152,6 +152,13 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
 def asked(
     paths: Mapping[str, xr.Dataset], nodes: Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
-    """Nodes that all paths have, and the direction, by default that in which they move farthest."""
+    """Nodes that all paths have, and the direction, by default that in which they move farthest.
+
+    Raises
+    ------
+    InputError
+        Not a mapping of label to path, no node, or one that a path does not have.
+    """
+    check_paths(paths)
     numbers = check_nodes_of(paths, nodes)
     return numbers, main_direction(paths, numbers) if direction is None else direction

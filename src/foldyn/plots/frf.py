@@ -210,12 +210,6 @@ def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:
             continue
         written.append(frequency)
         part = (frequency - low) / (high - low)
-        axes.annotate(
-            f"{hertz(frequency)} Hz",
-            (frequency, height),
-            xytext=(0.0, 5.0),
-            textcoords="offset points",
-            ha="left" if part < 0.04 else "right" if part > 0.96 else "center",
-            zorder=5.0,
-            **style.FINE,
-        )
+        side = "left" if part < 0.04 else "right" if part > 0.96 else "center"
+        look = style.FINE | {"xytext": (0.0, 5.0), "textcoords": "offset points", "ha": side}
+        axes.annotate(f"{hertz(frequency)} Hz", (frequency, height), zorder=5.0, **look)

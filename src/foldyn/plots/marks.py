@@ -131,16 +131,9 @@ class Labels:
         best = int(np.argmax(np.round(gaps / self._distance, 1)))
         shift = spots[best] - anchor
         place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]
-        written = self._axes.text(
-            *place,
-            text,
-            fontsize=size,
-            color=color,
-            ha="center",
-            va="center",
-            zorder=20,
-            path_effects=[withStroke(linewidth=2.0, foreground="white")],
-        )
+        look = {"fontsize": size, "color": color, "ha": "center", "va": "center", "zorder": 20}
+        written = self._axes.text(*place, text, **look)
+        written.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
         written.set_gid(f"label {text}")
         around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
         self._taken = np.vstack(

@@ -160,8 +160,7 @@ def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     columns = min(count, _COLUMNS)
     rows = -(-count // columns)
     figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows, title)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    frames = [grid[divmod(k, columns)] for k in range(rows * columns)]
+    frames = list(figure.subplots(rows, columns, squeeze=False).flat)
     for spare in frames[count:]:
         spare.remove()
     for k, frame in enumerate(frames[:count]):

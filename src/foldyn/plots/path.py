@@ -19,7 +19,6 @@ from foldyn.plots.along import (
     along,
     asked,
     check_path,
-    check_paths,
     displacements,
     evenly,
     farthest,
@@ -70,7 +69,6 @@ def plot_load_displacement(
     InputError
         No path or node, a node that a path does not have, another direction.
     """
-    check_paths(paths)
     numbers, direction = asked(paths, nodes, direction)
     curves = []
     for label, path in paths.items():
@@ -117,7 +115,6 @@ def plot_reaction(
         No path or node, a node that a path does not have or does not support along the direction,
         another direction.
     """
-    check_paths(paths)
     numbers, direction = asked(paths, nodes, direction)
     curves = [
         _Curve(
@@ -203,15 +200,10 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
     label, x, y, path = curve
     for number, (start, stop, stable) in enumerate(stretches(path)):
         part = slice(start, stop + 1)
-        axes.plot(
-            x[part],
-            y[part],
-            color=color,
-            linewidth=1.4,
-            linestyle="solid" if stable else _UNSTABLE,
-            label=label if number == 0 and label else f"_{label}{number}",
-            zorder=zorder,
-        )
+        look: dict[str, Any] = {"color": color, "linewidth": 1.4, "zorder": zorder}
+        dashes = "solid" if stable else _UNSTABLE
+        name = label if number == 0 and label else f"_{label}{number}"
+        axes.plot(x[part], y[part], linestyle=dashes, label=name, **look)
     if len(x) == 1:  # a single point has no line
         axes.plot(x, y, marker=".", color=color, label=label)
     for kind, mark in _MARKS.items():

@@ -200,13 +200,9 @@ def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: flo
     """Put axes for what is seen into a figure: the center in inches, the scale in inches per m."""
     width, height = figure.get_size_inches()
     side = 1.1 * seen.size.max() * scale  # of the square axes, which clip what they draw
-    corner = center[0] - 0.5 * side, center[1] - 0.5 * side
-    axes = Axes3D(
-        figure,
-        (corner[0] / width, corner[1] / height, side / width, side / height),
-        proj_type="ortho",
-        computed_zorder=False,
-    )
+    left, bottom = center[0] - 0.5 * side, center[1] - 0.5 * side
+    place = left / width, bottom / height, side / width, side / height
+    axes = Axes3D(figure, place, proj_type="ortho", computed_zorder=False)
     figure.add_axes(axes)
     axes.view_init(elev=seen.view.elevation, azim=seen.view.azimuth)
     low, high = seen.middle - 0.5 * seen.box, seen.middle + 0.5 * seen.box

@@ -60,13 +60,8 @@ class GifWriter(PillowWriter):
             picture.quantize(palette=palette, dither=Image.Dither.NONE)
             for picture in self._pictures
         )
-        first.save(
-            self.outfile,
-            save_all=True,
-            append_images=others,
-            duration=round(1000 / self.rate),
-            loop=0,
-        )
+        duration = round(1000 / self.rate)
+        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0)
 
 
 def _common_palette(pictures: list[Image.Image]) -> Image.Image:
