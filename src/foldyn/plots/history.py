@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.chosen import AXES, check_nodes_of, directions
+from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
+from foldyn.values import number
 
 
 def plot_history(
@@ -63,13 +63,11 @@ def plot_history(
         for label, one in trajectories.items()
     }
     chosen = directions(axes, len(numbers), moved.values())
-    intervals = {
-        label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
-    }
+    times = {label: dataset["time"].values for label, dataset in trajectories.items()}
+    intervals = {label: sampling_interval(time) for label, time in times.items()}
     if max_frequency is None:
         max_frequency = 0.5 / max(intervals.values())
-    elif not (np.isfinite(max_frequency) and max_frequency > 0.0):
-        raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
+    number("max_frequency", max_frequency, above=0.0, unit="Hz")
 
     rows = len(numbers)
     figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
@@ -79,32 +77,26 @@ def plot_history(
     handles = []
     for row, (node, direction) in enumerate(zip(numbers, chosen, strict=True)):
         left, right = grid[row]
-        last = row == rows - 1
-        style.frame(
-            left,
-            "time (s)" if last else "",
-            f"{direction} displacement (m)",
-            f"node {node}",
+        time_label, frequency_label = (
+            ("time (s)", "frequency (Hz)") if row == rows - 1 else ("", "")
         )
-        style.frame(right, "frequency (Hz)" if last else "", "amplitude (m)", f"node {node}")
-        for index, (label, dataset) in enumerate(trajectories.items()):
-            time = dataset["time"].values
+        style.frame(left, time_label, f"{direction} displacement (m)", f"node {node}")
+        style.frame(right, frequency_label, "amplitude (m)", f"node {node}")
+        for index, (label, time) in enumerate(times.items()):
             motion = moved[label][:, row, AXES.index(direction)]
             frequencies, amplitude = spectrum(
                 motion, intervals[label], window=window, detrend=detrend
             )
             shown = frequencies <= max_frequency * (1.0 + 1e-9)
             look = style.line_style(index) | {"label": label}
-            (line,) = left.plot(time, motion, **look)
+            lines = left.plot(time, motion, **look)
             right.plot(frequencies[shown], amplitude[shown], **look)
-            if row == 0:
-                handles.append(line)
+            handles += lines if row == 0 else []
         left.margins(x=0.0)
         right.set_xlim(0.0, max_frequency)
         right.set_ylim(bottom=0.0)
         for frame in (left, right):
             style.exponents(frame, ticks=5)
-    style.legend_below(figure, handles, columns=5)
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
-    return style.finish(figure)
+    return style.finish(figure, handles, columns=5)
