@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from problem import Problem
 
 from foldyn.dynamics import rk4
-from foldyn.dynamics.course import Plan, samples
-from foldyn.dynamics.engine import Compiled
-from foldyn.dynamics.start import begin
+from foldyn.dynamics.course import StepPlan, samples
+from foldyn.dynamics.initial import begin
+from foldyn.dynamics.methods import Compiled
 from foldyn.dynamics.system import pack
 from foldyn.mechanics import internal_force, workspace
 
@@ -23,7 +23,7 @@ class FoldynEngine:
         self.name = "Foldyn" if threads == 1 else f"Foldyn, {threads} threads"
         self.problem = problem
         self.packed = pack(problem.case, problem.dt)
-        self.engine = Compiled(rk4.advance, self.packed, threads)
+        self._threads = threads
         self._back = np.argsort(problem.order)
 
     def force(self, u: NDArray) -> NDArray:
@@ -39,13 +39,14 @@ class FoldynEngine:
         The loop evaluates the force once more at its end; that part is taken off.
         """
         case, packed, dt = self.problem.case, self.packed, self.problem.dt
-        plan = Plan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0, 0.0, np.zeros(0))
+        plan = StepPlan(0.0, steps * dt, dt, steps, 1 << 60, 0.0, 0.0, 0.0, np.zeros(0))
         start = self.problem.start[self._back]
         course = begin(case, start, np.zeros_like(start), plan, packed)
         course.tally.samples = 1  # so that no step is due for a sample
         out = samples(0, len(start), len(packed.system.supported), 6)
+        engine = Compiled(rk4.advance, packed, course, plan, self._threads)
         began = time.perf_counter()
-        code, _ = self.engine.advance(course, plan, out, steps)
+        code, _ = engine.advance(out, steps)
         seconds = time.perf_counter() - began
         if code:
             raise RuntimeError(f"Foldyn's loop stopped with code {code}")

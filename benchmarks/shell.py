@@ -25,7 +25,8 @@ import machine
 import numpy as np
 
 from foldyn.studies.herkal.opensees import compare, run
-from foldyn.studies.herkal.opensees.stored import CASES, Moved, read_motion, stored_motions
+from foldyn.studies.herkal.opensees.stored import Moved, read_motion, stored_motions
+from foldyn.studies.herkal.sheet_models import CASES
 
 Motion = Callable[[], Moved]
 

@@ -75,7 +75,7 @@ def film_of_specimen(motion: xr.Dataset, kind: str) -> ex.SyntheticFilm:
 
 def measure(folder: Path, kind: str) -> dict[str, float]:
     """Track a film and compare with the truth."""
-    model = ex.Model.of(fd.load(folder / "path.nc"))
+    model = ex.TrackedModel.of(fd.load(folder / "path.nc"))
     start = time.perf_counter()
     tracks = ex.track_film(str(folder / f"{kind}.mkv"), model)
     seconds = time.perf_counter() - start

@@ -20,9 +20,9 @@ from foldyn.report import Table
 from foldyn.report.album import Album
 from foldyn.studies.herkal import report, sensitivity_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
-from foldyn.studies.herkal.figures import plot_sensitivity
-from foldyn.studies.herkal.models import REFERENCE, label, rules
+from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
+from foldyn.studies.herkal.sheet_models import REFERENCE, label, rules
 from foldyn.studies.herkal.specimen import page
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.study import FULL, RESULTS, Study
@@ -38,13 +38,13 @@ WIDTH = 900  # pixels
 
 def draw(study: Study, found: variations.Variations) -> None:
     """Write the two figures."""
-    nodes, axis = study.reported("case2")
+    nodes, axis, _ = reported("case2")
     names = (REFERENCE, "panel", "circumcenter", "consistent")
     every = {label(m): study.result("case2", m, "motion") for m in names}
     motions = {name: motion for name, motion in every.items() if motion is not None}
     plots.plot_history(motions, nodes, axis, 5.0).savefig(IMAGES / "herkal-case2.png", dpi=100)
     models = (*rules(), sensitivity_page.TURNED)
-    plot_sensitivity(found, models, paper_table()).savefig(
+    sensitivity_page.plot_sensitivity(found, models, paper_table()).savefig(
         IMAGES / "herkal-sensitivity.png", dpi=100
     )
 
@@ -83,7 +83,7 @@ def main(folder: Path) -> None:
         )
     table(
         ["claim", "paper or bound", "here", ""],
-        [[v.target.what, v.asked, float(v.computed), v.told] for v in claims(study)],
+        [[v.target.what, v.asked, float(v.computed), v.word] for v in claims(study)],
     )
     for one in (
         report.rank_table(study),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,11 +61,7 @@ def gradient_error(
     h = 1e-3 * (size or _size(point))
     for _ in range(4):
         d = rng.standard_normal(point.shape)
-
-        def slope(h: float, d: NDArray = d) -> float:
-            return (energy(point + h * d) - energy(point - h * d)) / (2.0 * h)
-
-        found.append((4.0 * slope(0.5 * h) - slope(h)) / 3.0)
+        found.append(_slope(energy, point, d, h))
         exact.append(float((np.asarray(force(point)) * d).sum()))
     return float(np.linalg.norm(np.subtract(found, exact)) / np.linalg.norm(exact))
 
@@ -83,15 +80,19 @@ def tangent_error(
     """
     point = np.asarray(u, float)
     d = np.random.default_rng(seed).standard_normal(point.shape)
-
-    def slope(h: float) -> NDArray:
-        return (np.asarray(force(point + h * d)) - np.asarray(force(point - h * d))) / (2.0 * h)
-
-    h = 1e-3 * (size or _size(point))
-    found = (4.0 * slope(0.5 * h) - slope(h)) / 3.0
+    found = _slope(force, point, d, 1e-3 * (size or _size(point)))
     exact = (tangent(point) @ d.ravel()).reshape(point.shape)  # type: ignore[operator]
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
 def _size(point: NDArray) -> float:
     return float(np.abs(point).max()) or 1e-3
+
+
+def _slope(function: Callable[[NDArray], Any], point: NDArray, d: NDArray, h: float) -> Any:
+    """Slope of a function along a direction: central differences, extrapolated from two steps."""
+
+    def central(h: float) -> Any:
+        return (np.asarray(function(point + h * d)) - function(point - h * d)) / (2.0 * h)
+
+    return (4.0 * central(0.5 * h) - central(h)) / 3.0

@@ -33,7 +33,7 @@ def shortened(message: str) -> str:
 
 
 ALSO = "\n  also "
-"""Between the lines of a message that tells several faults."""
+"""Between the lines of a message with several faults."""
 
 
 class FoldynError(Exception):
@@ -76,7 +76,7 @@ class InputError(FoldynError, ValueError):
         return self.field.partition(".")[0].partition("[")[0]
 
     def within(self, field: str, file: object = None) -> InputError:
-        """The same error, seen from further out: its field is a part of another, or of a file."""
+        """The same error seen from further out: its field is part of another, or of a file."""
         inner = self.field if self.file is None else f"{self.file}: {self.field}"
         others = [other.within(field) for other in self.others]
         return type(self)(self.reason, field + inner, file, others)
@@ -84,7 +84,7 @@ class InputError(FoldynError, ValueError):
 
 @contextmanager
 def within(field: str, file: object = None) -> Iterator[None]:
-    """Put the place of what is read or checked meanwhile before the field of an `InputError`."""
+    """Prefix the field of an `InputError` raised in the block with the place being checked."""
     try:
         yield
     except InputError as error:
@@ -92,7 +92,7 @@ def within(field: str, file: object = None) -> Iterator[None]:
 
 
 class Faults:
-    """Collects the faults of independent parts, to be told together."""
+    """Collects the faults of independent parts, to be reported together."""
 
     def __init__(self) -> None:
         self.found: list[InputError] = []
@@ -111,7 +111,7 @@ class Faults:
         self.found += [alone, *error.others]
 
     def tell(self) -> None:
-        """Raise all that was found in one error, if anything was."""
+        """Raise all faults in one error, if there are any."""
         if self.found:
             first, *others = self.found
             raise InputError(first.reason, first.field, first.file, others)

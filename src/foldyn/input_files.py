@@ -6,6 +6,7 @@ Every message says what is wrong and what to do; the caller puts the place befor
 from __future__ import annotations
 
 import codecs
+import hashlib
 import json
 import os
 import re
@@ -17,7 +18,7 @@ from typing import Any
 from foldyn.errors import InputError
 
 DEEPEST = 50
-"""Tables and lists in one another that a TOML or JSON text may have."""
+"""Levels of nested tables and lists that a TOML or JSON text may have."""
 
 MEBI = 2**20
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{DEEPEST},}}""")
@@ -81,6 +82,12 @@ def check_file(path: str | os.PathLike[str], what: str) -> Path:
     return path
 
 
+def file_digest(path: Path) -> str:
+    """Digest of the content of a file, "1f0c6a2b9d3e4f58"."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
 def from_toml(text: str) -> dict[str, Any]:
     """Tables of a TOML text.
 
@@ -96,7 +103,7 @@ def from_toml(text: str) -> dict[str, Any]:
     try:
         return _shallow(tomllib.loads(text))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid TOML: {_told(error)}") from None
+        raise InputError(f"is not valid TOML: {_why(error)}") from None
 
 
 def from_json(text: str) -> Any:
@@ -110,17 +117,16 @@ def from_json(text: str) -> Any:
     try:
         return _shallow(json.loads(text))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid JSON: {_told(error)}") from None
+        raise InputError(f"is not valid JSON: {_why(error)}") from None
 
 
-def _told(error: Exception) -> str:
-    return f"nested deeper than {DEEPEST} levels" if isinstance(error, RecursionError) else (
-        str(error)
-    )  # fmt: skip
+def _why(error: Exception) -> str:
+    too_deep = isinstance(error, RecursionError)
+    return f"nested deeper than {DEEPEST} levels" if too_deep else str(error)
 
 
 def _shallow(value: Any) -> Any:
-    """Return `value` where it is not too deep for the functions that walk through it."""
+    """Return `value` unless it is too deep for the functions that walk through it."""
     level = [value]
     for _ in range(DEEPEST + 1):
         level = [

@@ -18,7 +18,7 @@ from foldyn.errors import InputError
 
 MEBI, GIB = 2.0**20, 2.0**30
 HALF = 0.5
-"""Share of the memory that the command takes without being told to."""
+"""Share of the memory that the command takes unless forced."""
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 _share: ContextVar[float] = ContextVar("share of the memory", default=1.0)
 
@@ -34,7 +34,7 @@ def at_most(share: float) -> Iterator[None]:
 
 
 def memory() -> float:
-    """Bytes of the machine, or fewer where its container or the shell's limits allow fewer."""
+    """Bytes of the machine, or of its container or the shell's limit if they allow fewer."""
     known = [_machine(), *map(_limit, _LIMITS)]
     if sys.platform != "win32":
         import resource

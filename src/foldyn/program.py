@@ -13,7 +13,7 @@ COMPUTING = (
     "jit", "patterns", "materials", "mechanics", "structures", "shells", "cases", "statics",
     "dynamics", "linear", "signals",
 )  # fmt: skip
-"""Folders of the package whose changes make stored results outdated."""
+"""Folders of the package whose changes outdate stored results."""
 
 
 @cache

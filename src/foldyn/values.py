@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 
 LARGEST, SMALLEST = 1e50, 1e-50
-"""Sizes of numbers but 0, in SI units: their fourth powers and quotients are finite and not 0."""
+"""Sizes of numbers other than 0, in SI units: their fourth powers and quotients stay in range."""
 LONGEST, SHORTEST = 1e30, 1e-30
-"""Sizes of lengths (m), whose eighth powers occur: a thousand universes, and less than Planck's."""
+"""Sizes of lengths (m), whose eighth powers occur: a thousand universes to less than Planck's."""
 MOST = 2**63 - 1
 """Largest whole number: what arrays of them hold."""
 SHOWN = 60
@@ -64,7 +64,7 @@ def plain(value: Any) -> Any:
 
 
 def shortened(text: str) -> str:
-    """Text for a message, in one line, of a long one only the beginning."""
+    """Text for a message in one line; only the beginning of a long one."""
     text = " ".join(text.splitlines())
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
 
@@ -201,7 +201,7 @@ def numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def _as_floats(array: NDArray) -> NDArray:
-    """Floats of whole numbers of any size; the array itself where it holds other things."""
+    """Floats of whole numbers of any size; the array itself if it holds anything else."""
     if not all(isinstance(item, int | float) for item in array.ravel()):
         return array
     large = {True: math.inf, False: -math.inf}
@@ -255,7 +255,7 @@ def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ..
 
 
 def vector(name: str, value: Any, *, nonzero: bool = False) -> tuple[float, float, float]:
-    """Return `value` as three finite floats, if asked not all of them zero."""
+    """Return `value` as three finite floats; with `nonzero`, not all of them zero."""
     array = numbers(name, value)
     if array.shape != (3,):
         raise InputError(f" = {show(value)}: must be three numbers (x, y, z)", name)

@@ -10,12 +10,17 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
-from typing import Any, Self
+from typing import Any, Self, TypeVar
+
+from foldyn.errors import ComputationError
+
+Item = TypeVar("Item")
 
 
 class Workers:
@@ -25,21 +30,13 @@ class Workers:
     ----------
     count : int
         Of processes.
-    begin : callable, optional
-        Called in each of them first, with `given`.
-    *given
-        Can be sent to another process.
     """
 
-    def __init__(
-        self, count: int, begin: Callable[..., None] | None = None, *given: object
-    ) -> None:
+    def __init__(self, count: int) -> None:
         context = get_context("spawn")
         line, self._end = context.Pipe(duplex=False)
         self._line = line  # open here too: a process that starts later gets it
-        self._pool = ProcessPoolExecutor(
-            count, context, initializer=_live, initargs=(line, begin, given)
-        )
+        self._pool = ProcessPoolExecutor(count, context, initializer=_live, initargs=(line,))
 
     def submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
         """Have something computed.
@@ -53,6 +50,35 @@ class Workers:
             return self._pool.submit(do, *given)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def each(
+        self, do: Callable[[Item], Any], items: Iterable[Item], keep: Callable[[Item, Any], None]
+    ) -> None:
+        """Compute something for each item; each result is kept as soon as it is ready.
+
+        When Ctrl-C interrupts this, the results that are ready are kept, too.
+
+        Raises
+        ------
+        ComputationError
+            A process was ended from outside.
+        """
+        waiting: dict[Future[Any], Item] = {}
+        try:
+            waiting = {self.submit(do, item): item for item in items}
+            for future in as_completed(list(waiting)):
+                keep(waiting.pop(future), future.result())
+        except BrokenProcessPool:
+            raise ComputationError(
+                "a process that computes was ended from outside: perhaps for lack of memory, then "
+                "the same command goes on with what is left; or, in a script, because this was not "
+                'called below if __name__ == "__main__":'
+            ) from None
+        except KeyboardInterrupt:
+            for future, item in waiting.items():
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    keep(item, future.result())
+            raise
 
     def stop(self) -> None:
         """End all processes at once, whatever they compute."""
@@ -69,14 +95,12 @@ class Workers:
         self._line.close()
 
 
-def _live(line: Connection, begin: Callable[..., None] | None, given: tuple[Any, ...]) -> None:
+def _live(line: Connection) -> None:
     """Begin a process that ends when the line does."""
     Thread(target=_follow, args=(line,), daemon=True).start()
     _arm(line)
     if line.poll():  # it ended before that
         os._exit(1)
-    if begin is not None:
-        begin(*given)
 
 
 def _follow(line: Connection) -> None:

@@ -57,7 +57,7 @@ def scratch(folder: Path, name: str) -> Iterator[Path]:
 
 
 def remove_leftovers(*folders: Path) -> None:
-    """Remove what `whole` and `scratch` of processes that are no more have left in folders."""
+    """Remove what `whole` and `scratch` of dead processes have left in folders."""
     for folder in folders:
         with suppress(OSError):
             for path in list(folder.iterdir()):
@@ -80,7 +80,7 @@ def _remove(path: Path) -> None:
 
 
 def _alive(process: int) -> bool:
-    """Whether a process runs; where that cannot be told, its files are held open and so kept."""
+    """Whether a process runs; where this is unknown, files in use are held open and so kept."""
     if os.name != "posix":
         return False
     try:

@@ -87,7 +87,7 @@ def test_everything_that_can_be_said(read) -> None:
         "steps": 30,
         "first_step": 0.01,
         "constant": (1,),
-        "until": Reached(7, "x", 0.02),
+        "until": Reached(node=7, axis="x", displacement=0.02),
         "inertia_relief": False,
         "settings": Settings(tolerance=1e-10, largest_turn=3.0, stability=False),
     }
@@ -114,7 +114,7 @@ def test_moved_supports_are_shown_where_nothing_is_loaded(read) -> None:
 def test_where_a_path_ends() -> None:
     u = np.zeros((3, 3))
     for goal in (0.2, -0.2):
-        reached = Reached(1, "z", goal)
+        reached = Reached(node=1, axis="z", displacement=goal)
         for moved, answer in ((0.0, False), (0.19, False), (0.2, True), (0.3, True), (-0.3, False)):
             u[1, 2] = moved * np.sign(goal)
             assert reached(u, 1.0) is answer
@@ -216,7 +216,7 @@ BAD = {
     ),
     "until nowhere": (
         [('"statics"', '"statics"\nuntil = { node = 7, axis = "x", displacement = 0 }')],
-        "analysis.until.displacement = 0: the path begins there; give where it shall end",
+        "analysis.until.displacement = 0: the path begins there; say where it ends",
     ),
     "history of a load": (
         [("force = [1, 0, 0]", 'force = [1, 0, 0]\nhistory = { kind = "step" }')],
@@ -257,7 +257,7 @@ BAD = {
     ),
     "no shapes": (
         [('"statics"', '"statics"\n[output]\nshapes = 0')],
-        "output.shapes = 0: give 1 to 12 shapes, or a list of points",
+        "output.shapes = 0: give 1 to 12 shapes, or a list of point numbers",
     ),
     "too many shapes": (
         [('"statics"', f'"statics"\n[output]\nshapes = {list(range(13))}')],

@@ -175,7 +175,7 @@ BAD = {
     ),
     "no modes shown": (
         [('"modes"', '"modes"\n[output]\nshapes = 0')],
-        "output.shapes = 0: give 1 to 12 modes, or a list of their numbers",
+        "output.shapes = 0: give 1 to 12 modes, or a list of mode numbers",
     ),
     "mode 0": (
         [('"modes"', '"modes"\n[output]\nshapes = [0, 1]')],

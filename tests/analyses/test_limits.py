@@ -7,8 +7,7 @@ import warnings
 
 import pytest
 
-from foldyn.analyses import limits
-from foldyn.analyses.reading import read_case
+from foldyn.analyses.reading import check_values, read_case
 from foldyn.errors import InputError
 
 CASE = """
@@ -202,5 +201,5 @@ def test_no_message_is_long(what, tmp_path):
 def test_limits_are_checked_deep_and_in_order():
     document = {"a": {"b": [1, {"c": 2**63}]}, "d": 10**400}
     with pytest.raises(InputError, match=r"^a\.b\[1\]\.c = 9223372036854775808: must be"):
-        limits.check_values(document)
-    limits.check_values({"a": [1e-300, {"b": float("nan")}], "c": True, "d": "x"})
+        check_values(document)
+    check_values({"a": [1e-300, {"b": float("nan")}], "c": True, "d": "x"})

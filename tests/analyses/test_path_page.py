@@ -50,7 +50,7 @@ def test_loads_that_are_constant_are_named(tmp_path):
     text = loads + '[analysis]\nkind = "statics"\nconstant = "gravity"\nsteps = 2\n'
     path, page = write(tmp_path, text)
     assert path.attrs["constant"].tolist() == [1]
-    assert "above, but for loads 1, which act in full all along." in page
+    assert "above, except load 1 (in full throughout)." in page
 
 
 def test_there_and_back(tmp_path):

@@ -11,7 +11,7 @@ from foldyn.analyses import read_case
 from foldyn.analyses.frf_page import driven_direction
 from foldyn.analyses.modes import shown_modes
 from foldyn.linear import peaks_of
-from foldyn.plots.responses import curves_of
+from foldyn.plots.frf import curves_of
 
 SHEET = """
 [pattern]

@@ -88,8 +88,8 @@ def test_conversion_rounds_once(table) -> None:
 
 
 BAD = {
-    "empty": ("", "holds no lines but empty ones and comments"),
-    "comments only": ("# time [s],factor\n", "holds no lines but empty ones"),
+    "empty": ("", "holds only empty lines and comments"),
+    "comments only": ("# time [s],factor\n", "holds only empty lines"),
     "no header": ("0,0\n1,1\n", "line 1: holds numbers, no names; begin with a line that names"),
     "header in a comment": ("# time [s],f\n0,0\n1,1\n", "line 2: holds numbers, no names"),
     "one column": ("time [s]  force\n0 0\n1 1\n", 'line 1: "time [s]  force" is one column'),
@@ -97,9 +97,9 @@ BAD = {
     "empty unit": ("time [],f\n0,0\n1,1\n", 'column "time []": has no unit of time'),
     "unit of time": (
         "time [h],f\n0,0\n1,1\n",
-        'column "time [h]": [h] is no unit of time; use one of s, ms, us, m',
+        'column "time [h]": [h] is not a unit of time; use one of s, ms, us, m',
     ),
-    "force as time": ("F [N],t [s]\n0,0\n1,1\n", 'column "F [N]": [N] is no unit of time'),
+    "force as time": ("F [N],t [s]\n0,0\n1,1\n", 'column "F [N]": [N] is not a unit of time'),
     "force as factor": (
         "t [s],F [mN]\n0,0\n1,1\n",
         'column "F [mN]": is a force, but a history is a factor without unit; say unit = "mN"',
@@ -152,8 +152,14 @@ def test_a_bad_file_gets_one_message(table, tmp_path, name) -> None:
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ({"time": "zeit"}, 'time = "zeit": is no column; there are "time [s]", "force [N]", "no"'),
-        ({"value": "forse"}, "value = \"forse\": is no column; did you mean 'force'? there"),
+        (
+            {"time": "zeit"},
+            'time = "zeit": no such column; there are "time [s]", "force [N]", "no"',
+        ),
+        (
+            {"value": "forse"},
+            "value = \"forse\": no such column; did you mean 'force'? the",
+        ),
         ({"value": "time"}, 'time and value: are both the column "time [s]"'),
         ({"time": "force [N]"}, 'time and value: are both the column "force [N]"'),
         ({"value": "no", "unit": "N"}, 'column "no": has no unit, unit = "N" asks for a force'),

@@ -214,7 +214,7 @@ REFUSED = {
     ),
     "first step": (
         [("load_factors = [0, 0.5, 1]", "first_step = 0.1")],
-        "analysis.first_step: method 'newton' goes by load_factors or steps; leave it out",
+        "analysis.first_step: method 'newton' is driven by load_factors or steps; leave it out",
     ),
     "constant": (
         [("load_factors = [0, 0.5, 1]", 'constant = "gravity"')],

@@ -9,6 +9,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.cli.main import main
+from foldyn.structures.discretize import PER_NODE
 
 cv2 = pytest.importorskip("cv2")
 
@@ -132,3 +133,12 @@ def test_bad_input_gets_one_message_and_nothing_written(inside, capsys, argument
     assert len(said.err.strip().splitlines()) == 1
     assert said.out == ""
     assert sorted(inside.rglob("*")) == before
+
+
+def test_more_than_half_of_the_memory_is_taken_when_forced(inside, monkeypatch, capsys):
+    monkeypatch.setattr("foldyn.memory.memory", lambda: 1.5 * PER_NODE * (25 + 16))
+    command = ["track", "film.mkv", "--model", "case.toml", "--out", "forced.nc", "--no-figures"]
+    assert main(command) == 2
+    assert "a structure of 41 nodes needs about" in capsys.readouterr().err
+    assert not (inside / "forced.nc").exists()
+    assert main([*command, "--force"]) == 0

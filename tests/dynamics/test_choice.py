@@ -8,7 +8,7 @@ from oscillators import MASS, linear_law, oscillator, released
 
 import foldyn as fd
 from foldyn.dynamics import METHODS, prepare
-from foldyn.dynamics.timescale import frequency, vibrating_share
+from foldyn.dynamics.method_choice import frequency, vibrating_share
 from foldyn.studies import find_case
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)

@@ -9,8 +9,7 @@ from scipy import linalg
 
 import foldyn as fd
 from foldyn.dynamics import METHODS, largest_frequency
-from foldyn.dynamics.critical_step import MARGIN
-from foldyn.dynamics.stability import stability_limit
+from foldyn.dynamics.stability import MARGIN, stability_limit
 
 RK4 = METHODS["rk4"].growth
 OMEGA = 4.0

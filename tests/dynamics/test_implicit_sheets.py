@@ -9,7 +9,7 @@ import pytest
 from oscillators import LENGTH, MASS, duffing_law, oscillator
 
 import foldyn as fd
-from foldyn.algebra import choice
+from foldyn.algebra import solvers
 from foldyn.checks import observed_order
 from foldyn.dynamics import METHODS
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -71,8 +71,8 @@ def test_band_and_sparse_matrix_give_the_same_motion(method, mass, monkeypatch):
     case = fd.Case(miura(mass=mass), SUPPORTS, [load], fd.Rayleigh(0.1, 1e-4))
     band = fd.simulate(case, 0.5, method, dt=5e-3)
     assert band.attrs["linear_solver"] == "banded"
-    monkeypatch.setattr(choice, "MOST_SYMMETRIC", 0.0)
-    monkeypatch.setattr(choice, "MOST_UNSYMMETRIC", 0.0)
+    monkeypatch.setattr(solvers, "MOST_SYMMETRIC", 0.0)
+    monkeypatch.setattr(solvers, "MOST_UNSYMMETRIC", 0.0)
     sparse = fd.simulate(case, 0.5, method, dt=5e-3)
     assert sparse.attrs["linear_solver"] == "superlu"
     scale = float(np.abs(band.displacement).max())

@@ -7,8 +7,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
-from foldyn.dynamics.numbering import renumbered
-from foldyn.mechanics import renumber
+from foldyn.mechanics.body import renumbered
+from foldyn.mechanics.model import renumber
 from foldyn.structures import body
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)

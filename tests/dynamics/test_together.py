@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import methods
-from foldyn.dynamics.engine import threads_of
+from foldyn.dynamics.methods import threads_of
 from foldyn.dynamics.system import pack
 from foldyn.errors import InstabilityError, PenetrationError
 

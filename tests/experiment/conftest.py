@@ -25,5 +25,5 @@ def tracked(sharp):
 
     from foldyn.experiment import Placing, Tracking, track_film
 
-    how = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
-    return track_film(str(sharp.path), sharp.model, how)
+    tracking = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
+    return track_film(str(sharp.path), sharp.model, tracking)

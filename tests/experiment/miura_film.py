@@ -75,9 +75,9 @@ def make_film(count: int, seed: int = 0, dropped: tuple = (), **sensor: Any) -> 
 def model() -> Any:
     from dataclasses import replace
 
-    from foldyn.experiment import Model
+    from foldyn.experiment import TrackedModel
 
-    at_rest = Model.of(folded(REST))
+    at_rest = TrackedModel.of(folded(REST))
     states = moving_states(np.linspace(REST - 15.0, REST + 15.0, 13))
     return replace(at_rest, rest=moving_states(REST)[0], states=states)
 

@@ -66,7 +66,7 @@ def test_the_fitted_view_and_the_camera_agree():
     ("options", "match"),
     [
         ({"up": "z"}, "same axis"),
-        ({"up": "upwards"}, "no direction"),
+        ({"up": "upwards"}, "choose one of"),
         ({"distance": 0.0}, "distance"),
         ({"metres_per_pixel": -1.0}, "metres_per_pixel"),
         ({"k1": -2000.0}, "fold the image back"),

@@ -11,7 +11,7 @@ import xarray as xr
 
 import foldyn as fd
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes
+from foldyn.experiment import ForceDisplacement, Parameter, Shapes, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 
 MOVED = -np.linspace(0.03, 0.3, 8)
@@ -40,15 +40,15 @@ def forces(path, noise=0.0, **known) -> ForceDisplacement:
     )
 
 
-def histories(path, nodes, noise=0.0, **known) -> History:
+def histories(path, nodes, noise=0.0, **known) -> TimeHistory:
     """Histories that the case file itself gives, with noise."""
     wave = np.tile(np.sin(TIME)[:, None], len(nodes))
-    blank = History(nodes=nodes, time=TIME, values=wave)
+    blank = TimeHistory(nodes=nodes, time=TIME, values=wave)
     (true,) = problem(path, [blank], [ALPHA], {}).predict([0.4])
     true = true.reshape(len(nodes), -1).T
     draw = np.random.default_rng(4)
     values = true + noise * draw.standard_normal(true.shape)
-    return History(nodes=nodes, time=TIME, values=values, **known)
+    return TimeHistory(nodes=nodes, time=TIME, values=values, **known)
 
 
 def test_exact_forces_give_the_parameters_exactly(pressed) -> None:
@@ -134,7 +134,7 @@ def test_damping_from_a_history_scored_on_held_out_nodes(swung) -> None:
 
 def test_held_out_data_do_not_move_the_fit(swung) -> None:
     fitted = histories(swung, [0], 1e-5)
-    wrong = History(nodes=[2], time=TIME, values=np.sin(9.0 * TIME), held_out=True)
+    wrong = TimeHistory(nodes=[2], time=TIME, values=np.sin(9.0 * TIME), held_out=True)
     alone, both = (fd.fit(swung, data, [ALPHA]) for data in ([fitted], [fitted, wrong]))
     assert both.values == alone.values
     assert both.scores[1].rms > 0.1
@@ -267,7 +267,7 @@ def test_a_start_at_which_nothing_can_be_computed(pressed) -> None:
 def test_a_model_that_fails_at_every_start(swung) -> None:
     """The load is so large that panel passes through panel."""
     bad = histories(swung, [0])
-    with pytest.raises(ComputationError, match="no search found an end: "):
+    with pytest.raises(ComputationError, match="no search converged: "):
         fd.fit(swung, [bad], [Parameter("loads[0].force[0]", 50.0, 40.0, 60.0)])
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
+from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 from foldyn.signals import spectrum
 
@@ -17,8 +17,8 @@ SWAY = np.sin(TIME)
 ALPHA = [Parameter("damping.alpha")]
 
 
-def history(**changes) -> History:
-    return History(**{"nodes": [0], "time": TIME, "values": SWAY, **changes})
+def history(**changes) -> TimeHistory:
+    return TimeHistory(**{"nodes": [0], "time": TIME, "values": SWAY, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def motion(swung):
         ({"values": np.where(TIME > 1, np.inf, SWAY)}, "infinite; give NaN where a node was lost"),
         ({"time": TIME[::-1]}, "must be at least two increasing times"),
         ({"time": np.where(TIME > 1, np.nan, TIME)}, "time[21] = nan: must be a finite number"),
-        ({"axis": "w"}, 'axis = "w": must be "x", "y" or "z"'),
+        ({"axis": "w"}, 'axis = "w": choose one of x, y, z'),
         ({"sigma": 0.0}, "sigma = 0.0: must be greater than 0"),
         ({"align": -0.01}, "align = -0.01: must be at least 0"),
         ({"detrend": "mean"}, 'detrend = "mean": choose'),
@@ -78,7 +78,7 @@ def test_forces_and_shapes_are_checked() -> None:
         ([history(nodes=[0, 1])], "values: are of 1 nodes, 2 are named"),
         ([history(nodes=[99])], "node 99 is out of range"),
         ([history(delay=0.1)], "time: 0.1 to 2.05 s, delay included, is not within the motion"),
-        ([history(), history()], "sigma: missing; several measurements are weighed"),
+        ([history(), history()], "sigma: missing; several measurements are weighted"),
         ([ForceDisplacement(displacement=[1], force=[1])], 'needs a case of kind "statics"'),
         ([history(held_out=True)], "0 values that are not held out cannot give 1 parameters"),
         ([history(case="none.toml")], "none.toml: there is no such file"),

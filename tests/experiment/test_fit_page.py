@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.experiment import ForceDisplacement, History, Parameter, Shapes, Spectrum
-from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_histories, plot_shapes
-from foldyn.experiment.calibration.fit_page import write_fit
+from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
+from foldyn.experiment.calibration.fit_page import (
+    plot_correlation,
+    plot_histories,
+    plot_shapes,
+    write_fit,
+)
 from foldyn.experiment.calibration.fit_problem import problem
 
 TIME = np.linspace(0.0, 2.0, 80)
@@ -30,7 +34,7 @@ def fitted(tmp_path_factory):
         ForceDisplacement(displacement=MOVED, force=np.zeros(6), sigma=1e-5, name="forces"),
         Shapes(nodes=[0, 1, 2, 3], load_factor=[0.5, 1.0], values=np.zeros((2, 4, 3)),
                sigma=1e-4, name="corners"),
-        History(nodes=[0, 2], time=TIME, values=wave, sigma=1e-5, name="sway", case=swung,
+        TimeHistory(nodes=[0, 2], time=TIME, values=wave, sigma=1e-5, name="sway", case=swung,
                 detrend="constant"),
     ]  # fmt: skip
     parameters = [

@@ -7,9 +7,7 @@ import pytest
 
 from foldyn.errors import InputError
 from foldyn.experiment import Parameter
-from foldyn.experiment.calibration.key_paths import parts, replaced, value_at
-from foldyn.experiment.calibration.parameters import space
-from foldyn.experiment.calibration.ties import Tie
+from foldyn.experiment.calibration.parameters import Tie, parts, replaced, space, value_at
 
 DOCUMENT = {
     "sheet": {"thickness": 0.01, "length_scale_ratio": 2.0},
@@ -66,7 +64,7 @@ def test_ties_are_arithmetic_on_keys() -> None:
         ("__import__('os').getcwd()", "is no number or key"),
         ("2 ** 3", "2 ** 3 is no number or key"),
         ("1 / 0", "divides by zero"),
-        ("x" + ".a" * 480, "has more than 50 operations in one another"),
+        ("x" + ".a" * 480, "has more than 50 nested operations"),
         ("1" * 1001, "is longer than 1000 characters"),
         ("2 * 0x" + "f" * 900, "is not a finite number"),
         (360, "= 360: must be a text"),

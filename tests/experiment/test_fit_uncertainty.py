@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foldyn.experiment.calibration.uncertainty import uncertainty
+from foldyn.experiment.calibration.fitted import Uncertainty
 
 ONE = np.ones(2)
 FREE = np.zeros(2, dtype=bool)
@@ -19,7 +19,7 @@ def line(n: int = 12) -> np.ndarray:
 def test_standard_errors_are_those_of_linear_regression() -> None:
     jacobian = line()
     residual = np.random.default_rng(0).standard_normal(12)
-    found = uncertainty(jacobian, residual, np.array([1.0, 10.0]), FREE, 0.95)
+    found = Uncertainty.of(jacobian, residual, np.array([1.0, 10.0]), FREE, 0.95)
     cov = np.linalg.inv(jacobian.T @ jacobian) * (residual @ residual) / 10
     np.testing.assert_allclose(found.standard_error, np.sqrt(np.diag(cov)) * [1, 10], rtol=1e-12)
     assert found.correlation[0, 1] == pytest.approx(cov[0, 1] / np.sqrt(cov[0, 0] * cov[1, 1]))
@@ -35,7 +35,7 @@ def test_intervals_contain_the_truth_as_often_as_they_say(confidence) -> None:
     for _ in range(draws):
         noise = draw.standard_normal(6)
         error = np.linalg.lstsq(jacobian, noise, rcond=None)[0]
-        found = uncertainty(jacobian, jacobian @ error - noise, ONE, FREE, confidence)
+        found = Uncertainty.of(jacobian, jacobian @ error - noise, ONE, FREE, confidence)
         inside += int(abs(error[1]) < found.half_width[1])
     spread = 3.0 * np.sqrt(draws * confidence * (1.0 - confidence))
     assert abs(inside - confidence * draws) < spread
@@ -45,7 +45,7 @@ def test_a_direction_that_is_not_seen_takes_its_parameters_with_it() -> None:
     seen = 100.0 * line()
     jacobian = np.column_stack([seen[:, 0], seen[:, 1], 2.0 * seen[:, 1]])  # only their sum counts
     residual = np.random.default_rng(1).standard_normal(12)
-    found = uncertainty(jacobian, residual, np.ones(3), np.zeros(3, dtype=bool), 0.95)
+    found = Uncertainty.of(jacobian, residual, np.ones(3), np.zeros(3, dtype=bool), 0.95)
     assert found.determined.tolist() == [True, False, False]
     assert np.isfinite(found.standard_error[0])
     assert np.isinf(found.standard_error[1:]).all()
@@ -57,18 +57,18 @@ def test_a_direction_that_is_not_seen_takes_its_parameters_with_it() -> None:
 def test_what_the_noise_hides_is_not_determined() -> None:
     jacobian = line() * [100.0, 0.1]
     residual = np.random.default_rng(1).standard_normal(12)
-    assert uncertainty(jacobian, residual, ONE, FREE, 0.95).determined.tolist() == [True, False]
-    assert uncertainty(jacobian, 1e-3 * residual, ONE, FREE, 0.95).determined.all()
+    assert Uncertainty.of(jacobian, residual, ONE, FREE, 0.95).determined.tolist() == [True, False]
+    assert Uncertainty.of(jacobian, 1e-3 * residual, ONE, FREE, 0.95).determined.all()
 
 
 def test_nothing_seen_at_all() -> None:
-    found = uncertainty(np.zeros((5, 2)), np.ones(5), ONE, FREE, 0.95)
+    found = Uncertainty.of(np.zeros((5, 2)), np.ones(5), ONE, FREE, 0.95)
     assert not found.determined.any()
 
 
 def test_a_parameter_at_its_bound_counts_as_known() -> None:
     residual = np.random.default_rng(2).standard_normal(12)
-    found = uncertainty(100.0 * line(), residual, ONE, np.array([False, True]), 0.95)
+    found = Uncertainty.of(100.0 * line(), residual, ONE, np.array([False, True]), 0.95)
     assert np.isnan(found.standard_error[1])
     assert found.freedom == 11
     expected = np.sqrt(residual @ residual / 11 / 12) / 100.0
@@ -76,6 +76,6 @@ def test_a_parameter_at_its_bound_counts_as_known() -> None:
 
 
 def test_as_many_values_as_parameters_leave_no_intervals() -> None:
-    found = uncertainty(100.0 * line(2), np.zeros(2), ONE, FREE, 0.95)
+    found = Uncertainty.of(100.0 * line(2), np.zeros(2), ONE, FREE, 0.95)
     assert found.freedom == 0
     assert np.isnan(found.half_width).all()

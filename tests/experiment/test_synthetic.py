@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.experiment import Look, Sensor, film_of, photos_of, refine, write_film
-from foldyn.experiment.rendering.paper import two_colors
+from foldyn.experiment.rendering.picture import two_colors
 
 
 def test_the_same_seed_gives_the_same_film():

@@ -19,7 +19,7 @@ PAGE = (DOCS / "tracking.md").read_text("utf-8")
 def test_every_option_has_a_row():
     (commands,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
     options = {name for a in commands.choices["track"]._actions for name in a.option_strings}
-    common = {"-h", "--help", "--out", "--no-figures", "--quiet"}
+    common = {"-h", "--help", "--out", "--no-figures", "--quiet", "--force"}
     rows = "".join(line.split(" | ")[0] for line in PAGE.splitlines() if line.startswith("| `--"))
     assert set(re.findall(r"--[a-z]+", rows)) == options - common
 

@@ -12,10 +12,10 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.experiment import (
     Camera,
-    Model,
     Parameter,
     Placing,
     Sensor,
+    TrackedModel,
     Tracking,
     film_of,
     photos_of,
@@ -78,7 +78,7 @@ kind = "statics"
 """  # fmt: skip
 
 
-def camera(model: Model) -> Camera:
+def camera(model: TrackedModel) -> Camera:
     middle = 0.5 * (model.rest.min(axis=0) + model.rest.max(axis=0))
     middle[2] = model.rest[:, 2].max()
     return Camera.looking_at(middle, DISTANCE, SCALE, SIZE, turned=(1.5, -1.0, 0.8))
@@ -97,7 +97,7 @@ def filmed(tmp_path_factory):
     """A case file; beside it film.nc and film.csv, the tracks of a film of its motion."""
     folder = tmp_path_factory.mktemp("filmed")
     path, case, arguments = written(folder, SWAYS, "sways.toml")
-    model = Model.of(case)
+    model = TrackedModel.of(case)
     motion = fd.simulate(case, **arguments)
     film = film_of(
         motion, camera(model), RATE, 0.24, sensor=Sensor(samples=8), dropped=(DROPPED,)
@@ -116,7 +116,7 @@ def photographed(tmp_path_factory):
     path, case, _ = written(folder, HANGS, "hangs.toml")
     bent = fd.trace(case, method="newton", load_factors=FACTORS)
     steps = [int(np.argmin(np.abs(bent["load_factor"].values - f))) for f in FACTORS]
-    model = Model.of(bent)
+    model = TrackedModel.of(bent)
     pictures, _ = photos_of(bent, steps, camera(model), sensor=Sensor(samples=8))
     files = [folder / f"load{k}.png" for k in range(len(FACTORS))]
     for file, picture in zip(files, pictures, strict=True):
@@ -199,9 +199,9 @@ def test_what_tracks_cannot_say(filmed, photographed, ending):
         recognize(photos)
     with pytest.raises(InputError, match="load factor of each of its 3 photographs"):
         shapes(photos, load_factor=[1.0])
-    with pytest.raises(InputError, match="node 70 was not tracked"):
+    with pytest.raises(InputError, match="node 70 was not measured"):
         shapes(photos, nodes=[70], load_factor=FACTORS)
-    with pytest.raises(InputError, match=rf"film\.{ending}: axis = \"w\": must be"):
+    with pytest.raises(InputError, match=rf"film\.{ending}: axis = \"w\": choose"):
         history(film, [6], axis="w")
     with pytest.raises(InputError, match="z"):  # the line of sight
         recognize(film, axis="z")

@@ -19,7 +19,7 @@ from fuzz_target import Target
 import foldyn as fd
 from foldyn.dynamics import initial_state
 from foldyn.errors import InputError
-from foldyn.experiment import Model, load_tracks, save_tracks
+from foldyn.experiment import TrackedModel, load_tracks, save_tracks
 from foldyn.experiment.calibration.measured_files import recognize, shapes
 from foldyn.results import frf_dataset, netcdf, trajectory_dataset
 
@@ -232,7 +232,7 @@ _OF_PARTS = [_remove, _rename, _replace, _replace, _number, _number, _text, _tex
 def read_result(file: Path) -> None:
     """All that is made of a result from a file: each of it must refuse by itself."""
     ds = fd.load(file)
-    for make in (fd.case_of, initial_state, Model.of):
+    for make in (fd.case_of, initial_state, TrackedModel.of):
         try:
             make(ds)
         except InputError:

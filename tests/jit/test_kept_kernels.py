@@ -19,10 +19,9 @@ from llvmlite.binding import Linkage
 from numba import typeof
 
 from foldyn.errors import FoldynWarning
-from foldyn.jit import folder as folder_module
 from foldyn.jit import kept, sources
 from foldyn.jit.compiled import kernel, ready
-from foldyn.jit.folder import REMEDY, folder_for
+from foldyn.jit.kept import REMEDY, folder_for
 
 posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have owners on POSIX only")
 _numbers = itertools.count()
@@ -31,7 +30,7 @@ _numbers = itertools.count()
 @pytest.fixture
 def kernels(tmp_path, monkeypatch):
     """Makes kernels from text, as importing a module in a folder of its own does."""
-    monkeypatch.setattr(folder_module.config, "CACHE_DIR", "")
+    monkeypatch.setattr(kept.config, "CACHE_DIR", "")
     path = tmp_path / "double.py"
 
     def make(text: str = "return 2.0 * x"):
@@ -111,7 +110,7 @@ def test_a_full_disk_is_told_and_does_no_harm(kernels, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    folder_module.tell.cache_clear()
+    kept._warn.cache_clear()
     monkeypatch.setattr(kept.os, "replace", full)
     function = kernels()
     with pytest.warns(FoldynWarning, match="No space left on device; set NUMBA_CACHE_DIR"):
@@ -152,14 +151,15 @@ def folders(tmp_path, monkeypatch):
     found = {name: tmp_path / name for name in ("sources", "named", "home", "temporary")}
     for path in found.values():
         path.mkdir()
-    monkeypatch.setattr(folder_module.config, "CACHE_DIR", str(found["named"]))
+    monkeypatch.setattr(kept.config, "CACHE_DIR", str(found["named"]))
     monkeypatch.setenv("XDG_CACHE_HOME", str(found["home"]))
-    monkeypatch.setattr(folder_module.AppDirs, "user_cache_dir", str(found["home"]))
-    monkeypatch.setattr(folder_module.tempfile, "tempdir", str(found["temporary"]))
-    for cached in (folder_module.folder_for, folder_module.tell, folder_module._private):
+    monkeypatch.setattr(kept.AppDirs, "user_cache_dir", str(found["home"]))
+    monkeypatch.setattr(kept.tempfile, "tempdir", str(found["temporary"]))
+    remembering = (kept.folder_for, kept._warn, kept._private)
+    for cached in remembering:
         cached.cache_clear()
     yield found
-    for cached in (folder_module.folder_for, folder_module.tell, folder_module._private):
+    for cached in remembering:
         cached.cache_clear()
 
 
@@ -172,7 +172,7 @@ def spoil(path: Path) -> None:
 def test_the_first_folder_that_can_be_written(folders, recwarn):
     sources = folders["sources"]
     assert folder_for(sources).parent == folders["named"]
-    folder_module.config.CACHE_DIR = ""
+    kept.config.CACHE_DIR = ""
     folder_for.cache_clear()
     assert folder_for(sources) == sources / "__pycache__"
     spoil(sources / "__pycache__")
@@ -201,7 +201,7 @@ def test_a_folder_for_temporary_files_is_the_users_alone(folders):
     assert found.parent.parent == folders["temporary"]
     assert stat.S_IMODE(found.parent.stat().st_mode) == 0o700
     folder_for.cache_clear()
-    folder_module._private.cache_clear()
+    kept._private.cache_clear()
     assert folder_for(folders["sources"]) == found  # the next process finds it again
 
 
@@ -221,7 +221,7 @@ def test_a_folder_that_others_may_have_filled_is_not_taken(folders, trap, monkey
     if trap == "of another user":
         me = os.getuid()
         answers = itertools.chain([me], itertools.repeat(me + 1))
-        monkeypatch.setattr(folder_module.os, "getuid", lambda: next(answers))
+        monkeypatch.setattr(kept.os, "getuid", lambda: next(answers))
     with pytest.warns(FoldynWarning, match=REMEDY):
         found = folder_for(folders["sources"])
     assert not found.is_relative_to(usual)

@@ -29,7 +29,7 @@ for path in doors:
     for name in [name for name in sys.modules if name.startswith("foldyn.")]:
         if name != "foldyn.errors":
             del sys.modules[name]
-assert len(doors) > 10 and "numba" not in sys.modules
+assert len(doors) > 8 and "numba" not in sys.modules
 """
 
 

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear import eigen
-from foldyn.linear.pencil import Pencil
+from foldyn.linear.eigen import Pencil
 
 N = 150
 SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(

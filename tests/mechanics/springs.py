@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import foldyn as fd
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.jit.compiled import kernel
 from foldyn.materials import hinge_law
-from foldyn.mechanics.blocks import SparseBlocks
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
+from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.mechanics.threads import Team, team
 from foldyn.structures.discretized import Discretized
 

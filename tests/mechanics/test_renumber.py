@@ -10,7 +10,7 @@ from test_blocks import force_of, random_model
 import foldyn as fd
 from foldyn import mechanics
 from foldyn.materials import CustomHingeLaw
-from foldyn.mechanics.model import GROUP
+from foldyn.mechanics.model import GROUP, node_order, renumber
 from foldyn.mechanics.strips import reach
 
 CUBIC = CustomHingeLaw(
@@ -20,7 +20,7 @@ CUBIC = CustomHingeLaw(
 
 def shuffled(model, seed=0):
     order = np.random.default_rng(seed).permutation(len(model.rest))
-    return order, *mechanics.renumber(model, order)
+    return order, *renumber(model, order)
 
 
 def energies(model, u):
@@ -65,7 +65,7 @@ def test_there_and_back_is_the_model_itself():
     """But for the order of hinges with the same lowest node."""
     model = structure("miura n5b8").model
     order, other, rows = shuffled(model)
-    back, rows_back = mechanics.renumber(other, np.argsort(order))
+    back, rows_back = renumber(other, np.argsort(order))
     old = rows[rows_back]
     assert sorted(old) == list(range(len(model.hinges)))
     np.testing.assert_array_equal(back.rest, model.rest)
@@ -78,26 +78,26 @@ def test_node_order_brings_neighbors_together():
     put all centers after all vertices."""
     pattern = fd.patterns.miura(cells=(30, 8))
     model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01)).model
-    order = mechanics.node_order(model)
+    order = node_order(model)
     assert sorted(order) == list(range(len(model.rest)))
-    other, _ = mechanics.renumber(model, order)
+    other, _ = renumber(model, order)
     assert reach(model) > 1000
     assert reach(other) <= 2 * (17 + 16)
-    again = mechanics.node_order(other)
-    assert reach(mechanics.renumber(other, again)[0]) <= reach(other)
+    again = node_order(other)
+    assert reach(renumber(other, again)[0]) <= reach(other)
 
 
 def test_node_order_keeps_numbers_that_are_good():
     pattern = fd.patterns.kresling(sides=6, storeys=12)
     model = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01)).model
-    np.testing.assert_array_equal(mechanics.node_order(model), np.arange(len(model.rest)))
+    np.testing.assert_array_equal(node_order(model), np.arange(len(model.rest)))
 
 
 def test_node_order_without_bars_or_with_parts_that_do_not_touch():
     apart = random_model(0, 3, 3)
-    assert sorted(mechanics.node_order(apart)) == list(range(60))
+    assert sorted(node_order(apart)) == list(range(60))
     some = random_model(5, 0, 0)
-    assert sorted(mechanics.node_order(some)) == list(range(60))
+    assert sorted(node_order(some)) == list(range(60))
 
 
 def test_elements_stand_by_groups_of_lowest_nodes_and_apart_within():

@@ -14,13 +14,14 @@ from test_blocks import random_model
 
 import foldyn as fd
 from foldyn import mechanics
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
+from foldyn.jit.intrinsics import borrowed
 from foldyn.materials import CustomHingeLaw
 from foldyn.mechanics import force as force_module
 from foldyn.mechanics import threads as threads_module
+from foldyn.mechanics.model import node_order, renumber
 from foldyn.mechanics.strips import reach, shares, strips
-from foldyn.mechanics.threads import BROKEN, run_together, team, wait
+from foldyn.mechanics.threads import BROKEN, part, run_together, team, wait
 
 # relative to the norm of the force: sums of some ten numbers in another order
 ROUNDING = 1e-14
@@ -62,7 +63,7 @@ def sheet(cells, laws="mixed"):
     s = fd.discretize(
         fd.patterns.miura(cells=cells, dihedral=100), fd.Sheet(1e6, 0.25, 0.01), **LAWS[laws]
     )
-    model, _ = mechanics.renumber(s.model, mechanics.node_order(s.model))
+    model, _ = renumber(s.model, node_order(s.model))
     u = np.random.default_rng(0).uniform(-0.02, 0.02, model.rest.shape)
     return model, u
 
@@ -151,14 +152,14 @@ def test_every_element_and_node_belongs_to_one_strip(monkeypatch):
         lowest = np.concatenate([part.lowest for part in parts])
         covered = np.concatenate([np.arange(a, b) for a, b in lowest])
         assert sorted(covered) == list(range(n))
-        for part in parts:
-            done = part.finished[part.edge :]
+        for one in parts:
+            done = one.finished[one.edge :]
             assert np.concatenate([np.arange(a, b) for a, b in done]).tolist() == list(
-                range(*part.own)
+                range(*one.own)
             )
             # no strip touches more nodes than the buffers have rows
-            low = np.minimum(part.lowest[:, 0], part.finished[:, 0])
-            assert (part.fresh[:, 1] - low).max() <= part.rows
+            low = np.minimum(one.lowest[:, 0], one.finished[:, 0])
+            assert (one.fresh[:, 1] - low).max() <= one.rows
 
 
 def test_work_is_shared_evenly():
@@ -223,7 +224,7 @@ def wait_once(member):
 
 @shared
 def shares_of(member, count):
-    return mechanics.part(member, count)
+    return part(member, count)
 
 
 def test_parts_of_a_count_follow_each_other():

@@ -14,7 +14,7 @@ from foldyn.plots import animate_modes, draw_modes, plot_mac
 from foldyn.plots.modes import chosen_modes, describe_mode
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
-from foldyn.results.modes import modes_dataset
+from foldyn.results import modes_dataset
 
 EIGENVALUE = np.array([0.0, -4.0, 0.0, (2 * np.pi * 3.8) ** 2, (2 * np.pi * 12.0) ** 2])
 RIGID = np.array([True, False, False, False, False])
@@ -220,9 +220,9 @@ def test_a_large_mac_matrix_has_no_numbers():
         (lambda case, modes: draw_modes(case, modes, [6]), "which: 6; there are modes 1 to 5"),
         (lambda case, modes: draw_modes(case, modes, [0]), "which: 0; there are modes 1 to 5"),
         (lambda case, modes: draw_modes(case, modes, [1] * 13), "13 modes; one figure shows at"),
-        (lambda case, modes: draw_modes(case, modes, amplitude=0.0), "amplitude: 0.0; give a pos"),
+        (lambda case, modes: draw_modes(case, modes, amplitude=0.0), "amplitude = 0.0: must be"),
         (lambda case, modes: draw_modes(case, modes.isel(node=slice(9)), names={}), "9 nodes, the"),
-        (lambda case, modes: draw_modes(case, modes.drop_vars("shape")), "have no shape"),
+        (lambda case, modes: draw_modes(case, modes.drop_vars("shape")), "has no shape"),
         (lambda case, modes: plot_mac([1.0]), "shape .1,.; give a matrix"),
         (lambda case, modes: plot_mac([[1.5]]), "not between 0 and 1"),
         (lambda case, modes: plot_mac([[np.nan]]), "not between 0 and 1"),
@@ -237,6 +237,6 @@ def test_bad_input(case, modes, call, words):
 def test_bad_films(case, modes, tmp_path):
     with pytest.raises(InputError, match=r"\.gif or \.mp4"):
         animate_modes(case, modes, tmp_path / "modes.avi")
-    with pytest.raises(InputError, match="frames: 1"):
+    with pytest.raises(InputError, match="frames = 1"):
         animate_modes(case, modes, tmp_path / "modes.gif", frames=1)
     assert not list(tmp_path.iterdir())

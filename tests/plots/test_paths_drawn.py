@@ -21,7 +21,7 @@ from foldyn.plots import (
     style,
     total_reaction,
 )
-from foldyn.plots.along import evenly, main_direction, runs, way
+from foldyn.plots.along import evenly, main_direction, stretches, way
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.results import path_dataset
@@ -221,7 +221,7 @@ def test_the_way_of_the_nodes(path):
 
 
 def test_runs_of_stability(path):
-    assert [tuple(run) for run in runs(path)] == [(0, 2, True), (2, 6, False), (6, 7, True)]
+    assert [tuple(part) for part in stretches(path)] == [(0, 2, True), (2, 6, False), (6, 7, True)]
 
 
 def sheets(figure):
@@ -353,10 +353,7 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
         (lambda case, path: plot_load_displacement(path, [7]), "paths: give a mapping"),
         (lambda case, path: plot_load_displacement({"a": path}, []), "nodes: empty"),
         (lambda case, path: plot_load_displacement({"a": path}, [13]), "13 is not in 'a'"),
-        (
-            lambda case, path: plot_load_displacement({"a": path}, [7], "w"),
-            'direction = "w": must be',
-        ),
+        (lambda case, path: plot_load_displacement({"a": path}, [7], "w"), 'direction = "w"'),
         (
             lambda case, path: plot_reaction({"a": path}, [7], "z"),
             "no support holds node 7 along z",
@@ -365,7 +362,7 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
         (lambda case, path: draw_shapes(case, path, []), "points: empty"),
         (lambda case, path: draw_shapes(case, path, 0), "points: 0; give at least one"),
         (lambda case, path: draw_shapes(case, path.isel(node=slice(9))), "9 nodes, the structure"),
-        (lambda case, path: plot_path_energies(path.drop_vars("point")), "path: is no path"),
+        (lambda case, path: plot_path_energies(path.drop_vars("point")), "path: is not a path"),
         (lambda case, path: energy_shares(path.where(path.step < 3)), "NaN"),
     ],
 )
@@ -375,5 +372,5 @@ def test_bad_input(case, path, call, words):
 
 
 def test_motions_are_no_paths(case, trajectory):
-    with pytest.raises(InputError, match="is no path"):
+    with pytest.raises(InputError, match="is not a path"):
         plot_load_displacement({"a": trajectory}, [7])

@@ -271,12 +271,12 @@ def test_without_a_circle_the_whole_curve_is_drawn(case):
         (lambda r: plot_frf(r, [7]), "response"),
         (lambda r: plot_frf({"a": r}, []), "nodes: empty"),
         (lambda r: plot_frf({"a": r}, [13]), "13 is not in 'a', whose nodes are 0..12"),
-        (lambda r: plot_frf({"a": r}, [7], "w"), "axes: 'w' is no direction"),
+        (lambda r: plot_frf({"a": r}, [7], "w"), 'axes = "w"'),
         (lambda r: plot_frf({"a": r}, [7, 6], ["x", "y", "z"]), "3 directions for 2 nodes"),
         (lambda r: plot_frf({"a": r}, [7], "x", "speed"), "quantity: 'speed'; the response has"),
-        (lambda r: plot_frf({"a": r}, [7], prominence=1.0), "prominence: 1.0"),
+        (lambda r: plot_frf({"a": r}, [7], prominence=1.0), "prominence = 1.0: must be"),
         (lambda r: plot_nyquist(r, 13), "13 is not in"),
-        (lambda r: plot_nyquist(r, 7, "w"), "'w' is no direction"),
+        (lambda r: plot_nyquist(r, 7, "w"), '"w": choose one of x, y, z'),
     ],
 )
 def test_bad_input(response, call, words):

@@ -14,8 +14,8 @@ import xarray as xr
 import foldyn as fd
 from foldyn.dynamics import initial_state
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment import Model
-from foldyn.results import netcdf, seal, trajectory_dataset
+from foldyn.experiment import TrackedModel
+from foldyn.results import netcdf, trajectory_dataset
 from foldyn.results.apart import apart
 
 SEAL = 80  # bytes at the end
@@ -52,13 +52,13 @@ def refusal(path) -> str:
 
 def test_every_flipped_bit_shows(file, motion):
     sound = file.read_bytes()
-    assert seal.sound(file)
+    assert netcdf.sound(file)
     random = np.random.default_rng(0)
     for place in [*random.integers(0, len(sound), 60), 0, len(sound) - SEAL - 1, len(sound) - 2]:
         damaged = bytearray(sound)
         damaged[place] ^= 1 << int(random.integers(8))
         file.write_bytes(damaged)
-        if seal.sound(file) is None:  # the seal itself: all before it is sound
+        if netcdf.sound(file) is None:  # the seal itself: all before it is sound
             assert place >= len(sound) - SEAL
             xr.testing.assert_identical(fd.load(file), motion)
         else:
@@ -67,7 +67,7 @@ def test_every_flipped_bit_shows(file, motion):
 
 def test_files_without_a_seal_are_read(file, motion):
     xr.testing.assert_identical(fd.load(unsealed(file)), motion)
-    assert seal.sound(file) is None
+    assert netcdf.sound(file) is None
     motion.to_netcdf(file, engine="h5netcdf")
     xr.testing.assert_identical(fd.load(file), motion)
 
@@ -192,9 +192,13 @@ def test_variables_must_fit_their_dimensions(file):
             lambda ds: ds.transpose(..., "axis", "node"),
             "displacement must be numbers over node, axis; it has float64 over axis, node",
         ),
-        (Model.of, lambda ds: ds.isel(time=[]), "no finite displacements"),
-        (Model.of, lambda ds: ds.assign(displacement=ds["displacement"] * np.nan), "no finite"),
-        (Model.of, lambda ds: ds.assign(rest_position=ds["displacement"]), "rest|damaged"),
+        (TrackedModel.of, lambda ds: ds.isel(time=[]), "no finite displacements"),
+        (
+            TrackedModel.of,
+            lambda ds: ds.assign(displacement=ds["displacement"] * np.nan),
+            "no finite",
+        ),
+        (TrackedModel.of, lambda ds: ds.assign(rest_position=ds["displacement"]), "rest|damaged"),
     ],
 )
 def test_what_is_made_of_a_result_checks_it(make, change, text, motion):

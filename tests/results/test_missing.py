@@ -11,7 +11,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.cli.main import main
-from foldyn.results.missing import REASONS, told
+from foldyn.results.quantities import REASONS, missing_values
 
 DOCS = (Path(__file__).parents[2] / "docs" / "results.md").read_text("utf-8")
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
@@ -58,8 +58,10 @@ def test_rigid_modes_have_no_damping_ratio(tmp_path):
     stored = fd.load(tmp_path / "modes.nc")
     assert stored.damping_ratio.attrs["missing"] == REASONS["damping_ratio"]
     assert "missing" not in stored.frequency.attrs
-    assert list(told(stored)) == ["damping_ratio"]
-    assert told(stored)["damping_ratio"].startswith("6 of 8 values are missing (nan): a rigid")
+    assert list(missing_values(stored)) == ["damping_ratio"]
+    assert missing_values(stored)["damping_ratio"].startswith(
+        "6 of 8 values are missing (nan): a rigid"
+    )
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
@@ -94,10 +96,10 @@ def test_the_command_says_what_is_missing(text, kind, words, tmp_path, monkeypat
 
 def test_any_other_nan_is_a_failure(tmp_path, monkeypatch, capsys):
     from foldyn.linear import modes
-    from foldyn.results import missing
+    from foldyn.results import quantities
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(missing, "REASONS", {})
+    monkeypatch.setattr(quantities, "REASONS", {})
     (tmp_path / "case.toml").write_text(FREE)
     assert modes is fd.modes
     assert main(["modes", "case.toml", "--no-figures"]) == 1

@@ -9,7 +9,7 @@ from shell_lab import at_rest, forces, random_state, split, tangent
 import foldyn as fd
 from foldyn.checks import gradient_error, tangent_error
 from foldyn.shells import shell
-from foldyn.shells.step_tangent import add_extrapolated_strain
+from foldyn.shells.tangent import add_extrapolated_strain
 
 # thick, with stiff creases: the three parts of the energy are of one size at the states below,
 # so that an error in one of them cannot hide behind another
@@ -149,7 +149,7 @@ def test_tangent_is_symmetric(model):
 
 def test_pattern_of_the_tangent(model):
     """Columns ascend, none twice; symmetric; the dofs of a triangle and its neighbors only."""
-    found = model.sparsity
+    found = model.body.sparsity
     size = model.nodes.size + model.rotations
     assert found.size == size == len(found.indptr) - 1
     assert found.indptr[-1] == len(found.indices)
@@ -163,7 +163,7 @@ def test_pattern_of_the_tangent(model):
 
 def test_addresses_take_little_memory():
     """At 1e5 triangles the tables of addresses stay far below the matrix (some 2 kB a triangle)."""
-    found = shell(fd.patterns.miura(), THICK, divisions=8).sparsity
+    found = shell(fd.patterns.miura(), THICK, divisions=8).body.sparsity
     tables = sum(table.nbytes for table in found[3:])
     assert tables / len(found.triangle) < 450
 
@@ -184,7 +184,7 @@ def test_extrapolated_strain(model):
     u0, u = split(model, before)[0], split(model, now)[0]
     matrix = tangent(model, now)
     expected = matrix.toarray()
-    add_extrapolated_strain(model.model, model.sparsity, u, u0, matrix.data)
+    add_extrapolated_strain(model.model, model.body.sparsity, u, u0, matrix.data)
     for t, tri in enumerate(model.triangles):
         ends = [(tri[k], tri[(k + 1) % 3]) for k in range(3)]
         gap2 = [np.sum(((u - u0)[b] - (u - u0)[a]) ** 2) for a, b in ends]

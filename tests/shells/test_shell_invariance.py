@@ -132,7 +132,7 @@ def test_a_crease_that_pushes_harder_the_further_it_is_has_no_balance():
         slope_of=lambda theta, rest: -1.0,
     )
     s = shell(MODELS["simple fold"](), SHEET, divisions=1, crease_stiffness=1e6, fold_law=law)
-    with pytest.raises(ComputationError, match="find no balance"):
+    with pytest.raises(ComputationError, match="do not balance"):
         s.internal_force(split(s, random_state(s))[0])
 
 

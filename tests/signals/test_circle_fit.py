@@ -150,7 +150,7 @@ HOLE = np.where(F == 9.0, np.nan, H)
         ((F, H[:-1]), "response: shape"),
         ((F[::-1], H), "must increase"),
         ((F, H, (9.0, 9.5)), "band: 3 points between 9 and 9.5 Hz"),
-        ((F, H, (9.0, 12.0), "velocity"), "quantity: 'velocity'"),
+        ((F, H, (9.0, 12.0), "velocity"), 'quantity = "velocity"'),
         ((F, HOLE, (7.0, 12.0)), "first at 9 Hz"),
         ((F, np.ones(81) + 0j, (7.0, 12.0), "mobility"), "constant in the band"),
     ],

@@ -66,8 +66,8 @@ def test_transmissibility_is_the_same_of_all_quantities():
 @pytest.mark.parametrize(
     ("function", "arguments", "words"),
     [
-        (convert_response, (F, H, "receptance", "inertance"), "target: 'inertance'"),
-        (convert_response, (F, H, "flexibility", "mobility"), "source: 'flexibility'"),
+        (convert_response, (F, H, "receptance", "inertance"), 'target = "inertance"'),
+        (convert_response, (F, H, "flexibility", "mobility"), 'source = "flexibility"'),
         (convert_response, (F, H[:-1], "mobility", "receptance"), "response: shape"),
         (convert_response, (F[::-1], H, "mobility", "receptance"), "frequency: must increase"),
         (convert_response, (-F[::-1], H, "mobility", "receptance"), "from 0 Hz"),

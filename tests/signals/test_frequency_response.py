@@ -284,11 +284,11 @@ def test_what_is_left_at_the_end_is_unused():
         ({"response": np.full(100, np.nan)}, "response: 100 samples are NaN"),
         ({"dt": 0.0}, "dt"),
         ({"dt": np.arange(100) * 0.1}, "sampling_interval"),
-        ({"estimator": "h3"}, "estimator: 'h3'"),
+        ({"estimator": "h3"}, 'estimator = "h3"'),
         ({"segment": 101}, "segment: 101"),
         ({"segment": 2}, "segment = 2"),
-        ({"overlap": 1.0}, "overlap: 1.0"),
-        ({"overlap": -0.1}, "overlap: -0.1"),
+        ({"overlap": 1.0}, "overlap = 1.0"),
+        ({"overlap": -0.1}, "overlap = -0.1"),
         ({"window": np.ones(5)}, "window"),
         ({"detrend": "mean"}, "detrend"),
     ],
@@ -302,10 +302,10 @@ def test_bad_input(arguments, words):
 @pytest.mark.parametrize(
     ("function", "arguments", "words"),
     [
-        (exponential_window, (100, 0.1, -1.0), "rate: -1.0 must be finite, above 0"),
+        (exponential_window, (100, 0.1, -1.0), "rate = -1.0: must be greater than 0"),
         (exponential_window, (0, 0.1, 1.0), "n = 0"),
         (without_window, (10.0, 1.2, 1.0), "damping_ratio"),
-        (without_window, (10.0, 0.1, "fast"), 'rate: "fast" is not a finite number'),
+        (without_window, (10.0, 0.1, "fast"), 'rate = "fast": must be a number'),
     ],
 )
 def test_bad_windows(function, arguments, words):

@@ -179,7 +179,7 @@ def test_noise_on_the_curve():
         ({"magnitude": [1.0, np.nan, 1.0, 0.0]}, "first at 1 Hz; cut the curve"),
         ({"magnitude": [0.0, -1.0, 2.0, 1.0]}, "magnitude: below 0"),
         ({"magnitude": ["a"] * 4}, "not an array of numbers"),
-        ({"quantity": "compliance"}, "quantity: 'compliance'"),
+        ({"quantity": "compliance"}, 'quantity = "compliance"'),
     ],
 )
 @pytest.mark.parametrize("function", [find_peaks, half_power])
@@ -191,9 +191,9 @@ def test_bad_input(function, arguments, words):
 
 def test_bad_options():
     f, size = [0.0, 1.0, 2.0, 3.0], [0.0, 2.0, 1.0, 0.0]
-    with pytest.raises(InputError, match=r"prominence: 1\.5"):
+    with pytest.raises(InputError, match=r"prominence = 1\.5"):
         find_peaks(f, size, prominence=1.5)
     with pytest.raises(InputError, match="count = 0"):
         find_peaks(f, size, count=0)
-    with pytest.raises(InputError, match=r"ripple: -0\.1"):
+    with pytest.raises(InputError, match=r"ripple = -0\.1"):
         half_power(f, size, ripple=-0.1)

@@ -102,7 +102,7 @@ def test_a_cubic_spring_shows_its_describing_function():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"frequency": 0.0}, "frequency: 0.0"),
+        ({"frequency": 0.0}, "frequency = 0.0"),
         ({"frequency": 0.3}, "0.999 cycles of 0.3 Hz, and 2 are needed"),
         ({"cycles": 100}, "100 are needed; record longer, or fit fewer cycles"),
         ({"cycles": 1}, "cycles = 1"),

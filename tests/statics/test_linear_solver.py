@@ -7,8 +7,8 @@ import pytest
 from scipy import sparse
 from sheets import compression
 
-from foldyn.algebra.choice import factorizer
 from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.errors import InputError
 from foldyn.statics import SOLVERS, OrigamiProblem, Settings, Solver, trace

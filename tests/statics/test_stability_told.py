@@ -10,8 +10,8 @@ from trusses import APEX, VonMises
 
 import foldyn as fd
 from foldyn.errors import ComputationError, FoldynWarning
-from foldyn.statics import Settings, stability_changes, trace
-from foldyn.statics.station import Point
+from foldyn.statics import Point, Settings, trace
+from foldyn.statics.recording import MOST_LISTED, stability_facts, stability_warning
 
 STEEP = VonMises(h=2.0)  # gives way sideways at 2530 N, before its limit point
 SHALLOW = VonMises()
@@ -101,10 +101,10 @@ def test_a_path_that_begins_unstable_or_regains_stability():
     def points(*counts):
         return [Point(np.zeros(3), 0.1 * k, 1, 0.0, n) for k, n in enumerate(counts)]
 
-    assert "is 2 from the start" in stability_changes.warning(points(2, 2), True, False)
-    assert not stability_changes.warning(points(2, 2), False, False)  # the state was given so
-    assert not stability_changes.warning(points(1, 0), False, False)
-    many = stability_changes.warning(points(0, 1, 0, 3), False, False)
+    assert "is 2 from the start" in stability_warning(points(2, 2), True, False)
+    assert not stability_warning(points(2, 2), False, False)  # the state was given so
+    assert not stability_warning(points(1, 0), False, False)
+    many = stability_warning(points(0, 1, 0, 3), False, False)
     assert "is 0 at the load factor 0, 1 at 0.1, and at 1 more places (up to 3)" in many
-    long = stability_changes.facts(points(*[0, 1] * 40), False)["stability_changes"]
-    assert long.count(";") == stability_changes.MOST_TOLD and long.endswith("and 59 more")
+    long = stability_facts(points(*[0, 1] * 40), False)["stability_changes"]
+    assert long.count(";") == MOST_LISTED and long.endswith("and 59 more")

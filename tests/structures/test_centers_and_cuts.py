@@ -7,7 +7,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.structures.n5b8 import polygon_center, quad_centers
+from foldyn.structures.mesh import polygon_center, quad_centers
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
 DART = [[0, 0], [2, -1], [0.6, 0], [2, 1]]  # reflex at 2

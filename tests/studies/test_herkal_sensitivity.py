@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from pathlib import Path
 
 import pytest
 
+import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.errors import FoldynWarning
 from foldyn.program import digest
@@ -15,18 +17,17 @@ from foldyn.studies.herkal import report, runs, sensitivity, sensitivity_page, v
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import paper_table, tolerance
 from foldyn.studies.herkal.metric import errors
-from foldyn.studies.herkal.models import REFERENCE, Variant, paper_rules, rules
-from foldyn.studies.herkal.program import program, specimen_program
 from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.sensitivity import (
     BEND_LAWS,
     CALIBRATIONS,
     MODELS,
     PULSES,
-    Frequencies,
-    Motions,
+    Comparison,
     tasks,
 )
+from foldyn.studies.herkal.sheet_models import REFERENCE, Variant, paper_rules, rules
+from foldyn.studies.herkal.specimen import tasks as tasks_of_the_specimen
 from foldyn.studies.herkal.variations import (
     Variations,
     frequency_errors,
@@ -40,9 +41,9 @@ SHORT = Numerics(divisions=2, dt=0.01, duration=0.5)
 
 # ---------------------------------------------------------------------- tasks
 def test_tasks_are_all_combinations_of_loads():
-    found = [task for task in tasks(studies.CASES, SHORT) if isinstance(task, Motions)]
+    found = [task for task in tasks(studies.CASES, SHORT) if task.load is not None]
     assert len(set(found)) == len(found) == 4 * 1 + 3 * 4 * 2  # the edge of case 1 is loaded whole
-    assert {(t.pulse, t.loads) for t in found if t.case == "case3"} == set(
+    assert {(t.load.pulse, t.load.loads) for t in found if t.case == "case3"} == set(
         itertools.product(PULSES, ("file", "edge"))
     )
     assert [t.case for t in found[:8]] == ["case4"] * 8
@@ -50,7 +51,7 @@ def test_tasks_are_all_combinations_of_loads():
 
 
 def test_a_task_keeps_the_errors_against_the_shell_under_the_same_load(tmp_path):
-    task = Motions("case2", SHORT, 0.25, "edge")
+    task = Comparison("case2", SHORT, Variant(0.25, "edge"))
     assert not task.there(tmp_path)
     task.make(tmp_path)
     assert task.there(tmp_path)
@@ -68,10 +69,10 @@ def test_a_task_keeps_the_errors_against_the_shell_under_the_same_load(tmp_path)
 
 
 def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
-    task = Frequencies("case1", SHORT)
+    task = Comparison("case1", SHORT)
     task.make(tmp_path)
     assert task.there(tmp_path)
-    assert not Frequencies("case1", Numerics(3)).there(tmp_path)
+    assert not Comparison("case1", Numerics(3)).there(tmp_path)
     with monkeypatch.context() as patched:
         patched.setattr(sensitivity, "program", lambda: "another")
         assert not task.there(tmp_path)
@@ -88,7 +89,9 @@ def test_outdated_and_damaged_results_are_computed_again(tmp_path, monkeypatch):
 
 
 def test_frequencies_are_those_of_partners(tmp_path):
-    rows = list(Frequencies("case1", SHORT).rows())
+    task = Comparison("case1", SHORT)
+    task.make(tmp_path)
+    rows = task.result(tmp_path)
     assert len(rows) == len(MODELS) * 4 * runs.SHELL_MODES
     first = rows[0]
     assert (first["model"], first["mode"]) == (MODELS[0], 1)
@@ -96,7 +99,8 @@ def test_frequencies_are_those_of_partners(tmp_path):
 
 
 def test_the_program_is_told_by_what_computes(tmp_path):
-    assert program() != specimen_program()
+    for name in (*runs.COMPUTING, *tasks_of_the_specimen.COMPUTING):
+        assert (Path(fd.__file__).parent / name).exists(), name
     for name in ("shells/shell.py", "studies/herkal/runs.py", "studies/herkal/report.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("a = 1\n")
@@ -191,8 +195,8 @@ def stored():
 
 
 def test_stored_tables_are_whole(stored):
-    wanted = [t for t in tasks(studies.CASES, SHORT) if isinstance(t, Motions)]
-    keys = {(t.case, t.pulse, t.loads, *laws) for t in wanted
+    wanted = [t for t in tasks(studies.CASES, SHORT) if t.load is not None]
+    keys = {(t.case, t.load.pulse, t.load.loads, *laws) for t in wanted
             for laws in itertools.product(BEND_LAWS, CALIBRATIONS)}  # fmt: skip
     found = [
         tuple(r[k] for k in ("case", "pulse", "loads", "bend_law", "calibration"))
@@ -234,7 +238,7 @@ def test_page_of_the_sensitivity(stored, tmp_path):
 
 def test_the_command_varies_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(studies, "CASES", ("case1",))
-    monkeypatch.setattr(studies, "QUICK", studies.Plan(SHORT))
+    monkeypatch.setattr(studies, "QUICK", studies.StudyPlan(SHORT))
     monkeypatch.setattr(sensitivity, "PULSES", (0.5,))
     monkeypatch.setattr("foldyn.cli.study.PROCESSES", 1)
     monkeypatch.setattr(sensitivity_page, "PULSES", (0.5,))

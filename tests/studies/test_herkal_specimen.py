@@ -14,12 +14,12 @@ from foldyn.analyses import read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.experiment import ForceDisplacement, History
+from foldyn.experiment import ForceDisplacement, TimeHistory
 from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
 from foldyn.studies.herkal.specimen import evaluation, measured, page, prepared, synthetic, tasks
-from foldyn.studies.herkal.specimen.agreement import vibration_of
+from foldyn.studies.herkal.specimen.evaluation import vibration_of
 from foldyn.studies.herkal.specimen.measured import Data, data_of
 
 STEP = 1.0 / calibration.RATE
@@ -81,7 +81,7 @@ LATE = 20.4 * STEP
 
 def film(**nodes):
     columns = {int(name[1:]): values for name, values in nodes.items()}
-    return History(
+    return TimeHistory(
         nodes=list(columns), time=TIME, values=np.stack(list(columns.values()), 1), name="film"
     )
 
@@ -126,7 +126,7 @@ def test_a_film_that_shows_the_pressing_too(duration) -> None:
     late = 0.1 + duration + 0.2 + 0.4 * STEP
     wander = 1e-4 * np.sin(2.0 * np.pi * 0.8 * time)  # of the hand
     x = np.where(time < late, pressing + wander, ringing(time, late) + wander[-1])
-    history = History(nodes=[8], time=time, values=x[:, None], name="film")
+    history = TimeHistory(nodes=[8], time=time, values=x[:, None], name="film")
     found = prepared.prepare(history)
     assert found.released == pytest.approx(late, abs=1.5 * STEP)
     assert found.before[0] == pytest.approx(4e-3, rel=0.05)
@@ -279,7 +279,9 @@ def released(motion, tmp_path_factory):
     along = np.stack(
         [np.interp(time - 0.0321, motion.time, motion.displacement[:, n, 0]) for n in FRONT], axis=1
     )
-    history = History(nodes=FRONT, time=time, values=along + 3e-4, name="film", label="synthetic")
+    history = TimeHistory(
+        nodes=FRONT, time=time, values=along + 3e-4, name="film", label="synthetic"
+    )
     folder = tmp_path_factory.mktemp("released")
     return evaluation.fit_release(history, folder, {}, COARSER)
 
@@ -341,7 +343,7 @@ def tables(tmp_path):
 
 def test_files_are_sorted_by_what_they_hold(tables) -> None:
     found = data_of([str(tables / "film.csv"), str(tables / "weights.csv")])
-    assert found.names == ["weights.csv", "film.csv"]
+    assert [file.name for file in found.files.values()] == ["weights.csv", "film.csv"]
     assert found.film is None and not found.synthetic and found.label == "measured"
     assert isinstance(measured.measurement(found.static, ""), ForceDisplacement)
     before = found.digests()
@@ -427,7 +429,7 @@ def test_a_table_of_weights_alone(tables, monkeypatch) -> None:
         assert not fit.there(tables)
     fit.make(tables)
     assert fit.there(tables)
-    monkeypatch.setattr(tasks, "specimen_program", lambda: "another")
+    monkeypatch.setattr(tasks, "program", lambda *_: "another")
     assert not fit.there(tables)
 
 
@@ -487,11 +489,14 @@ def test_agreement_of_film_and_model_by_node() -> None:
 
 
 def test_what_is_said_of_the_supports_is_what_was_found() -> None:
-    assert "So the plate held the row" in page._glue(front_of(alone=6.0))
-    assert "So the plate held" not in page._glue(front_of(alone=9.4))
+    def told(front):
+        return page._vibrations(front, Data())[-1].text
+
+    assert "So the plate held the row" in told(front_of(alone=6.0))
+    assert "So the plate held" not in told(front_of(alone=9.4))
     flat = front_of()
     flat["model"][2] = 0.0
-    assert "no peak" in page._glue(flat)
+    assert "no peak" in told(flat)
 
 
 def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None:

@@ -12,11 +12,15 @@ import xarray as xr
 import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.structures.discretize import PER_NODE
 from foldyn.studies.herkal import pool, report, runs
 from foldyn.studies.herkal import study as studies
 from foldyn.studies.herkal.claims import CLAIMS, TARGETS, claims, table1
-from foldyn.studies.herkal.metric import best, content, deviation, errors, ranks
-from foldyn.studies.herkal.models import (
+from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best, content, deviation, errors, ranks
+from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
+from foldyn.studies.herkal.pool import Done
+from foldyn.studies.herkal.runs import Job, Numerics
+from foldyn.studies.herkal.sheet_models import (
     MODELS,
     OTHERS,
     REFERENCE,
@@ -26,12 +30,8 @@ from foldyn.studies.herkal.models import (
     paper_rules,
     rules,
 )
-from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.partners import FAR, LEAST_MAC
-from foldyn.studies.herkal.pool import Done
-from foldyn.studies.herkal.runs import Job, Numerics
 from foldyn.studies.herkal.specimen.measured import Data
-from foldyn.studies.herkal.study import LINEAR, Plan, Study, mean_ranks, second_table
+from foldyn.studies.herkal.study import LINEAR, Study, StudyPlan, mean_ranks, second_table
 from foldyn.studies.targets import Target, Verdict, read_targets
 
 SHORT = Numerics(divisions=2, dt=0.02, duration=0.5)
@@ -196,7 +196,7 @@ def test_results_are_those_of_the_vertices(tmp_path):
 
 
 def test_plans_have_the_longest_first_and_statics_once():
-    jobs = Plan().jobs()
+    jobs = StudyPlan().jobs()
     assert len(set(jobs)) == len(jobs)
     assert {job.model for job in jobs[:4]} == {REFERENCE} and jobs[0].kind == "motion"
     paths = {(job.case, job.model, job.variant) for job in jobs if job.kind == "path"}
@@ -208,7 +208,7 @@ def test_plans_have_the_longest_first_and_statics_once():
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """A study of case 1 over 4 s in which the motion with panel masses stands for the shell's."""
-    plan = Plan(Numerics(divisions=2, duration=4.0), ("case1",))
+    plan = StudyPlan(Numerics(divisions=2, duration=4.0), ("case1",))
     study = Study(plan, tmp_path_factory.mktemp("study"))
     folder = study.folder / studies.RESULTS
     folder.mkdir()
@@ -327,7 +327,7 @@ def test_errors_against_the_finest_stored_motion_of_another_shell(tmp_path, monk
     same = xr.Dataset({"displacement": (("time", "node", "axis"), x)}, coordinates)
     motions = {"panel": same, "centroid": 1.5 * same}
     monkeypatch.setattr(Study, "result", lambda self, case, model, kind: motions[model])
-    study = Study(Plan(cases=("case2",), models=("panel", "centroid")), tmp_path)
+    study = Study(StudyPlan(cases=("case2",), models=("panel", "centroid")), tmp_path)
     found = second_table(study)
     assert found["case2"][0] == divisions
     assert found["case2"][1] == pytest.approx({"panel": 0.0, "centroid": 0.5}, abs=1e-12)
@@ -336,7 +336,7 @@ def test_errors_against_the_finest_stored_motion_of_another_shell(tmp_path, monk
 
 
 def test_page_without_motions(tmp_path):
-    study = Study(Plan(SHORT, ("case1",), ("panel",)), tmp_path)
+    study = Study(StudyPlan(SHORT, ("case1",), ("panel",)), tmp_path)
     assert "None of the paper" in report.write(study).read_text("utf-8")
 
 
@@ -381,3 +381,14 @@ def test_the_specimen_is_left_out_without_opencv(tmp_path, monkeypatch, capsys):
     assert "synthetic film is left out: pip install foldyn[experiment]" in told
     assert "the specimen: calibrated" not in told
     assert "The paper specimen" not in (tmp_path / "study/report.html").read_text("utf-8")
+
+
+def test_the_command_takes_half_of_the_memory_unless_forced(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("foldyn.memory.memory", lambda: 1.5 * PER_NODE * 13)
+    monkeypatch.setattr(studies, "QUICK", StudyPlan(SHORT, ("case2",), ("panel",)))
+    monkeypatch.setattr(Study, "compute", lambda *_: [])
+    monkeypatch.setattr("foldyn.cli.study._data", lambda *_: None)
+    command = ["study", "herkal", "--quick", "--quiet", "--out", str(tmp_path / "study")]
+    assert main(command) == 2
+    assert "a structure of 13 nodes needs about" in capsys.readouterr().err
+    assert main([*command, "--force"]) == 0

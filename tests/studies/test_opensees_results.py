@@ -15,9 +15,8 @@ import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.studies import find_case
 from foldyn.studies.herkal.opensees import compare, model
-from foldyn.studies.herkal.opensees.mesh import panel_mesh
+from foldyn.studies.herkal.opensees.model import panel_mesh
 from foldyn.studies.herkal.opensees.stored import (
-    CASES,
     Moved,
     read_motion,
     read_still,
@@ -26,6 +25,7 @@ from foldyn.studies.herkal.opensees.stored import (
     write_motion,
     write_still,
 )
+from foldyn.studies.herkal.sheet_models import CASES
 
 FINEST = 32
 

@@ -6,8 +6,7 @@ the band is factorized faster than the sparse matrix, the more so the smaller it
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from functools import cache
 
 import numpy as np
@@ -90,15 +89,13 @@ def substitute(columns, b):
             others[i] -= column[i] * b[j]
 
 
-@contextmanager
-def one_thread() -> Iterator[None]:
+def one_thread() -> AbstractContextManager:
     """Keep LAPACK on one thread: more make the factorization of a band slower.
 
     Measured with two threads, SciPy's OpenBLAS: 5 times at 333 dofs, 1.4 at 6000. They also wait
     for each other where other programs run. Threads of other libraries (PARDISO's) stay.
     """
-    with _openblas().limit(limits=1):
-        yield
+    return _openblas().limit(limits=1)
 
 
 @cache

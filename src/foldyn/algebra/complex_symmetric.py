@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+
+from foldyn.algebra.superlu import SingularTangentError, factorize
 
 LOST = 1e-3  # of the solution: rounding above which it is a resonance without damping
 PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
@@ -21,13 +22,8 @@ def solve(matrix: sparse.csc_array, load: NDArray) -> NDArray[np.complex128]:
     """
     lost = np.full(len(load), np.nan, np.complex128)
     try:
-        factors = splu(
-            matrix,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=PIVOT,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:  # exactly singular
+        factors = factorize(matrix, pivot=PIVOT)
+    except SingularTangentError:
         return lost
     solution = factors.solve(load.astype(np.complex128))
     solution += factors.solve(load - matrix @ solution)

@@ -31,7 +31,7 @@ class Pardiso:
         self._upper = sparse.triu(rows, format="csr")
         self._upper.sort_indices()
         self._solver = import_module("pypardiso").PyPardisoSolver(mtype=SYMMETRIC_INDEFINITE)
-        weakref.finalize(self, _release, self._solver)
+        weakref.finalize(self, self._solver.free_memory, everything=True)
         try:
             self._solver.factorize(self._upper)
         except Exception as error:  # its own class, raised for zero pivots and for lack of memory
@@ -42,16 +42,9 @@ class Pardiso:
         return np.asarray(self._solver.solve(self._upper, b)).reshape(b.shape)
 
     def pivots(self) -> None:
-        """PARDISO does not tell its pivots."""
+        """None: PARDISO does not show its pivots."""
         return
 
     def negative(self) -> int:
         """Count of negative eigenvalues."""
         return int(self._solver.get_iparm(NEGATIVE))
-
-
-def _release(solver: object) -> None:
-    """Give PARDISO's memory back."""
-    free = getattr(solver, "free_memory", None)
-    if free is not None:
-        free(everything=True)

@@ -5,13 +5,13 @@ P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylve
 inertia), so one factorization gives both the step and the stability.
 
 SciPy's SuperLU is always there. What is faster on large structures (PARDISO) is an optional
-package; `choice` takes what is there.
+package; `solvers` takes what is there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,22 +44,30 @@ class Factorization(Protocol):
 Factorizer = Callable[[sparse.csc_array], Factorization]
 
 
+def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0) -> Any:
+    """Factors by SciPy's SuperLU, with its own attributes.
+
+    symmetric : pivots stay on the diagonal, unless one is smaller than `pivot` times the largest
+        entry of its column.
+    """
+    symmetrically = {
+        "permc_spec": "MMD_AT_PLUS_A",
+        "diag_pivot_thresh": pivot,
+        "options": {"SymmetricMode": True},
+    }
+    try:
+        return splu(matrix, **(symmetrically if symmetric else {}))
+    except RuntimeError as error:  # "Factor is exactly singular"
+        raise SingularTangentError("the matrix is singular") from error
+
+
 class SuperLU:
     """Factorization by SciPy's SuperLU in its symmetric mode, pivots taken from the diagonal."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         if not np.isfinite(matrix.data).all():
             raise SingularTangentError("the tangent is not finite")
-        try:
-            self._lu = splu(
-                matrix,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError as error:  # "Factor is exactly singular"
-            raise SingularTangentError("the tangent is singular") from error
-        self._matrix = matrix
+        self._lu, self._matrix = factorize(matrix), matrix
         self._pivots: NDArray | None = None
 
     def solve(self, b: NDArray) -> NDArray:
@@ -71,9 +79,9 @@ class SuperLU:
         if self._pivots is not None:
             return self._pivots
         straight = np.array_equal(self._lu.perm_r, self._lu.perm_c)
-        found = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
-        self._pivots = found
-        return found
+        pivots = self._lu.U.diagonal() if straight else _eigenvalues(self._matrix)
+        self._pivots = pivots
+        return pivots
 
     def negative(self) -> int:
         """Count of negative eigenvalues."""

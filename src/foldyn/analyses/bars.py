@@ -6,7 +6,7 @@ from typing import Any
 
 
 class _Hidden:
-    """A bar that is not there."""
+    """A bar that is not shown."""
 
     n = total = 0.0
 
@@ -17,9 +17,9 @@ class _Hidden:
 
 
 def bar(shown: bool, **options: Any) -> Any:
-    """Bar of tqdm, which is not imported for nothing.
+    """Bar of tqdm, which is imported only where it is shown.
 
-    Its lock stays behind where a process is killed, as the workers of a fit may be.
+    Its lock stays behind when a process is killed, as the workers of a fit may be.
     """
     if not shown:
         return _Hidden()

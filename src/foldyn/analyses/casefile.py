@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
+from foldyn.analyses.provenance import provenance
 from foldyn.analyses.sections import CaseSchema
 from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
 from foldyn.patterns import Pattern
+from foldyn.report.album import Album, ByRule
+from foldyn.report.page import write_report
+from foldyn.report.sections import Section
 from foldyn.structures import Sheet
 from foldyn.values import choice
 
-if TYPE_CHECKING:
-    import xarray
-
 Begun = Callable[[], None]
-Compute = Callable[[bool, Begun], "xarray.Dataset"]
-"""Computes a result, with or without a bar; calls what it is given when nothing is left to be
-refused."""
+Compute = Callable[[bool, Begun], xarray.Dataset]
+"""Computes a result, with or without a bar; calls its second argument, once or more often, after
+all input has been accepted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,7 @@ class Output:
     nodes : ndarray of int64
         Nodes that figures and spectra show.
     named : bool
-        Whether the file names these nodes, or they are those of the default.
+        Whether the file names these nodes; otherwise they are the default.
     axis : str or None
         Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
         one in which a node moves most.
@@ -101,30 +103,36 @@ class Analysis(ABC):
 
     @abstractmethod
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
-        """Check a computation with one mass rule as far as that is possible before it starts.
+        """Check a computation with one mass rule, as far as possible before it starts.
 
         changes : arguments that take the place of the file's.
         """
 
     @abstractmethod
     def line(self, name: str, result: xarray.Dataset) -> str:
-        """Tell in a line what came of the computation with the mass rule `name`."""
+        """Summarize the computation with the mass rule `name` in a line."""
 
+    @staticmethod
     @abstractmethod
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
-        command: str = "",
-    ) -> Path:  # fmt: skip
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterable[Section]:
+        """Sections of the page about results, by mass rule; the album draws their figures."""
+
+    def page(self, case_file: CaseFile, results: ByRule, folder: Path, command: str = "") -> Path:
         """Draw results, by mass rule, into an existing folder; returns the path of report.html.
 
         command : what was typed to compute them, for the page.
         """
+        sections = [
+            *self.sections(case_file, results, Album(folder)),
+            *provenance(case_file, results, command),
+        ]
+        return write_report(folder / "report.html", case_file.heading, sections)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
-        """Refuse what the computations of all mass rules cannot do together."""
+        """Refuse computations of several mass rules that cannot run together."""
 
     def compiles(self, computations: Sequence[Compute]) -> bool:
-        """Whether kernels have to be compiled first and no bar says so."""
+        """Whether kernels have to be compiled first without a bar that says so."""
         return False
 
     def shown(self, case: Case) -> NDArray[np.int64]:
@@ -286,7 +294,7 @@ class CaseFile:
 
 
 class Computation:
-    """One result of a case file, checked as far as that is possible before it is computed.
+    """One result of a case file, checked as far as possible before it is computed.
 
     Attributes
     ----------
@@ -308,6 +316,6 @@ class Computation:
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """Compute it; `begun` is called when nothing is left to be refused."""
+        """Compute it; `begun` is called once all input has been accepted."""
         with self.case_file.placing(self.mass):
             return self.compute(progress, begun)

@@ -17,7 +17,7 @@ Document = dict[str, Any]
 
 
 def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
-    """The document with what the command line says of its analysis."""
+    """The document with the keys of [analysis] that the command line gives."""
     analysis = {**document["analysis"], **flags}
     if "state" not in flags:
         return {**document, "analysis": analysis}
@@ -30,7 +30,7 @@ def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
 
 
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
-    """The document of another kind with what has a place in one of `kind`."""
+    """The document as one of another kind; what has no place there is left out, with a warning."""
     left: list[str] = []
     atrest = state == "rest"
     supports, bases = _supports(document.get("supports", []), atrest, left)
@@ -89,7 +89,7 @@ def _supports(
 
 
 def _shown(output: Document, kind: str) -> Document:
-    """What the figures show of what those of another kind do."""
+    """The keys of [output] that mean the same for another kind."""
     if kind == "modes":  # axis and nodes mean something else there
         return {key: output[key] for key in ("animation",) if key in output}
     shown = {key: output[key] for key in ("nodes", "axis") if key in output}
@@ -127,8 +127,8 @@ def remodeled(
         given = {key: value for key, value in given.items() if key in shared}
     if kind != now and kind == SHELL:
         changed["analysis"] = _of_a_shell(document["analysis"])
-    told = {} if divisions is None else {"divisions": divisions}
-    changed["model"] = {**given, "kind": kind, **told}
+    finer = {} if divisions is None else {"divisions": divisions}
+    changed["model"] = {**given, "kind": kind, **finer}
     return changed
 
 

@@ -8,39 +8,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, get_type_hints
+from typing import Annotated, Any, Self, get_type_hints
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, create_model, model_validator
 
 from foldyn.analyses.bars import bar
-from foldyn.analyses.casefile import (
-    Analysis,
-    Begun,
-    CaseFile,
-    Compute,
-    arguments_of,
-    movable,
-)
-from foldyn.analyses.frf_page import frf_page
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, movable
+from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
-from foldyn.analyses.sections import Nodes, Positive, Section, one_of, part
+from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, part
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
-from foldyn.cases.decode import check_keys
+from foldyn.cases.decode import check_keys, given_keys
 from foldyn.cases.models import SHELL
-from foldyn.cases.part import given_keys
 from foldyn.cases.supports import DIRECTIONS, check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf
-from foldyn.linear.frf import METHODS
-from foldyn.linear.quantity import PER_FORCE
+from foldyn.linear.frf import METHODS, PER_FORCE
 from foldyn.values import number, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_FREQUENCIES = 100_000
 OPTIONS: Mapping[str, Any] = {
@@ -149,10 +138,9 @@ NO_HISTORY = (
 )
 
 
-class FrfOutput(Section):
+class FrfOutput(ShownSection):
     """[output] of a frequency response: what is shown."""
 
-    nodes: Nodes = None
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
     quantity: Annotated[Any, one_of(PER_FORCE)] = None
 
@@ -212,14 +200,10 @@ class FrfAnalysis(Analysis):
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            told = False
-
             def tell(now: Progress) -> None:
-                nonlocal told
-                if not told:
+                if not reached.n:
                     reached.clear()
                     begun()
-                told = True
                 reached.total = now.duration
                 reached.update(now.time - reached.n)
 
@@ -246,12 +230,7 @@ class FrfAnalysis(Analysis):
         ]
         return np.unique(np.concatenate(forces)) if forces else movable(case)
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
-        command: str = "",
-    ) -> Path:  # fmt: skip
-        """Draw the responses; see `Analysis`."""
-        return frf_page(case_file, results, folder, command)
+    sections = staticmethod(frf_sections)
 
 
 def _bar(shown: bool) -> Any:

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
+import xarray
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
-from foldyn.analyses.provenance import provenance
 from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
-from foldyn.linear.frf import METHODS
-from foldyn.linear.quantity import PER_FORCE, quantity_of
-from foldyn.report.album import Album, shown_nodes
-from foldyn.report.page import write_report
+from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
+from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
 from foldyn.report.sections import Heading, Section, Table, Text, cell
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_CURVES = 8
 """Responses that one figure shows at most, each in its color."""
 MOST_REASONS = 6
-"""Peaks of which the page says why a number is missing, at most."""
+"""Peaks for which the page explains missing numbers, at most."""
 
 
-def frf_page(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path, command: str = ""
-) -> Path:
-    """Draw a case and its frequency responses into `folder`; returns the path of report.html."""
-    album = Album(folder)
+def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
+    """See `Analysis.sections`."""
     first = next(iter(results))
     case, response = case_file.case(first), results[first]
     drive = case_file.analysis.arguments["drive"]
@@ -41,47 +32,40 @@ def frf_page(
     axis = case_file.output.axis or driven_direction(response)
     quantity = case_file.output.quantity or quantity_of(response)
     shown = quantity if quantity in PER_FORCE else None
-    rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
     parts = "Magnitude, phase and coherence" if "coherence" in response else "Magnitude and phase"
-    sections: list[Section] = [
-        *album.structure(_driven(case, drive), "The pattern with its nodes, supports and drive."),
-        Heading("The response"),
-        album.figure(
-            "response",
-            f"{parts} of the {quantity} of {_listed(nodes)}{some} along {axis}, {rules}: "
-            f"{_meaning(quantity, axis, response)}. Dots mark peaks.",
-            lambda: plots.plot_frf(results, nodes, axis, shown),
-        ),
-    ]
-    found = {
+    yield from album.structure(
+        _driven(case, drive), "The pattern with its nodes, supports and drive."
+    )
+    yield Heading("The response")
+    yield album.figure(
+        "response",
+        f"{parts} of the {quantity} of {listed('node', nodes)}{some} along {axis}, "
+        f"{rules(results)}: {_meaning(quantity, axis, response)}. Dots mark peaks.",
+        lambda: plots.plot_frf(results, nodes, axis, shown),
+    )
+    peaks = {
         (rule, node): peaks_of(result, node, axis, shown)
         for rule, result in results.items()
         for node in nodes
     }
-    if shown is not None and any(np.isfinite(p.damping_ratio) for p in found[first, nodes[0]]):
+    if shown is not None and any(np.isfinite(p.damping_ratio) for p in peaks[first, nodes[0]]):
         rule = f" with mass rule {first}" if len(results) > 1 else ""
-        sections.append(
-            album.figure(
-                "nyquist",
-                f"Mobility of node {nodes[0]} along {axis}{rule} around its peaks, in the complex "
-                "plane: a mode makes a circle, from which its natural frequency and damping are "
-                "found. Points that leave the circle show what other modes or nonlinearity add.",
-                lambda: plots.plot_nyquist(response, nodes[0], axis, found[first, nodes[0]]),
-            )
+        yield album.figure(
+            "nyquist",
+            f"Mobility of node {nodes[0]} along {axis}{rule} around its peaks, in the complex "
+            "plane: a mode makes a circle, from which its natural frequency and damping are "
+            "found. Points that leave the circle show what other modes or nonlinearity add.",
+            lambda: plots.plot_nyquist(response, nodes[0], axis, peaks[first, nodes[0]]),
         )
-    sections += [
-        Heading("The numbers"),
-        _peaks(found, quantity, axis, len(results) > 1),
-        _run(case_file, results),
-        Text(_notes(response, case, found)),
-        *provenance(case_file, results, command),
-    ]
-    return write_report(album.folder / "report.html", case_file.heading, sections)
+    yield Heading("The numbers")
+    yield _peaks(peaks, quantity, axis, len(results) > 1)
+    yield _run(case_file, results)
+    yield Text(_notes(response, case, peaks))
 
 
 def driven_direction(response: xarray.Dataset) -> str:
     """Direction in which most of the drive acts."""
-    from foldyn.plots.responses import along_drive
+    from foldyn.plots.frf import along_drive
 
     drive = response["drive"].transpose("node", "axis").values
     return along_drive(response)[int(np.abs(drive).sum(axis=0).argmax())]
@@ -104,35 +88,32 @@ def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:
 
 
 def _peaks(
-    found: Mapping[tuple[str, int], tuple[Peak, ...]], quantity: str, axis: str, several: bool
+    peaks: Mapping[tuple[str, int], tuple[Peak, ...]], quantity: str, axis: str, several: bool
 ) -> Table:
-    from foldyn.plots.responses import unit_of
+    from foldyn.plots.frf import unit_of
 
     header = [*(["mass rule"] if several else []), "node", "peak (Hz)"]
     header += [f"height{unit_of(quantity)}", "3 dB (%)", "textbook (%)"]
     header += ["f0 (Hz)", "circle (%)", "misfit (%)"]
-    rows = []
-    for (rule, node), peaks in found.items():
-        for peak in peaks:
-            row: list[Any] = [*([rule] if several else []), node]
-            rows.append(
-                [
-                    *row, peak.frequency, peak.height, _percent(peak.half_power),
-                    _percent(peak.textbook), cell(peak.natural_frequency),
-                    _percent(peak.damping_ratio), _percent(peak.misfit),
-                ]
-            )  # fmt: skip
+    rows = [
+        [
+            *([rule] if several else []), node, peak.frequency, peak.height,
+            _percent(peak.half_power), _percent(peak.textbook), cell(peak.natural_frequency),
+            _percent(peak.damping_ratio), _percent(peak.misfit),
+        ]
+        for (rule, node), found in peaks.items() for peak in found
+    ]  # fmt: skip
     return Table(
         header,
         rows,
-        f"Peaks of the {quantity} along {axis} and the damping ratios that they tell: from the "
+        f"Peaks of the {quantity} along {axis} and the damping ratios they give: from the "
         "half-power points (3 dB: exact for a single mode; textbook: (f2 - f1) / 2f), and from "
         "fitted circles, with the natural frequency f0 and how far points lie off the circle",
         digits=4,
     )
 
 
-def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
+def _run(case_file: CaseFile, results: ByRule) -> Table:
     keys = {
         "secant": "secant (degrees)",
         "modes": "modes",
@@ -150,67 +131,58 @@ def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
     a = next(iter(results.values())).attrs
     if not METHODS[a["method"]].by_amplitude:
         del keys["amplitude"]
-    present = [key for key in keys if key in a]
-    header = ["mass rule", "method", "state", *(keys[key] for key in present), "time (s)"]
-    rows = []
-    for rule, result in results.items():
-        a = result.attrs
-        told = [a.get(key) for key in present]
-        rows.append([rule, a["method"], a["state"], *told, a["wall_seconds"]])
-    return Table(header, rows, f"{case_file.path.name}: the computation", digits=3)
+    columns = {"method": "method", "state": "state"}
+    columns |= {title: key for key, title in keys.items() if key in a}
+    columns["time (s)"] = "wall_seconds"
+    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
 def _notes(
-    response: xarray.Dataset, case: Case, found: Mapping[tuple[str, int], tuple[Peak, ...]]
+    response: xarray.Dataset, case: Case, peaks: Mapping[tuple[str, int], tuple[Peak, ...]]
 ) -> str:
-    """What a reader has to know about the numbers."""
-    told = [
+    """Notes on the numbers."""
+    notes = [
         f"Damping: alpha {case.damping.alpha:g} 1/s, beta {case.damping.beta:g} s. The result "
         "carries its own case."
     ]
     soft = int(response.attrs.get("soft", 0))
     if soft:
-        told.append(
+        notes.append(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
             "vanishes: they count without stiffness here. Responses of finite amplitude, by a "
             "secant amplitude or computed in time, have it."
         )
     if "secant" in response.attrs:
-        told.append(
+        notes.append(
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{response.attrs['secant']:g} degrees."
         )
     swing = response["swing"].values if "swing" in response else np.zeros(1)
     if (swing > 0.0).any():  # else no hinge is superlinear
         at = int(np.nanargmax(swing)) if np.isfinite(swing).any() else 0
-        told.append(
+        notes.append(
             "Each superlinear hinge is linearized for its own amplitude: the largest is "
             f"{swing[at]:.3g} degrees, at {response['frequency'].values[at]:.4g} Hz."
         )
     missing = [
         f"Peak at {peak.frequency:.4g} Hz of node {node}, {rule}: {_reason(peak.note)}."
-        for (rule, node), peaks in found.items()
-        for peak in peaks
+        for (rule, node), found in peaks.items()
+        for peak in found
         if peak.note
     ]
     if missing:
-        told.append("Why numbers are missing from the table:")
-        told += missing[:MOST_REASONS]
+        notes.append("Why numbers are missing from the table:")
+        notes += missing[:MOST_REASONS]
         if len(missing) > MOST_REASONS:
-            told.append(f"And {len(missing) - MOST_REASONS} more.")
-    return "\n\n".join(told)
+            notes.append(f"And {len(missing) - MOST_REASONS} more.")
+    return "\n\n".join(notes)
 
 
 def _reason(note: str) -> str:
-    """What a note says, without what it would have a programmer do."""
+    """A note without its advice to programmers."""
     parts = [part for part in note.split("; ") if part.startswith(("half power", "circle fit"))]
     return "; ".join(parts or [note]).replace("magnitude: ", "")
 
 
 def _percent(ratio: float) -> float | None:
     return float(f"{100.0 * ratio:.3g}") if np.isfinite(ratio) else None
-
-
-def _listed(nodes: list[int]) -> str:
-    names = ", ".join(map(str, nodes))
-    return f"node {names}" if len(nodes) == 1 else f"nodes {names}"

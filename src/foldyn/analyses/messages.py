@@ -12,7 +12,7 @@ from foldyn.errors import ALSO
 from foldyn.values import SHOWN, nearest, show
 
 MOST_LINES = 12
-"""Errors that are told one by one."""
+"""Errors listed one by one."""
 _TEXTS = {
     "missing": "missing; give its value",
     "float_type": "must be a number",
@@ -33,7 +33,7 @@ def describe(
 ) -> str:
     """Text for all that a validation found: one line, and one more for each further error.
 
-    `kinds` are the schemas of all kinds of analysis: a key of another kind is told as such.
+    `kinds` are the schemas of all kinds of analysis: a key of another kind is reported as such.
     """
     items = error.errors(include_url=False, include_context=True)
     unknown = [item for item in items if item["type"] == "extra_forbidden"]
@@ -45,8 +45,8 @@ def describe(
         if item["type"] != "extra_forbidden"
         and not (item["type"] == "missing" and item["loc"] in meant)
     ]
-    found = [*unknown, *rest][:MOST_LINES]
-    lines = [line for item in found for line in _lines(item, schema, kinds)]
+    listed = [*unknown, *rest][:MOST_LINES]
+    lines = [line for item in listed for line in _lines(item, schema, kinds)]
     if len(unknown) + len(rest) > MOST_LINES:
         lines.append(f"{len(unknown) + len(rest) - MOST_LINES} more")
     return ALSO.join(dict.fromkeys(lines))

@@ -2,53 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
-from pydantic import PlainValidator
 
 from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.provenance import provenance
-from foldyn.analyses.sections import AXES, MOST_SHAPES, Animation, Count, Nodes, Section, one_of
+from foldyn.analyses.sections import Animation, Count, Section, ShownSection, some_shapes
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
-from foldyn.errors import InputError
 from foldyn.linear import character, mac, modes, pair_modes
-from foldyn.report.album import Album
-from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Table, Text
+from foldyn.report.album import Album, ByRule, by_mass_rule, listed
+from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
-from foldyn.values import indices, show
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
 
 FRAMES, FPS = 24, 12
 MOST_FILMED = 6
 """Modes that the film shows at most."""
 MOST_TRIANGLES = 25_000
 """Triangles that each of its pictures has at most, unless a single mode has more."""
-
-
-def _shapes(value: Any) -> int | tuple[int, ...]:
-    if isinstance(value, int) and not isinstance(value, bool):
-        if not 1 <= value <= MOST_SHAPES:
-            raise InputError(
-                f" = {value}: give 1 to {MOST_SHAPES} modes, or a list of their numbers"
-            )
-        return value
-    chosen = indices("", value, "mode", "or how many modes to draw")
-    if min(chosen, default=1) < 1:
-        raise InputError(f" = {show(value)}: modes are counted from 1")
-    if len(chosen) > MOST_SHAPES:
-        raise InputError(f": {len(chosen)} modes; give at most {MOST_SHAPES}")
-    return chosen
 
 
 class ModesSection(Section):
@@ -60,12 +36,10 @@ class ModesSection(Section):
     secant: Secant = None
 
 
-class ModesOutput(Section):
+class ModesOutput(ShownSection):
     """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
 
-    nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
-    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 6
+    shapes: Annotated[int | tuple[int, ...], some_shapes("modes", "mode", least=1)] = 6
     animation: Animation = "gif"
 
 
@@ -110,68 +84,53 @@ class ModesAnalysis(Analysis):
         rigid, unstable = result["rigid"].values, result["eigenvalue"].values < 0.0
         elastic = result["frequency"].values[~rigid & ~unstable]
         special = [
-            f"{int(found.sum())} {what}"
-            for found, what in ((rigid, "rigid"), (unstable, "unstable"))
-            if found.any()
+            f"{int(chosen.sum())} {what}"
+            for chosen, what in ((rigid, "rigid"), (unstable, "unstable"))
+            if chosen.any()
         ]
         reach = f", {elastic[0]:.4g} to {elastic[-1]:.4g} Hz" if len(elastic) else ""
-        told = f" ({', '.join(special)})" if special else ""
+        among = f" ({', '.join(special)})" if special else ""
         return (
-            f"  {name}: {counted(result.sizes['mode'], 'mode')}{told}{reach}, "
+            f"  {name}: {counted(result.sizes['mode'], 'mode')}{among}{reach}, "
             f"{result.attrs['wall_seconds']:.1f} s"
         )
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
-        command: str = "",
-    ) -> Path:  # fmt: skip
-        """Draw the modes; see `Analysis`."""
-        return _draw(case_file, results, folder, command)
-
-
-def _draw(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path, command: str
-) -> Path:
-    album = Album(folder)
-    first = next(iter(results))
-    case, modes = case_file.case(first), results[first]
-    shown = shown_modes(modes, case_file.output.shapes)
-    told = _character(case_file, modes, case)
-    about = _about(modes)
-    rule = f", mass rule {first}" if len(results) > 1 else ""
-    sections: list[PageSection] = [
-        *album.structure(case),
-        Heading("The modes"),
-        album.figure(
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+        """See `Analysis`."""
+        (first, modes), *others = results.items()
+        case = case_file.case(first)
+        shown = shown_modes(modes, case_file.output.shapes)
+        names = _character(case_file, modes, case)
+        rule = f", mass rule {first}" if others else ""
+        yield from album.structure(case)
+        yield Heading("The modes")
+        yield album.figure(
             "modes",
-            f"Mode shapes{rule}, over {about} in gray; {_judged(case_file, told)}. A mode has no "
-            "amplitude of its own: each is drawn so that it can be read.",
-            lambda: plots.draw_modes(case, modes, shown, names=told),
-        ),
-    ]
-    together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
-    filmed = shown[: min(MOST_FILMED, together)]
-    film = album.folder / f"modes.{case_file.output.animation}"
-    plots.animate_modes(case, modes, film, filmed, names=told, frames=FRAMES, fps=FPS)
-    sections.append(
-        Picture(film, f"The same modes{_first(filmed, shown)} in motion, all at one pace.")
-    )
-    others = list(results)[1:]
-    if others:
-        same = {other: mac(modes, results[other], case.structure.mass) for other in others}
-        sections.append(
-            album.figure(
+            f"Mode shapes{rule}, over {_about(modes)} in gray; {_judged(case_file, names)}. A "
+            "mode has no amplitude of its own: each is drawn so that it can be read.",
+            lambda: plots.draw_modes(case, modes, shown, names=names),
+        )
+        together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
+        filmed = shown[: min(MOST_FILMED, together)]
+        film = album.folder / f"modes.{case_file.output.animation}"
+        plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
+        some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
+        yield Picture(film, f"The same modes{some} in motion, all at one pace.")
+        same = {rule: mac(modes, other, case.structure.mass) for rule, other in others}
+        if same:
+            yield album.figure(
                 "mac",
-                f"How alike modes with {first} (rows) and with {_listed(others)} (columns) are: "
+                f"How alike modes with {first} (rows) and with {', '.join(same)} (columns) are: "
                 "modal assurance criterion, weighted by the mass; 1 is the same shape.",
                 lambda: _draw_mac(first, same),
             )
-        )
-    sections += [Heading("The numbers"), _table(modes, told, rule)]
-    sections += [_compared(results, same)] if others else []
-    sections += [_run(case_file, results), Text(_notes(modes, case))]
-    sections += provenance(case_file, results, command)
-    return write_report(album.folder / "report.html", case_file.heading, sections)
+        yield Heading("The numbers")
+        yield _table(modes, names, rule)
+        if same:
+            yield _compared(results, same)
+        yield _run(case_file, results)
+        yield Text(_notes(modes, case))
 
 
 def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
@@ -185,10 +144,8 @@ def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> 
 
 def _about(modes: xarray.Dataset) -> str:
     """About which state the modes swing."""
-    return {
-        "rest": "the undeformed sheet",
-        "equilibrium": "the equilibrium under the loads",
-    }.get(str(modes.attrs["state"]), "the stored state")
+    states = {"rest": "the undeformed sheet", "equilibrium": "the equilibrium under the loads"}
+    return states.get(str(modes.attrs["state"]), "the stored state")
 
 
 def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
@@ -197,13 +154,14 @@ def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray
     return character(modes, chosen.axis, chosen.nodes if chosen.named else None, case=case)
 
 
-def _judged(case_file: CaseFile, told: xarray.Dataset) -> str:
+def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
     """How the names of modes came about."""
-    of = f" of nodes {_listed(case_file.output.nodes.tolist())}" if case_file.output.named else ""
-    return f"named by the largest share of their motion{of}, seen along {told.attrs['axis']}"
+    nodes = case_file.output.nodes.tolist()
+    of = f" of {listed('node', nodes)}" if case_file.output.named else ""
+    return f"named by the largest share of their motion{of}, seen along {names.attrs['axis']}"
 
 
-def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Figure:
+def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Any:
     """Draw the matrices beside each other."""
     whole = np.hstack([np.nan_to_num(matrix) for matrix in same.values()])
     if len(same) == 1:
@@ -212,7 +170,7 @@ def _draw_mac(first: str, same: Mapping[str, NDArray[np.float64]]) -> Figure:
     return plots.plot_mac(whole, None, columns, first, "")
 
 
-def _compared(results: Mapping[str, xarray.Dataset], same: Mapping[str, NDArray]) -> Table:
+def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
     """Frequencies of modes that belong together, by mass rule."""
     first, modes = next(iter(results.items()))
     header = ["mode", f"{first} (Hz)"]
@@ -229,15 +187,7 @@ def _compared(results: Mapping[str, xarray.Dataset], same: Mapping[str, NDArray]
     return Table(header, rows, "The same modes with other mass rules, by their shapes")
 
 
-def _listed(names: list[Any]) -> str:
-    return ", ".join(map(str, names))
-
-
-def _first(filmed: list[int], shown: list[int]) -> str:
-    return f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
-
-
-def _table(modes: xarray.Dataset, told: xarray.Dataset, rule: str) -> Table:
+def _table(modes: xarray.Dataset, names: xarray.Dataset, rule: str) -> Table:
     header = ["mode", "frequency (Hz)", "damping (%)", "what it does", "share (%)"]
     header += [f"{'effective mass ' if axis == 'x' else ''}{axis} (%)" for axis in "xyz"]
     free = np.asarray(modes.attrs["free_mass"], dtype=np.float64)
@@ -245,9 +195,13 @@ def _table(modes: xarray.Dataset, told: xarray.Dataset, rule: str) -> Table:
         shares = 100.0 * modes["effective_mass"].transpose("mode", "axis").values / free
     rows = []
     for k, number in enumerate(modes["mode"].values.tolist()):
-        row: list[Any] = [number, _frequency(modes, k), _percent(modes["damping_ratio"].values[k])]
-        row += [str(told["name"].values[k]), round(100.0 * float(told["share"][k].max()))]
-        rows.append([*row, *(_share(share) for share in shares[k].tolist())])
+        row: list[Any] = [
+            number,
+            _frequency(modes, k),
+            cell(100.0 * modes["damping_ratio"].values[k]),
+        ]
+        row += [str(names["name"].values[k]), round(100.0 * float(names["share"][k].max()))]
+        rows.append([*row, *(cell(round(share, 1)) for share in shares[k].tolist())])
     return Table(
         header,
         rows,
@@ -263,55 +217,45 @@ def _frequency(modes: xarray.Dataset, k: int) -> float | str:
     return value if np.isfinite(value) else "unstable"
 
 
-def _percent(ratio: float) -> float | None:
-    return 100.0 * ratio if np.isfinite(ratio) else None
-
-
-def _share(percent: float) -> float | None:
-    """A share to 0.1 %."""
-    return round(percent, 1) if np.isfinite(percent) else None
-
-
-def _run(case_file: CaseFile, results: Mapping[str, xarray.Dataset]) -> Table:
-    header = ["mass rule", "free dofs", "state", "secant (degrees)", "proven complete", "solver"]
-    rows = []
-    for rule, found in results.items():
-        a = found.attrs
-        complete = f"{int(a['complete'])} of {found.sizes['mode']}"
-        rows.append(
-            [rule, a["free_dofs"], a["state"], a.get("secant"), complete, a["solver"],
-             a["wall_seconds"]]
-        )  # fmt: skip
-    return Table([*header, "time (s)"], rows, f"{case_file.path.name}: the computation", digits=3)
+def _run(case_file: CaseFile, results: ByRule) -> Table:
+    columns = {
+        "free dofs": "free_dofs",
+        "state": "state",
+        "secant (degrees)": "secant",
+        "proven complete": lambda found: f"{int(found.attrs['complete'])} of {found.sizes['mode']}",
+        "solver": "solver",
+        "time (s)": "wall_seconds",
+    }
+    return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
 def _notes(modes: xarray.Dataset, case: Case) -> str:
-    """What a reader has to know about the numbers."""
-    told = [
+    """Notes on the numbers."""
+    notes = [
         f"Modes are small vibrations about {_about(modes)}, shapes of the modal mass 1. The result "
         "carries its own case."
     ]
     if case.damping.alpha or case.damping.beta:
-        told.append(
+        notes.append(
             f"Damping: C = alpha M + beta K0 with alpha {case.damping.alpha:g} 1/s and beta "
             f"{case.damping.beta:g} s gives the ratio of each mode."
         )
     soft = int(modes.attrs["soft_hinges"])
     if soft:
-        told.append(
+        notes.append(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
             "vanishes: they count without stiffness, and motions that only they resist have the "
             "frequency zero. With a secant amplitude they have the slope of an oscillation of that "
             "amplitude."
         )
     if "secant" in modes.attrs:
-        told.append(
+        notes.append(
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{modes.attrs['secant']:g} degrees: the frequencies are those of that amplitude."
         )
     if float(modes.attrs["residual"]) > 1e-6:
-        told.append(
+        notes.append(
             f"The state is no equilibrium: its residual is {modes.attrs['residual']:.2g} of the "
             "forces at play."
         )
-    return "\n\n".join(told)
+    return "\n\n".join(notes)

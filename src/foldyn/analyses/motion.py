@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Self
 
 import numpy as np
+import xarray
 from pydantic import Field, PlainValidator, model_validator
 
 from foldyn import plots
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
-from foldyn.analyses.provenance import provenance
-from foldyn.analyses.sections import (
-    AXES,
-    Animation,
-    CaseSchema,
-    Nodes,
-    Positive,
-    Section,
-    one_of,
-)
+from foldyn.analyses.sections import Animation, CaseSchema, Positive, Section, ShownSection, one_of
 from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, compiled, prepare
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import InputError
-from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
-from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Table, Text
+from foldyn.report.album import Album, ByRule, by_mass_rule, rules, shown_nodes, visible_scale
+from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
 from foldyn.values import number, show, whole
-
-if TYPE_CHECKING:
-    import xarray
 
 SAMPLES = 2000
 """Samples that a motion keeps when the file does not say."""
@@ -62,11 +49,9 @@ class MotionSection(Section):
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
-class MotionOutput(Section):
+class MotionOutput(ShownSection):
     """[output] of a motion: what is kept and shown."""
 
-    nodes: Nodes = None
-    axis: Annotated[Any, one_of(AXES)] = None
     every: Annotated[Any, PlainValidator(_every)] = None
     max_frequency: Positive | None = None
     animation: Animation = "gif"
@@ -110,10 +95,9 @@ class MotionAnalysis(Analysis):
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
         """See `Analysis`; output.every is an argument of `simulate` too."""
-        found = super().of(schema, case)
-        every = schema.output.every
-        found.arguments["every"] = schema.analysis.duration / SAMPLES if every is None else every
-        return found
+        analysis, every = super().of(schema, case), schema.output.every
+        analysis.arguments["every"] = schema.analysis.duration / SAMPLES if every is None else every
+        return analysis
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
@@ -146,7 +130,6 @@ class MotionAnalysis(Analysis):
     def line(self, name: str, result: xarray.Dataset) -> str:
         """Method and its reason if it was chosen, steps, speed and accuracy."""
         a = result.attrs
-        per_second = a["steps"] / max(a["wall_seconds"], 1e-9)
         size = f"{a['dt']:.3g} s"
         if "smallest_step" in a:
             size = f"{a['smallest_step']:.3g} to {a['largest_step']:.3g} s"
@@ -159,61 +142,51 @@ class MotionAnalysis(Analysis):
             chosen = f"  {name}: {a['method']}, {a['method_reason']}\n"
         return (
             f"{chosen}  {name}: {a['steps']} steps of {size} ({detail}), "
-            f"{per_second:,.0f} steps/s, energy error {a['energy_error']:.1e}"
+            f"{_speed(a):,.0f} steps/s, energy error {a['energy_error']:.1e}"
         )
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
-        command: str = "",
-    ) -> Path:  # fmt: skip
-        """Draw the motions; see `Analysis`."""
-        album = Album(folder)
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+        """See `Analysis`."""
         first = next(iter(results))
         case, trajectory = case_file.case(first), results[first]
-        nodes, some = shown_nodes(case_file.output.nodes.tolist())
-        start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
-        scale = visible_scale(case, trajectory)
-        rules = "all mass rules" if len(results) > 1 else f"mass rule {first}"
-        sections: list[PageSection] = album.structure(case)
-        if case.loads or case.imposed_terms or case.base_terms:
-            sections.append(
-                album.figure(
-                    "load",
-                    "Loads and imposed motions over time.",
-                    lambda: plots.plot_load_history(case, duration, start=start),
-                )
-            )
         shown = case_file.output
+        nodes, some = shown_nodes(shown.nodes.tolist())
+        start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
+        scale, enlarged = visible_scale(case, trajectory)
+        yield from album.structure(case)
+        if case.loads or case.imposed_terms or case.base_terms:
+            yield album.figure(
+                "load",
+                "Loads and imposed motions over time.",
+                lambda: plots.plot_load_history(case, duration, start=start),
+            )
+        yield Heading("The motion")
+        yield album.figure(
+            "motion",
+            f"Displacement of the chosen nodes{some} (left) and its frequency content (right), "
+            f"{rules(results)}.",
+            lambda: plots.plot_history(
+                results, nodes, axes=shown.axis, max_frequency=shown.max_frequency
+            ),
+        )
         film = album.folder / f"motion.{shown.animation}"
-        sections += [
-            Heading("The motion"),
-            album.figure(
-                "motion",
-                f"Displacement of the chosen nodes{some} (left) and its frequency content "
-                f"(right), {rules}.",
-                lambda: plots.plot_history(
-                    results, nodes, axes=shown.axis, max_frequency=shown.max_frequency
-                ),
-            ),
-            Picture(
-                plots.animate(case, trajectory, film, scale=scale),
-                f"The motion with mass rule {first}{enlarged(scale)}; at rest in gray.",
-            ),
-            album.figure(
-                "energies",
-                f"Energies over time and the error of their balance, mass rule {first}.",
-                lambda: plots.plot_energies(trajectory),
-            ),
-            Heading("The numbers"),
-            _table(case_file, results, nodes),
-            Text(
-                "The energy error is the largest imbalance of kinetic + strain + dissipated energy "
-                "- work, relative to the largest of them. The results carry their own case and can "
-                "be run again from it."
-            ),
-            *provenance(case_file, results, command),
-        ]
-        return write_report(album.folder / "report.html", case_file.heading, sections)
+        yield Picture(
+            plots.animate(case, trajectory, film, scale=scale),
+            f"The motion with mass rule {first}{enlarged}; at rest in gray.",
+        )
+        yield album.figure(
+            "energies",
+            f"Energies over time and the error of their balance, mass rule {first}.",
+            lambda: plots.plot_energies(trajectory),
+        )
+        yield Heading("The numbers")
+        yield _table(case_file, results, nodes)
+        yield Text(
+            "The energy error is the largest imbalance of kinetic + strain + dissipated energy - "
+            "work, relative to the largest of them. The results carry their own case and can be "
+            "run again from it."
+        )
 
 
 class _Prepared:
@@ -227,25 +200,24 @@ class _Prepared:
         return self.motion.run(progress)
 
 
-def _table(case_file: CaseFile, results: Mapping[str, xarray.Dataset], nodes: list[int]) -> Table:
-    columns: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
-        "steps": lambda a: a["steps"],
-        "step (s)": lambda a: a["dt"],
-        "critical step (s)": lambda a: (
-            a["critical_step"] if np.isfinite(a["critical_step"]) else None
-        ),
-        "steps per second": lambda a: a["steps"] / max(a["wall_seconds"], 1e-9),
-        "energy error": lambda a: a["energy_error"],
-    }
-    rows = []
-    for rule, result in results.items():
+def _table(case_file: CaseFile, results: ByRule, nodes: list[int]) -> Table:
+    def largest(result: xarray.Dataset) -> float:
         moved = result["displacement"].to_numpy()[:, nodes]
-        largest = float(np.linalg.norm(moved, axis=-1).max())
-        rows.append([rule, *(of(result.attrs) for of in columns.values()), largest])
-    shown = ", ".join(map(str, nodes))
-    return Table(
-        ["mass rule", *columns, "largest displacement (m)"],
-        rows,
-        f"{case_file.path.name}: the runs; displacement of nodes {shown}",
-        digits=3,
-    )
+        return float(np.linalg.norm(moved, axis=-1).max())
+
+    columns = {
+        "steps": "steps",
+        "step (s)": "dt",
+        "critical step (s)": lambda result: cell(result.attrs["critical_step"]),
+        "steps per second": lambda result: _speed(result.attrs),
+        "energy error": "energy_error",
+        "largest displacement (m)": largest,
+    }
+    moved = ", ".join(map(str, nodes))
+    caption = f"{case_file.path.name}: the runs; displacement of nodes {moved}"
+    return by_mass_rule(results, columns, caption)
+
+
+def _speed(attributes: Mapping[str, Any]) -> float:
+    """Steps per second."""
+    return attributes["steps"] / max(attributes["wall_seconds"], 1e-9)

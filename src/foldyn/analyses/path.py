@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from contextlib import closing
+from typing import Annotated, Any, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
-from foldyn.analyses.path_page import path_page
+from foldyn.analyses.path_page import path_sections
 from foldyn.analyses.sections import (
-    MOST_SHAPES,
     Animation,
     CaseSchema,
     Count,
     ModelSection,
-    Nodes,
     Positive,
     Section,
+    ShownSection,
     Whole,
     check_mass,
     one_of,
     part,
+    some_shapes,
 )
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
@@ -35,9 +35,6 @@ from foldyn.cases.supports import AXES, DIRECTIONS, check_axis, support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.values import indices, number, show
-
-if TYPE_CHECKING:
-    import xarray
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
 """Keys that are settings of the solver."""
@@ -66,17 +63,6 @@ def _load_factors(value: Any) -> list[float]:
     return [number(f"[{i}]", item) for i, item in enumerate(value)]
 
 
-def _shapes(value: Any) -> int | tuple[int, ...]:
-    if isinstance(value, int) and not isinstance(value, bool):
-        if not 1 <= value <= MOST_SHAPES:
-            raise InputError(f" = {value}: give 1 to {MOST_SHAPES} shapes, or a list of points")
-        return value
-    chosen = indices("", value, "point", "or how many shapes to draw")
-    if len(chosen) > MOST_SHAPES:
-        raise InputError(f": {len(chosen)} points; give at most {MOST_SHAPES}")
-    return chosen
-
-
 TIMELESS = (
     "a path has no time; leave it out: what loads and moves the structure grows with the load "
     "factor (or is named in analysis.constant)"
@@ -86,25 +72,8 @@ NO_BASE = (
 )
 
 
-class UntilSection(Section):
-    """Where a path ends: a node's displacement along an axis reaches a value."""
-
-    node: Whole
-    axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
-    displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
-
-    @model_validator(mode="after")
-    def _moves(self) -> Self:
-        if self.displacement == 0.0:
-            raise InputError(
-                " = 0: the path begins there; give where it shall end", ".displacement"
-            )
-        return self
-
-
-@dataclass(frozen=True)
-class Reached:
-    """Whether a node has reached a displacement, as a function for `until` of `trace`.
+class Reached(Section):
+    """[analysis.until]: whether a node has moved so far along an axis; `until` of `trace`.
 
     Attributes
     ----------
@@ -115,9 +84,15 @@ class Reached:
         from zero on the same side.
     """
 
-    node: int
-    axis: str
-    displacement: float
+    node: Whole
+    axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
+    displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if self.displacement == 0.0:
+            raise InputError(" = 0: the path begins there; say where it ends", ".displacement")
+        return self
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
         """Whether it is so for displacements (n, 3), m."""
@@ -134,19 +109,18 @@ class PathSection(Section):
     steps: Count | None = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
-    until: UntilSection | None = None
+    until: Reached | None = None
     inertia_relief: bool = False
     tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn
     stability: bool = Settings.stability
 
 
-class PathOutput(Section):
+class PathOutput(ShownSection):
     """[output] of a path: what is shown."""
 
-    nodes: Nodes = None
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
-    shapes: Annotated[int | tuple[int, ...], PlainValidator(_shapes)] = 4
+    shapes: Annotated[int | tuple[int, ...], some_shapes("shapes", "point")] = 4
     animation: Animation = "gif"
 
 
@@ -186,7 +160,6 @@ class PathAnalysis(Analysis):
         until = schema.analysis.until
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
-            given["until"] = Reached(**until.model_dump())
         settings = Settings(**{name: given.pop(name) for name in SETTINGS})
         return cls({**given, "settings": settings})
 
@@ -200,22 +173,19 @@ class PathAnalysis(Analysis):
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            points = _bar(progress)
-            found = 0
+            count = 0
 
             def tell(point: Point) -> None:
-                nonlocal found
-                if not found:
+                nonlocal count
+                if not count:
                     points.clear()
                     begun()
-                found += 1
+                count += 1
                 points.set_postfix_str(f"load factor {point.factor:.4g}", refresh=False)
                 points.update()
 
-            try:
+            with closing(_bar(progress)) as points:
                 return trace(case, progress=tell, **given)
-            finally:
-                points.close()
 
         return compute
 
@@ -238,17 +208,11 @@ class PathAnalysis(Analysis):
             return np.flatnonzero(case.imposed.any(axis=1))
         return super().shown(case)
 
-    def page(
-        self, case_file: CaseFile, results: Mapping[str, xarray.Dataset], folder: Path,
-        command: str = "",
-    ) -> Path:  # fmt: skip
-        """Draw the path; see `Analysis`."""
-        (path,) = results.values()
-        return path_page(case_file, path, folder, command)
+    sections = staticmethod(path_sections)
 
 
 def _bar(shown: bool) -> Any:
-    """Bar of points: how many there will be is not known."""
+    """Bar of points, whose number is not known."""
     made = bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
     made.set_postfix_str("first use compiles kernels, up to half a minute")
     return made

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
+import xarray
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
-from foldyn.analyses.provenance import provenance
-from foldyn.plots.along import along, evenly, main_direction
-from foldyn.report.album import Album, enlarged, shown_nodes, visible_scale
-from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
-
-if TYPE_CHECKING:
-    import xarray
+from foldyn.plots.along import CRITICAL, along, evenly, main_direction
+from foldyn.report.album import Album, ByRule, listed, shown_nodes, visible_scale
+from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
@@ -27,83 +22,65 @@ MOST_COLUMNS = 4
 """Nodes whose displacements the table shows at most."""
 
 
-def path_page(case_file: CaseFile, path: xarray.Dataset, folder: Path, command: str = "") -> Path:
-    """Draw a case and its path into `folder`; returns the path of report.html."""
-    album, case = Album(folder), case_file.case()
+def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
+    """See `Analysis.sections`."""
+    (path,) = results.values()
+    case = case_file.case()
     moved = plots.moved_supports(case)
-    chosen = case_file.output.nodes.tolist()
-    nodes, some = shown_nodes(chosen, MOST_CURVES)
+    nodes, some = shown_nodes(case_file.output.nodes.tolist(), MOST_CURVES)
     direction = case_file.output.axis or main_direction({"": path}, nodes)
-    sections: list[Section] = [*album.structure(case), Heading("The path")]
+    yield from album.structure(case)
+    yield Heading("The path")
     if moved is not None:
-        sections.append(
-            album.figure(
-                "reaction",
-                f"Total force of the supports at {_nodes(moved[0])}, which are moved along "
-                f"{moved[1]}, over their displacement. {_multiplied(path)}",
-                lambda: plots.plot_reaction({"": path}, *moved),
-            )
+        yield album.figure(
+            "reaction",
+            f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
+            f"{moved[1]}, over their displacement. {_multiplied(path)}",
+            lambda: plots.plot_reaction({"": path}, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
-        sections.append(
-            album.figure(
-                "curve",
-                f"Load factor over the displacement of {_nodes(nodes)}{some} along {direction}. "
-                f"{_multiplied(path)}",
-                lambda: plots.plot_load_displacement({"": path}, nodes, direction),
-            )
+        yield album.figure(
+            "curve",
+            f"Load factor over the displacement of {listed('node', nodes)}{some} along "
+            f"{direction}. {_multiplied(path)}",
+            lambda: plots.plot_load_displacement({"": path}, nodes, direction),
         )
     if path.sizes["step"] > 1:
-        sections.append(
-            album.figure(
-                "energies",
-                f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, "
-                "with the work that was done on the structure; below, their shares.",
-                lambda: plots.plot_path_energies(path, *_growing(path, moved)),
-            )
+        over: tuple[list[int], str] | tuple[None, None] = None, None
+        if moved is not None and (np.diff(along(path, *moved)) > 0.0).all():
+            over = moved  # they only move forward
+        yield album.figure(
+            "energies",
+            f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
+            "done on the structure; below, their shares.",
+            lambda: plots.plot_path_energies(path, *over),
         )
-    scale = visible_scale(case, path)
-    sections.append(
-        album.figure(
-            "shapes",
-            f"The deformed sheet{enlarged(scale)}; the undeformed one in gray.",
-            lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
-        )
+    scale, enlarged = visible_scale(case, path)
+    yield album.figure(
+        "shapes",
+        f"The deformed sheet{enlarged}; the undeformed one in gray.",
+        lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
     )
     if path.sizes["step"] > 1:
-        file = album.folder / f"path.{case_file.output.animation}"
-        plots.animate(case, path, file, frames=FRAMES, fps=FPS, scale=scale)
-        sections.append(Picture(file, f"Along the path{enlarged(scale)}; at rest in gray."))
-    sections += [
-        Heading("The numbers"),
-        _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved),
-        _run(case_file, path),
-        Text(
-            "Stable means that the tangent stiffness of the free nodes has no negative eigenvalue: "
-            "nodes that supports move stay where they are. At every point the out-of-balance "
-            "force is below the tolerance times "
-            "the forces at play, or rounding. The result carries its own case, can be run again "
-            "from it, and motions can start from its points."
-        ),
-        *provenance(case_file, {case_file.masses[0]: path}, command),
-    ]
-    return write_report(album.folder / "report.html", case_file.heading, sections)
-
-
-def _growing(
-    path: xarray.Dataset, moved: tuple[list[int], str] | None
-) -> tuple[list[int], str] | tuple[None, None]:
-    """The moved supports, if they only move forward."""
-    if moved is None or not (np.diff(along(path, *moved)) > 0.0).all():
-        return None, None
-    return moved
+        film = album.folder / f"path.{case_file.output.animation}"
+        plots.animate(case, path, film, frames=FRAMES, fps=FPS, scale=scale)
+        yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
+    yield Heading("The numbers")
+    yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
+    yield _run(case_file, path)
+    yield Text(
+        "Stable means that the tangent stiffness of the free nodes has no negative eigenvalue: "
+        "nodes that supports move stay where they are. At every point the out-of-balance force is "
+        "below the tolerance times the forces at play, or rounding. The result carries its own "
+        "case, can be run again from it, and motions can start from its points."
+    )
 
 
 def _multiplied(path: xarray.Dataset) -> str:
     """What the load factor is."""
     constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
-    but = f", but for {_list('loads', constant)}, which act in full all along" if constant else ""
-    return f"The factor multiplies the loads and displacements that the structure has above{but}."
+    but = f", except {listed('load', constant)} (in full throughout)" if constant else ""
+    return f"The factor multiplies the loads and displacements shown above{but}."
 
 
 def _points(
@@ -118,64 +95,43 @@ def _points(
     rows = sorted({*special, *drawn, *evenly(path, MOST_ROWS)})
     shares = plots.energy_shares(path)
     total = sum(path[f"strain_{name}"].values for name in shares)
-    header = ["point", "load factor"]
-    columns: list[np.ndarray] = [path["load_factor"].values]
+    columns = {"load factor": path["load_factor"].values}
     if moved is not None:
-        header += [f"moved along {moved[1]} (m)", "force (N)"]
-        columns += [along(path, *moved), plots.total_reaction(path, *moved)]
-    shown = [node for node in nodes if moved is None or node not in moved[0]]
-    header += [f"node {node} along {direction} (m)" for node in shown]
-    columns += [along(path, [node], direction) for node in shown]
-    header += ["strain energy (J)", *(f"{name} (%)" for name in shares)]
-    columns += [np.asarray(total), *(100.0 * share for share in shares.values())]
-    header += ["iterations", "stability", "kind"]
+        columns[f"moved along {moved[1]} (m)"] = along(path, *moved)
+        columns["force (N)"] = plots.total_reaction(path, *moved)
+    for node in nodes:
+        if moved is None or node not in moved[0]:
+            columns[f"node {node} along {direction} (m)"] = along(path, [node], direction)
+    columns["strain energy (J)"] = np.asarray(total)
+    columns |= {f"{name} (%)": 100.0 * share for name, share in shares.items()}
     negative = path["negative_eigenvalues"].values
     judged = ["" if n < 0 else "stable" if n == 0 else "unstable" for n in negative.tolist()]
-    kinds = {"regular": "", "limit": "limit point", "bifurcation": "bifurcation"}
     table = [
         [
             k,
-            *(None if np.isnan(column[k]) else float(column[k]) for column in columns),
+            *(cell(column[k]) for column in columns.values()),
             int(path["iterations"][k]),
             judged[k],
-            kinds[str(path["point"].values[k])],
+            CRITICAL.get(str(path["point"].values[k]), ""),
         ]
         for k in rows
     ]
+    header = ["point", *columns, "iterations", "stability", "kind"]
     return Table(header, table, "Points of the path, with all limit points and bifurcations")
 
 
 def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
-    a = path.attrs
-    header = [
-        "method",
-        "points",
-        "limit points",
-        "bifurcations",
-        "Newton iterations",
-        "factorizations",
-        "step cuts",
-        "tolerance",
-        "time (s)",
-    ]
     kinds = path["point"].values
-    row = [
-        a["method"],
-        path.sizes["step"],
-        int((kinds == "limit").sum()),
-        int((kinds == "bifurcation").sum()),
-        a["newton_iterations"],
-        a["factorizations"],
-        a["step_cuts"],
-        a["tolerance"],
-        a["wall_seconds"],
-    ]
-    return Table(header, [row], f"{case_file.path.name}: the run", digits=3)
-
-
-def _nodes(nodes: list[int]) -> str:
-    return f"node {nodes[0]}" if len(nodes) == 1 else _list("nodes", nodes)
-
-
-def _list(what: str, numbers: list[int]) -> str:
-    return f"{what} {', '.join(map(str, numbers))}"
+    cells = {
+        "method": path.attrs["method"],
+        "points": path.sizes["step"],
+        "limit points": int((kinds == "limit").sum()),
+        "bifurcations": int((kinds == "bifurcation").sum()),
+        "Newton iterations": path.attrs["newton_iterations"],
+        "factorizations": path.attrs["factorizations"],
+        "step cuts": path.attrs["step_cuts"],
+        "tolerance": path.attrs["tolerance"],
+        "time (s)": path.attrs["wall_seconds"],
+    }
+    caption = f"{case_file.path.name}: the run"
+    return Table(list(cells), [list(cells.values())], caption, digits=3)

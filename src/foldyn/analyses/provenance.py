@@ -7,20 +7,18 @@ from dataclasses import fields
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from foldyn.analyses.casefile import CaseFile
+from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.values import plain
 
 if TYPE_CHECKING:
-    import xarray
+    from foldyn.analyses.casefile import CaseFile
 
 UNITS: Mapping[str, str] = {"youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3"}
 MOST = 200  # characters of a value
 
 
-def provenance(
-    case_file: CaseFile, results: Mapping[str, xarray.Dataset], command: str = ""
-) -> list[Section]:
+def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[Section]:
     """Sheet, model and damping in a table, and the case file itself.
 
     command : what was typed to compute it.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,7 @@ from pydantic import ValidationError
 
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
-from foldyn.analyses.limits import check_values
-from foldyn.analyses.messages import describe
+from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.registry import ANALYSES, schema_of
 from foldyn.cases import Case, Rayleigh, resolve_nodes
 from foldyn.cases.decode import call_from
@@ -23,8 +23,9 @@ from foldyn.formats import read_pattern
 from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern
 from foldyn.structures import Sheet
+from foldyn.values import LARGEST, MOST, SMALLEST, show
 
-MOST = 2
+MOST_MIB = 2
 """Size of a case file (MiB)."""
 
 
@@ -116,7 +117,6 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
     masses = list(schema.model.mass or [model.mass])
-    cases: dict[str, Case] = {}
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
     pattern: Any = None
     sheet: Any = None
@@ -142,7 +142,8 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         with within("", path):
             return Case(structure, schema.supports, schema.loads, damping)
 
-    cases[masses[0]] = case = make(masses[0])
+    case = make(masses[0])
+    cases = {masses[0]: case}
     with warnings.catch_warnings():  # the other rules would only repeat them
         warnings.simplefilter("ignore", FoldynWarning)
         cases |= {mass: make(mass) for mass in masses[1:]}
@@ -155,24 +156,56 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
             else resolve_nodes(case.structure, chosen, "output.nodes")
         )
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
-    found = CaseFile(
+    case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
         Output(nodes, chosen is not None, **shown), schema, make, cases,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:
         for mass in masses:
-            found.start(mass)  # a support may hold what the rigid motion moves
-    return found
+            case_file.start(mass)  # a support may hold what the rigid motion moves
+    return case_file
 
 
 def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
-    text = read_text(path, "a case file (TOML)", MOST, "put long tables into files of their own")
+    text = read_text(
+        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
+    )
     with within("", path):
         document = from_toml(text)
         check_values(document)
     return document
+
+
+def check_values(document: Mapping[str, Any]) -> None:
+    """Refuse numbers that cannot be computed with.
+
+    What is not finite is left to the checks of the keys, which know what is right there. Small
+    numbers in lists are left alone: tables of a pulse have such tails.
+    """
+    for place, value in _values(document):
+        words = ""
+        if isinstance(value, int) and not -MOST - 1 <= value <= MOST:
+            words = "a whole number of at most 64 bits"
+        elif isinstance(value, float) and LARGEST < abs(value) < math.inf:
+            words = f"in size at most {LARGEST:g}"
+        elif isinstance(value, float) and 0.0 < abs(value) < SMALLEST:
+            words = "" if isinstance(place[-1], int) else f"0 or in size at least {SMALLEST:g}"
+        if words:
+            raise InputError(f"{dotted(place)} = {show(value)}: must be {words}")
+
+
+def _values(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+    """All values that are not tables or lists, each with its place."""
+    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), document)]
+    while waiting:
+        place, value = waiting.pop()
+        if isinstance(value, Mapping | list):
+            inside = value.items() if isinstance(value, Mapping) else enumerate(value)
+            waiting += reversed([((*place, key), item) for key, item in inside])
+        else:
+            yield place, value
 
 
 def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:

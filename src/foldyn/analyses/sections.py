@@ -13,29 +13,21 @@ from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
-from foldyn.cases.damping import STATES
+from foldyn.cases.case import STATES
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import support_from
+from foldyn.cases.supports import AXES, support_from
 from foldyn.errors import Faults, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
-from foldyn.structures.options import CALIBRATIONS, SCHEMES
-from foldyn.values import MOST, choice, nearest, number, numbers, show, vector
+from foldyn.structures.structure import CALIBRATIONS, SCHEMES
+from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 
-AXES = ("x", "y", "z")
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
@@ -47,8 +39,33 @@ class Section(BaseModel):
 
 
 def one_of(known: Iterable[str]) -> PlainValidator:
-    """Take one of some words."""
+    """Accept one of the known words."""
     return PlainValidator(lambda value: choice("", value, known))
+
+
+def some_shapes(drawn: str, what: str, least: int = -MOST) -> PlainValidator:
+    """Accept how many shapes are drawn, or their numbers.
+
+    drawn : their name in messages, "modes"
+    what : what the numbers count, "mode"
+    least : the least of these numbers
+    """
+
+    def count_or_numbers(value: Any) -> int | tuple[int, ...]:
+        if isinstance(value, int) and not isinstance(value, bool):
+            if not 1 <= value <= MOST_SHAPES:
+                raise InputError(
+                    f" = {value}: give 1 to {MOST_SHAPES} {drawn}, or a list of {what} numbers"
+                )
+            return value
+        chosen = indices("", value, what, f"or how many {drawn} to draw")
+        if min(chosen) < least:
+            raise InputError(f" = {show(value)}: {what}s are counted from {least}")
+        if len(chosen) > MOST_SHAPES:
+            raise InputError(f": {len(chosen)} {what}s; give at most {MOST_SHAPES}")
+        return chosen
+
+    return PlainValidator(count_or_numbers)
 
 
 def _pattern(value: Any) -> dict[str, Any]:
@@ -95,9 +112,7 @@ def _inline(value: Mapping[str, Any]) -> None:
     if not isinstance(faces, list) or not faces:
         raise InputError(f".faces = {show(faces)}: must be a list of panels, as in [[0, 1, 2]]")
     for i, face in enumerate(faces):
-        if not isinstance(face, list) or any(
-            isinstance(v, bool) or not isinstance(v, int) for v in face
-        ):
+        if not isinstance(face, list) or any(type(vertex) is not int for vertex in face):
             raise InputError(f".faces[{i}] = {show(face)}: must be a list of vertex numbers")
     letters = value.get("assignments", [])
     if not isinstance(letters, list) or any(not isinstance(letter, str) for letter in letters):
@@ -137,17 +152,8 @@ def check_mass(place: str, name: Any, info: ValidationInfo) -> str:
     return choice(place, name, known)
 
 
-def _creases(value: Any) -> Any:
-    if not isinstance(value, list):
-        return number("", value)
-    array = numbers("", value)
-    if array.ndim != 1 or not array.size:
-        raise InputError(f" = {show(value)}: must be a number, or a list of one per crease")
-    return array
-
-
 def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
-    """Take the table of a load or support; some keys may be refused, each for a reason."""
+    """Accept the table of a load or support; some keys may be refused, each for a reason."""
 
     def read_part(value: Any, info: ValidationInfo) -> Any:
         for key in why:
@@ -165,7 +171,7 @@ Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
-PerCrease = Annotated[Any, PlainValidator(_creases)]
+PerCrease = Annotated[Any, PlainValidator(lambda value: number_or_list("", value, "crease"))]
 Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
@@ -215,6 +221,13 @@ class ModelSection(Section):
         """What the file says of the options of its model, but for the mass."""
         given = self.model_fields_set - {"kind", "mass"}
         return {key: getattr(self, key) for key in MODELS[self.kind].keys if key in given}
+
+
+class ShownSection(Section):
+    """[output]: nodes that figures show, and the axis along which they do."""
+
+    nodes: Nodes = None
+    axis: Annotated[Any, one_of(AXES)] = None
 
 
 class DampingSection(Section):

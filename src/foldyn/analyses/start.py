@@ -1,4 +1,4 @@
-"""How a motion or path starts, or about what modes swing, as a case file says it."""
+"""Initial states in a case file: rigid motions, and states of stored results."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class MotionStart(Section):
 
 
 class Start(NamedTuple):
-    """A state, and of a stored one how far its folds are folded, if it says so."""
+    """A state, and for a stored one the load factor to which its creases are folded, if known."""
 
     state: State | None = None  # rest
     load_factor: float | None = None
@@ -82,20 +82,20 @@ def start_of(section: MotionStart | StoredStart | None, case: Case, folder: Path
 
 
 def _stored(section: MotionStart | StoredStart, case: Case, folder: Path) -> Start:
-    said = f".file = {show(section.file)}: "
-    with within(said):
+    place = f".file = {show(section.file)}: "
+    with within(place):
         result = load(folder / section.file)
     try:
         state = initial_state(result, section.at)
     except InputError as error:
-        raise error.within("." if error.key == "at" else said) from None
-    wanted = len(case.structure.nodes)
+        raise error.within("." if error.key == "at" else place) from None
+    count = len(case.structure.nodes)
     for array in (state.displacement, state.velocity):
-        if array is not None and len(np.asarray(array)) != wanted:
+        if array is not None and len(np.asarray(array)) != count:
             raise InputError(
                 f"holds a motion of {len(np.asarray(array))} nodes, but this structure has "
-                f"{wanted}; give a result of the same pattern and model",
-                said,
+                f"{count}; give a result of the same pattern and model",
+                place,
             )
     if "load_factor" not in result:
         return Start(state)

@@ -1,6 +1,6 @@
-"""What modes and frequency responses share: one state, about which structures swing.
+"""What modes and frequency responses share: the one state about which a structure vibrates.
 
-Supports and loads are preloads, which act in full in its equilibrium and have no history.
+Supports and loads are preloads: they act in full in its equilibrium and have no history.
 """
 
 from __future__ import annotations
@@ -78,17 +78,16 @@ class VibrationSchema(CaseSchema):
 
 def about(case_file: CaseFile, mass: str) -> dict[str, Any]:
     """Arguments for the stored state that a case file names; none where it names none."""
-    start = case_file.start(mass)
-    found = {"state": start.state, "load_factor": start.load_factor}
-    return {key: value for key, value in found.items() if value is not None}
+    start = case_file.start(mass)._asdict()
+    return {key: value for key, value in start.items() if value is not None}
 
 
 @contextmanager
 def bar_closed(bar: Any) -> Iterator[Any]:
-    """Close a bar in the end.
+    """Close a bar at the end.
 
-    What a search for the equilibrium or a simulated motion has come to is no result of this kind,
-    and is not kept.
+    The partial result of a search for equilibrium, or of a simulated motion, is not a result of
+    this kind and is not kept.
     """
     try:
         yield bar

@@ -1,26 +1,96 @@
-"""The case: what a solver gets."""
+"""The case: what a solver gets, a structure with supports, loads and damping; and its states."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases.damping import Rayleigh
-from foldyn.cases.function import as_history
-from foldyn.cases.histories import History
-from foldyn.cases.loads import LOADS, Gravity
-from foldyn.cases.part import Load
+from foldyn.cases.history import History, as_history
+from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
 from foldyn.errors import Faults, InputError
-from foldyn.values import show
+from foldyn.structures.discretized import read_only
+from foldyn.values import choice, number, numbers, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
+Summands = Iterable[tuple[NDArray[np.float64], Any]]
+
+
+STATES = ("rest", "start")
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
+
+    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2.
+
+    Parameters
+    ----------
+    alpha : float
+        Mass-proportional coefficient (1/s), at least 0.
+    beta : float
+        Stiffness-proportional coefficient (s), at least 0.
+    state : {"rest", "start"}
+        Where K0 is taken: at the structure's rest, or where a motion starts (for modes and
+        frequency responses: the state about which it vibrates).
+    """
+
+    alpha: float = 0.0
+    beta: float = 0.0
+    state: str = "rest"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "alpha", number("alpha", self.alpha, least=0.0))
+        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
+        choice("state", self.state, STATES)
+
+    def matrix(self, mass: Any, stiffness: Any) -> Any:
+        """C from M (kg) and K0 (N/m)."""
+        damping = mass * self.alpha
+        return damping if self.beta == 0.0 else damping + self.beta * stiffness
+
+    def rate(self, omega: Any) -> Any:
+        """Damping (1/s) of a mode with angular frequency omega (rad/s) and modal mass 1 kg m2."""
+        return self.alpha + self.beta * omega**2
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Displacement and velocity of every node, for example to start a motion from.
+
+    Parameters
+    ----------
+    displacement : array_like, shape (n, 3), optional
+        Displacement (m) of every node from its rest position; zero by default.
+    velocity : array_like, shape (n, 3), optional
+        Velocity (m/s) of every node; zero by default.
+    """
+
+    displacement: ArrayLike | None = None
+    velocity: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        shapes = set()
+        for name in ("displacement", "velocity"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = numbers(name, value)
+            if array.ndim != 2 or array.shape[1] != 3:
+                raise InputError(f"{name}: shape {array.shape}: must be (nodes, 3)")
+            shapes.add(array.shape)
+            object.__setattr__(self, name, array)
+        if len(shapes) == 2:
+            raise InputError("displacement and velocity: must have the same shape")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +168,9 @@ class Case:
     def _check_selections(self) -> None:
         """Refuse nodes and creases that are not there, all at once."""
         faults = Faults()
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, BaseMotion):
-                with faults.collected():
-                    self._nodes_of(i, support)
+        for place, support in self._supports(Fix, Impose):
+            with faults.collected():
+                self._nodes_of(place, support)
         for place, load in self._loads():
             with faults.collected():
                 load.loaded(self.structure, place)
@@ -112,42 +181,36 @@ class Case:
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
         """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
-        mask = self.imposed | self._held
-        mask.flags.writeable = False
-        return mask
+        return read_only(self.imposed | self._held)
 
     @cached_property
     def imposed(self) -> NDArray[np.bool_]:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, Impose):
-                continue
-            nodes, axis = self._nodes_of(i, support), AXES.index(support.axis)
-            for taken, how in ((self._held, "held and imposed"), (mask, "imposed twice")):
+        for place, support in self._supports(Impose):
+            nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
+            for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
                 if twice.size:
                     raise InputError(
-                        f"supports[{i}]: node {twice[0]} is {how} along {support.axis}, a "
+                        f"{place}: node {twice[0]} is {both} along {support.axis}, a "
                         "contradictory support; leave out one of the two"
                     )
             mask[nodes, axis] = True
-        mask.flags.writeable = False
-        return mask
+        return read_only(mask)
 
     @cached_property
     def _held(self) -> NDArray[np.bool_]:
         """Whether a Fix holds each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
-        for i, support in enumerate(self.supports):
-            if isinstance(support, Fix):
-                nodes = self._nodes_of(i, support)
-                for axis in support.axes:
-                    mask[nodes, AXES.index(axis)] = True
+        for place, support in self._supports(Fix):
+            nodes = self._nodes_of(place, support)
+            for axis in support.axes:
+                mask[nodes, AXES.index(axis)] = True
         return mask
 
-    def _nodes_of(self, i: int, support: Fix | Impose) -> NDArray[np.int64]:
-        return resolve_nodes(self.structure, support.nodes, f"supports[{i}].nodes")
+    def _nodes_of(self, place: str, support: Any) -> NDArray[np.int64]:
+        return resolve_nodes(self.structure, support.nodes, f"{place}.nodes")
 
     @cached_property
     def free_dofs(self) -> NDArray[np.int64]:
@@ -162,38 +225,39 @@ class Case:
     @cached_property
     def imposed_terms(self) -> Terms:
         """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for i, support in enumerate(self.supports):
-            if isinstance(support, Impose):
-                vector = np.zeros((len(self.structure.nodes), 3))
-                vector[self._nodes_of(i, support), AXES.index(support.axis)] = support.value
-                _add(terms, as_history(support.history), vector)
-        return _frozen(terms)
+        return _summed(self._imposed())
+
+    def _imposed(self) -> Summands:
+        for place, support in self._supports(Impose):
+            vector = np.zeros((len(self.structure.nodes), 3))
+            vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
+            yield vector, support.history
 
     @cached_property
     def base_terms(self) -> Terms:
         """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
+        return _summed(self._moved_by_the_base())
+
+    def _moved_by_the_base(self) -> Summands:
         base = self.fixed & ~self.imposed
-        for i, support in enumerate(self.supports):
-            if not isinstance(support, BaseMotion):
-                continue
+        for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
             if not base[:, axis].any():
                 raise InputError(
-                    f"supports[{i}]: the base moves along {support.axis}, but no support holds a "
+                    f"{place}: the base moves along {support.axis}, but no support holds a "
                     f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
                     "out the base motion"
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            _add(terms, as_history(support.history), vector)
-        return _frozen(terms)
+            yield vector, support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:
         """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
+        return _summed(self._actuated())
+
+    def _actuated(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease
         for place, load in self._loads():
             actuated = load.rest_changes(self.structure, place)
@@ -209,35 +273,29 @@ class Case:
                 first[crease] = place
             vector = np.zeros(len(self.structure.folds))
             vector[creases] = change
-            _add(terms, as_history(load.history), vector)
-        return _frozen(terms)
+            yield vector, load.history
 
     @cached_property
     def load_terms(self) -> Terms:
         """Forces (N) on all nodes, shape (n, 3), each with its history."""
-        return self._force_terms(lambda load: True)
+        return _summed(self._forces(self._loads()))
 
     @cached_property
     def force_terms(self) -> Terms:
         """The terms of `load_terms` without gravity."""
-        return self._force_terms(lambda load: load.arrows)
+        return _summed(self._forces(pair for pair in self._loads() if pair[1].arrows))
 
-    def _force_terms(self, counts: Callable[[Load], bool]) -> Terms:
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for place, load in self._loads():
-            forces = load.forces(self.structure, place) if counts(load) else None
+    def _forces(self, loads: Iterable[tuple[str, Load]]) -> Summands:
+        for place, load in loads:
+            forces = load.forces(self.structure, place)
             if forces is not None:
-                _add(terms, as_history(load.history), forces)
-        return _frozen(terms)
+                yield forces, load.history
 
     @cached_property
     def gravity_terms(self) -> Terms:
         """Accelerations of gravity (m/s2), shape (3,), each with its history."""
-        terms: list[tuple[NDArray[np.float64], History]] = []
-        for load in self.loads:
-            if isinstance(load, Gravity):
-                _add(terms, as_history(load.history), np.array(load.acceleration))
-        return _frozen(terms)
+        gravity = (load for load in self.loads if isinstance(load, Gravity))
+        return _summed((np.array(load.acceleration), load.history) for load in gravity)
 
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:
@@ -250,6 +308,11 @@ class Case:
         pairs = [load.rest_changes(self.structure, place) for place, load in self._loads()]
         return _union([pair[0] for pair in pairs if pair is not None])
 
+    def _supports(self, *kinds: type) -> Iterator[tuple[str, Any]]:
+        """Supports of some kinds, with their places for messages."""
+        places = ((f"supports[{i}]", support) for i, support in enumerate(self.supports))
+        return ((place, support) for place, support in places if isinstance(support, kinds))
+
     def _loads(self) -> Iterator[tuple[str, Load]]:
         """Loads with their places for messages."""
         return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))
@@ -259,21 +322,17 @@ def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *numbers]))
 
 
-def _add(
-    terms: list[tuple[NDArray[np.float64], History]], history: History, vector: NDArray[np.float64]
-) -> None:
-    """Add a vector to the term with an equal history, or as a new term."""
-    for known, other in terms:
-        if other == history:
-            known += vector
-            return
-    terms.append((vector, history))
-
-
-def _frozen(terms: list[tuple[NDArray[np.float64], History]]) -> Terms:
-    for vector, _ in terms:
-        vector.flags.writeable = False
-    return tuple(terms)
+def _summed(parts: Summands) -> Terms:
+    """Vectors with their histories, those with equal histories added."""
+    terms: list[tuple[NDArray[np.float64], History]] = []
+    for vector, given in parts:
+        history = as_history(given)
+        same = next((total for total, other in terms if other == history), None)
+        if same is None:
+            terms.append((vector, history))
+        else:
+            same += vector
+    return tuple((read_only(vector), history) for vector, history in terms)
 
 
 def _tuple_of(name: str, kinds: tuple[type, ...], given: Any) -> tuple:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.input_files import read_text
 from foldyn.values import shortened, show, suggest
 
@@ -44,7 +45,7 @@ _HEADER = 'begin with a line that names the columns, as in "time [s],force [N]"'
 
 @dataclass(frozen=True)
 class _Column:
-    """One column: its place in a line, its heading as it stands, and the parts of that."""
+    """One column: its place in a line, its heading as written, and the parts of the heading."""
 
     place: int
     heading: str
@@ -74,15 +75,34 @@ def read_columns(
         file = Path(path)
     except TypeError:
         raise InputError(f"path = {show(path)}: must be the path of a CSV file") from None
-    text = _text(file)
-    try:
-        return _columns(text, time, value, wanted)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
+    with _opened(file) as (columns, lines):
+        chosen = _find("time", time, columns, 0), _find("value", value, columns, 1)
+        if chosen[0] == chosen[1]:
+            raise InputError(f'time and value: are both the column "{chosen[0].shown}"; name two')
+        ratios = _time_ratio(chosen[0]), _value_ratio(chosen[1], wanted)
+        rows = [
+            [_number(number, cells, item, r) for item, r in zip(chosen, ratios, strict=True)]
+            for number, cells in lines
+        ]
+        if len(rows) < 2:
+            raise InputError(f"too few lines of numbers ({len(rows)}); a table needs at least two")
+        times, values = np.array(rows, dtype=np.float64).T
+        back = np.flatnonzero(np.diff(times) <= 0.0)
+        if back.size:
+            i = int(back[0]) + 1
+            raise InputError(
+                f"line {lines[i][0]}: the time {times[i]:.9g} s does not come after the time "
+                f"before it ({times[i - 1]:.9g} s); times must increase"
+            )
+        return times, values
 
 
-def _text(file: Path) -> str:
-    return read_text(file, "a CSV file in UTF-8", MOST, "take fewer lines or columns")
+@contextmanager
+def _opened(file: Path) -> Iterator[tuple[list[_Column], list[tuple[int, list[str]]]]]:
+    """Columns and lines of a file, which messages name; see `_lines`."""
+    text = read_text(file, "a CSV file in UTF-8", MOST, "take fewer lines or columns")
+    with within("", file):
+        yield _lines(text)
 
 
 def read_numbers(
@@ -112,34 +132,25 @@ def read_numbers(
     InputError
         As `Table.from_csv`, but for the order of the lines.
     """
-    file = Path(path)
-    text = _text(file)
-    try:
-        columns, rows = _lines(text)
-        found = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
+    with _opened(Path(path)) as (columns, rows):
+        chosen = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
         ratios = [
             _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
-            for item, (_, unit) in zip(found, wanted.values(), strict=True)
+            for item, (_, unit) in zip(chosen, wanted.values(), strict=True)
         ]
         empty = [field in gaps for field in wanted]
         values = np.array([[_number(n, row, c, r, gap)
-                            for c, r, gap in zip(found, ratios, empty, strict=True)]
+                            for c, r, gap in zip(chosen, ratios, empty, strict=True)]
                            for n, row in rows])  # fmt: skip
         if not len(values):
             raise InputError("holds no lines of numbers below the names of the columns")
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
     return dict(zip(wanted, values.T, strict=True))
 
 
 def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
     """Names and units of the columns of a CSV file; None where a column has no unit."""
-    file = Path(path)
-    text = _text(file)
-    try:
-        return [(column.name, column.unit) for column in _lines(text)[0]]
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
+    with _opened(Path(path)) as (columns, _):
+        return [(column.name, column.unit) for column in columns]
 
 
 def some(names: Sequence[str]) -> str:
@@ -157,7 +168,7 @@ def _lines(text: str) -> tuple[list[_Column], list[tuple[int, list[str]]]]:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise InputError(f"holds no lines but empty ones and comments; {_HEADER}")
+        raise InputError(f"holds only empty lines and comments; {_HEADER}")
     number, first = lines[0]
     delimiter = next((mark for mark in _DELIMITERS if mark in first), ",")
     columns = _headings(number, _cells(number, first, delimiter))
@@ -171,31 +182,6 @@ def _lines(text: str) -> tuple[list[_Column], list[tuple[int, list[str]]]]:
             )
         rows.append((number, cells))
     return columns, rows
-
-
-def _columns(
-    text: str, time: str | None, value: str | None, wanted: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    columns, lines = _lines(text)
-    found = _find("time", time, columns, 0), _find("value", value, columns, 1)
-    if found[0] == found[1]:
-        raise InputError(f'time and value: are both the column "{found[0].shown}"; name two')
-    ratios = _time_ratio(found[0]), _value_ratio(found[1], wanted)
-    rows = [
-        [_number(number, cells, item, r) for item, r in zip(found, ratios, strict=True)]
-        for number, cells in lines
-    ]
-    if len(rows) < 2:
-        raise InputError(f"too few lines of numbers ({len(rows)}); a table needs at least two")
-    times, values = np.array(rows, dtype=np.float64).T
-    back = np.flatnonzero(np.diff(times) <= 0.0)
-    if back.size:
-        i = int(back[0]) + 1
-        raise InputError(
-            f"line {lines[i][0]}: the time {times[i]:.9g} s does not come after the time "
-            f"before it ({times[i - 1]:.9g} s); times must increase"
-        )
-    return times, values
 
 
 def _cells(number: int, line: str, delimiter: str) -> list[str]:
@@ -216,9 +202,9 @@ def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
         )
     columns = []
     for place, cell in enumerate(cells):
-        found = re.search(r"\[([^][]*)\]$", cell)
-        name = cell[: found.start()].strip() if found else cell
-        unit = found.group(1).strip() if found else ""
+        brackets = re.search(r"\[([^][]*)\]$", cell)
+        name = cell[: brackets.start()].strip() if brackets else cell
+        unit = brackets.group(1).strip() if brackets else ""
         columns.append(_Column(place, cell, name, _SPELLINGS.get(unit, unit) or None))
     return columns
 
@@ -226,14 +212,14 @@ def _headings(number: int, cells: Sequence[str]) -> list[_Column]:
 def _find(field: str, wanted: str | None, columns: Sequence[_Column], default: int) -> _Column:
     if wanted is None:
         return columns[default]
-    found = [column for column in columns if wanted.strip() in (column.heading, column.name)]
-    if len(found) == 1:
-        return found[0]
+    fits = [column for column in columns if wanted.strip() in (column.heading, column.name)]
+    if len(fits) == 1:
+        return fits[0]
     listed, asked = some([f'"{column.shown}"' for column in columns]), shortened(wanted)
-    if found:
-        raise InputError(f'{field} = "{asked}": names {len(found)} of the columns {listed}')
+    if fits:
+        raise InputError(f'{field} = "{asked}": names {len(fits)} of the columns {listed}')
     hint = suggest(wanted, [known for column in columns for known in (column.name, column.heading)])
-    raise InputError(f'{field} = "{asked}": is no column; {hint}there are {listed}')
+    raise InputError(f'{field} = "{asked}": no such column; {hint}there are {listed}')
 
 
 def _quantity(unit: str) -> str | None:
@@ -249,8 +235,8 @@ def _time_ratio(column: _Column) -> Fraction:
         )
     if column.unit not in TIME_UNITS:
         raise InputError(
-            f'column "{column.shown}": [{shortened(column.unit)}] is no unit of time; use one of '
-            f"{listed}"
+            f'column "{column.shown}": [{shortened(column.unit)}] is not a unit of time; use one '
+            f"of {listed}"
         )
     return TIME_UNITS[column.unit]
 

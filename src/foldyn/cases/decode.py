@@ -1,4 +1,4 @@
-"""From tables (of a case file or a stored case) to histories, laws and calls of generators.
+"""From tables (of a case file or a stored case) to histories, laws, parts of a case, generators.
 
 Every message begins with what follows the table's own place: ".duration = -1: must be ...", so
 that the caller puts "loads[0].history" in front.
@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Self, cast, get_args, get_origin, get_type_hints
 
 from foldyn.cases.histories import HISTORIES, History, Table
 from foldyn.errors import Faults, InputError, within
-from foldyn.values import choice, number, show, suggest, whole
+from foldyn.values import choice, number, plain, show, suggest, whole
 
 
 def history_from(table: Any, folder: Path | None = None) -> History:
@@ -122,10 +123,8 @@ def _table_from_file(arguments: Mapping[str, Any], folder: Path) -> Table:
     if not isinstance(file, str) or not file:
         raise InputError(f".file = {show(file)}: must be the path of a CSV file")
     columns = {name: value for name, value in arguments.items() if name != "file"}
-    try:
+    with within(f".file = {show(file)}: "):
         return Table.from_csv(folder / file, **columns)
-    except InputError as error:
-        raise InputError(f".file = {show(file)}: {error}") from None
 
 
 def _checked(place: str, value: Any, hint: Any) -> Any:
@@ -147,3 +146,56 @@ def _checked(place: str, value: Any, hint: Any) -> Any:
             for i, (item, part) in enumerate(zip(value, inner, strict=True))
         )
     return value
+
+
+class Part:
+    """A load or a support.
+
+    Attributes
+    ----------
+    keys : mapping of str to str
+        Keys of its table in a case file, and the arguments that they set.
+    missing : mapping of str to str
+        Remedies in messages where a key is missing that must not be: those of arguments without a
+        default, and those given here; "history" may be among them.
+    """
+
+    keys: ClassVar[Mapping[str, str]]
+    missing: ClassVar[Mapping[str, str]] = {}
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any], folder: Path | None = None) -> Self:
+        """Make it from its table; errors name fields inside the table.
+
+        Parameters
+        ----------
+        table : mapping
+        folder : Path, optional
+            Where relative paths of CSV files start; without it no file is read.
+        """
+        needed = {item.name for item in fields(cast(Any, cls)) if item.default is MISSING}
+        for key in (*(key for key, name in cls.keys.items() if name in needed), *cls.missing):
+            if key not in table:
+                raise InputError(f": missing; {cls.missing.get(key, 'give its value')}", f".{key}")
+        given = {argument: table[key] for key, argument in cls.keys.items() if key in table}
+        if "history" in table:
+            with within(".history"):
+                given["history"] = history_from(table["history"], folder)
+        try:
+            return cls(**given)
+        except InputError as error:
+            inside = error.field[len(error.key) :]
+            key = next((key for key, name in cls.keys.items() if name == error.key), error.key)
+            raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
+
+    def table(self) -> dict[str, Any]:
+        """Its table of plain values, without the history."""
+        return {key: plain(getattr(self, argument)) for key, argument in self.keys.items()}
+
+
+def given_keys(table: Any, kinds: Iterable[type[Part]]) -> set[str]:
+    """Keys of a table, each of which must belong to one of some kinds of parts."""
+    if not isinstance(table, Mapping):
+        raise InputError(f" = {show(table)}: must be a table")
+    check_keys(table, dict.fromkeys([*(key for kind in kinds for key in kind.keys), "history"]))
+    return set(table)

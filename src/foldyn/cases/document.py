@@ -17,14 +17,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.case import Case
-from foldyn.cases.damping import Rayleigh
+from foldyn.cases.case import Case, Rayleigh
 from foldyn.cases.decode import law_from
-from foldyn.cases.function import as_history
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
-from foldyn.cases.loads import load_from
+from foldyn.cases.history import as_history
+from foldyn.cases.loads import Load, load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
-from foldyn.cases.part import Load
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
@@ -88,7 +86,7 @@ def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) ->
         return _read(_resolve(sections, arrays))
     except InputError:
         raise
-    except Exception as error:  # whatever a number or a table in the wrong place leads to
+    except Exception as error:  # whatever a wrong number or table leads to
         raise InputError(f"the stored case is damaged ({type(error).__name__}: {error})") from error
 
 
@@ -170,12 +168,8 @@ class _Writer:
                 f'{name} is "{law.name}", a user\'s own law, of which only the name is stored'
             )
             return {"kind": "user", "name": str(law.name)}
-        arguments = {
-            f.name: getattr(law, f.name)
-            for f in dataclasses.fields(law)
-            if f.init and f.name != "name"
-        }
-        return {"kind": kind, **{key: plain(value) for key, value in arguments.items()}}
+        names = [f.name for f in dataclasses.fields(law) if f.init and f.name != "name"]
+        return {"kind": kind, **{name: plain(getattr(law, name)) for name in names}}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
@@ -219,7 +213,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     supports = [support_from(item) for item in sections["supports"]]
     loads = [load_from(item) for item in sections["loads"]]
     structure = _structure(sections)
-    with warnings.catch_warnings():  # they were given when the case was first made
+    with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
         return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
 
@@ -253,7 +247,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
             )
         centers = {k: nodes[c] for k, c in enumerate(structure.centers) if c >= 0}
         if centers and not np.array_equal(nodes, structure.nodes):
-            # panel centers given by hand, or found to other last digits on another machine
+            # panel centers given by hand, or computed to other last digits on another machine
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
 

@@ -11,7 +11,7 @@ from foldyn.values import shortened
 LONGEST = 1000
 """Characters of an expression."""
 DEEPEST = 50
-"""Operations in one another."""
+"""Nested operations."""
 
 
 def parse(text: str) -> ast.expr:
@@ -35,7 +35,7 @@ def parse(text: str) -> ast.expr:
         level = [inner for node in level for inner in ast.iter_child_nodes(node)]
         if not level:
             return tree
-    raise InputError(f"has more than {DEEPEST} operations in one another")
+    raise InputError(f"has more than {DEEPEST} nested operations")
 
 
 def written(node: ast.expr) -> str:

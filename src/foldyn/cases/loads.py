@@ -1,4 +1,4 @@
-"""Loads: forces on nodes, gravity, and the registry of all."""
+"""Loads: forces on nodes, gravity, creases that fold by themselves, and the registry of all."""
 
 from __future__ import annotations
 
@@ -6,20 +6,57 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.actuation import Actuate
-from foldyn.cases.function import as_history
-from foldyn.cases.histories import History
-from foldyn.cases.part import Load, given_keys
-from foldyn.cases.selection import check_nodes, resolve_nodes
+from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.history import History, as_history
+from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.values import show, vector
+from foldyn.values import number_or_list, show, vector
 
 __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
+
+
+class Load(Part):
+    """A load: a frozen dataclass that says what it does at factor 1 of its history.
+
+    A new kind is a subclass that is listed in `LOADS`; `place`, its place among the loads, is for
+    messages.
+
+    Attributes
+    ----------
+    apart : str
+        In messages: why it cannot share a table with another load.
+    arrows : bool
+        Whether pictures show its forces as arrows at the nodes.
+    moves : bool
+        Whether its history is that of a motion, whose velocity counts.
+    """
+
+    apart: ClassVar[str]
+    arrows: ClassVar[bool] = False
+    moves: ClassVar[bool] = False
+    history: Any
+
+    def forces(self, structure: Any, place: str) -> NDArray[np.float64] | None:
+        """Forces (n, 3), N, on all nodes; None if it is not a force."""
+        return None
+
+    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+        """Nodes on which it acts; none if it acts on all, or on creases."""
+        return np.zeros(0, np.int64)
+
+    def rest_changes(
+        self, structure: Any, place: str
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+        """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
+        return None
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse what the structure or its held dofs (n, 3) do not allow."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +78,6 @@ class Force(Load):
     history: History | Callable[[Any], Any] | None = None
 
     keys = {"nodes": "nodes", "force": "vector"}
-    missing = dict.fromkeys(keys, "give its value")
     apart = "acts on some nodes"
     arrows = True
 
@@ -57,9 +93,9 @@ class Force(Load):
 
     def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Load`."""
-        found = np.zeros((len(structure.nodes), 3))
-        found[self.loaded(structure, place)] = self.vector
-        return found
+        forces = np.zeros((len(structure.nodes), 3))
+        forces[self.loaded(structure, place)] = self.vector
+        return forces
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a force that acts on held axes only; warn of one that does so in part."""
@@ -82,7 +118,7 @@ class Force(Load):
             )
         warnings.warn(
             f"{place}: the force {show(self.vector)} acts in part where supports hold its nodes: "
-            f"{what}; that part goes into the reactions only",
+            f"{what}; that part only adds to the reactions",
             FoldynWarning,
             stacklevel=4,
         )
@@ -94,7 +130,7 @@ class Gravity(Load):
 
     Each node gets the sum of its row of the mass matrix times the acceleration, so that the
     weight is exact with every mass rule and a free structure falls with the acceleration itself.
-    What supports hold goes into the reactions.
+    The part that supports hold adds to the reactions.
 
     Parameters
     ----------
@@ -108,7 +144,6 @@ class Gravity(Load):
     history: History | Callable[[Any], Any] | None = None
 
     keys = {"gravity": "acceleration"}
-    missing = dict.fromkeys(keys, "give its value")
     apart = "acts on the whole structure"
 
     def __post_init__(self) -> None:
@@ -126,6 +161,71 @@ class Gravity(Load):
         """Refuse gravity where the mass is not known."""
         with within(f"{place}: gravity needs the mass of the structure: "):
             _ = structure.mass
+
+
+@dataclass(frozen=True)
+class Actuate(Load):
+    """Creases that fold or unfold by themselves.
+
+    The rest dihedral of each crease moves from its rest value (`Structure.fold_rest`) to `angle`
+    in proportion to the factor of the history.
+
+    Parameters
+    ----------
+    creases : int, sequence of int, or {"all", "mountain", "valley"}
+        Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
+        "valley", or "all", which are all but the flat ones.
+    angle : float or sequence of float
+        Rest dihedral (degrees, 0 to 360, flat 180) at factor 1, of all these creases or of each.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    creases: int | str | Sequence[int]
+    angle: float | Sequence[float]
+    history: History | Callable[[Any], Any] | None = None
+
+    keys = {"creases": "creases", "angle": "angle"}
+    apart = "creases and angle are a load of their own"
+    moves = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "creases", check_creases("creases", self.creases))
+        object.__setattr__(self, "angle", check_angles("angle", self.angle))
+        object.__setattr__(self, "history", as_history(self.history))
+
+    def rest_changes(
+        self, structure: Any, place: str
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """See `Load`; refuses angles that the fold law cannot be free of stress at."""
+        creases = resolve_creases(structure, self.creases, f"{place}.creases")
+        angles = np.array(self.angle)
+        if angles.ndim and len(angles) != len(creases):
+            raise InputError(
+                f" = {show(self.angle)}: {len(angles)} angles for {len(creases)} creases; give "
+                "one, or one for each",
+                f"{place}.angle",
+            )
+        closed = angles[(angles == 0.0) | (angles == 360.0)]
+        if closed.size and not structure.fold_law.closed_at_rest:
+            raise InputError(
+                f"{place}.angle = {closed[0]:g}: this fold law, free of stress at rest, has an "
+                "infinite moment there; give an angle between 0 and 360 degrees (flat: 180), or "
+                "another fold_law"
+            )
+        return creases, np.radians(angles) - structure.fold_rest[creases]
+
+
+def check_angles(name: str, angle: Any) -> float | tuple[float, ...]:
+    """Return a dihedral (degrees) for all creases, or a tuple of one for each."""
+    checked = number_or_list(name, angle, "crease")
+    listed = isinstance(checked, tuple)
+    for i, value in enumerate(checked if listed else (checked,)):
+        if not 0.0 <= value <= 360.0:
+            place = f"{name}[{i}]" if listed else name
+            raise InputError(f" = {value:g}: must lie between 0 and 360 degrees (flat: 180)", place)
+    return checked
 
 
 LOADS: tuple[type[Load], ...] = (Force, Gravity, Actuate)

@@ -15,7 +15,7 @@ BARS_AND_HINGES, SHELL = Structure.kind, Shell.kind
 
 @dataclass(frozen=True)
 class Model:
-    """A way to make a structure of a pattern and a sheet.
+    """A way to make a structure from a pattern and a sheet.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class Model:
     options : type
         Dataclass of its options.
     masses : iterable of str
-        Its distributions of mass.
+        Distributions of mass that it offers.
     name : str
         In messages.
     """
@@ -41,7 +41,7 @@ class Model:
 
     @property
     def mass(self) -> str:
-        """Distribution of mass that it has by default."""
+        """Its default distribution of mass."""
         return self.options().mass
 
 

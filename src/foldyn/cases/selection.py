@@ -1,6 +1,6 @@
-"""Selections: nodes by number, or vertices by an expression such as "zmax and y>0".
+"""Selections: nodes by number or, as "zmax and y>0", by place; creases by number or assignment.
 
-An expression is made of
+An expression for nodes is made of
 
 - ``xmin xmax ymin ymax zmin zmax``: vertices at an extreme of the pattern;
 - comparisons of ``x``, ``y`` or ``z`` (m) with numbers: ``y > 0``, ``0 <= x < 1.5``, ``z == 0``;
@@ -14,7 +14,7 @@ the pattern (at rest), never panel centers. They are read by a small parser, nev
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,13 +22,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError, within
-from foldyn.values import indices, shortened, show
+from foldyn.values import indices, shortened, show, suggest
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""
 
+SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
+"""Words for creases, and the assignments that each means."""
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
+_COMPARISONS: Mapping[type[ast.cmpop], Callable[[NDArray, float], NDArray]] = {
+    ast.Lt: lambda difference, tolerance: difference < -tolerance,
+    ast.LtE: lambda difference, tolerance: difference <= tolerance,
+    ast.Gt: lambda difference, tolerance: difference > tolerance,
+    ast.GtE: lambda difference, tolerance: difference >= -tolerance,
+    ast.Eq: lambda difference, tolerance: np.abs(difference) <= tolerance,
+    ast.NotEq: lambda difference, tolerance: np.abs(difference) > tolerance,
+}
 _MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 
 
@@ -60,14 +70,14 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
     vertices = np.asarray(getattr(points, "vertices", points), dtype=np.float64)
     span = np.ptp(vertices, axis=0)
     selector = _Selector(expression, vertices, TOLERANCE * float(np.linalg.norm(span)))
-    found = np.flatnonzero(selector.mask())
-    if found.size == 0:
+    chosen = np.flatnonzero(selector.mask())
+    if chosen.size == 0:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         ranges = ", ".join(f"{axis} {low[i]:.6g} to {high[i]:.6g}" for axis, i in _AXES.items())
         raise InputError(
             f'"{shortened(expression)}": selects no vertex; the pattern spans {ranges} (m)'
         )
-    return found
+    return chosen
 
 
 def resolve_nodes(
@@ -93,12 +103,17 @@ def resolve_nodes(
         pattern = structure.pattern  # None for a structure made by hand: all nodes are vertices
         with within(f"{field} = "):
             return select(structure.nodes if pattern is None else pattern, nodes)
-    chosen = np.array(check_nodes(nodes, field), dtype=np.int64)
-    count = len(structure.nodes)
+    check_nodes(nodes, field)
+    return _in_range(field, nodes, len(structure.nodes), "node")
+
+
+def _in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]:
+    """Return numbers of nodes or creases, of which the structure has `count`, as an array."""
+    chosen = np.atleast_1d(np.array(given, dtype=np.int64))
     bad = chosen[(chosen < 0) | (chosen >= count)]
     if bad.size:
         raise InputError(
-            f" = {show(nodes)}: node {bad[0]} is out of range; this structure has nodes 0 to "
+            f" = {show(given)}: {what} {bad[0]} is out of range; this structure has {what}s 0 to "
             f"{count - 1}",
             field,
         )
@@ -114,6 +129,64 @@ def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
             _Selector(nodes, np.zeros((1, 3)), 0.0).mask()
         return nodes
     return indices(field, nodes, "node", 'or a selection such as "xmin"')
+
+
+def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
+    """Return a choice of creases, checked but for its range: a word or a tuple of numbers."""
+    if isinstance(creases, str):
+        if creases not in SELECTIONS:
+            words = ", ".join(f'"{word}"' for word in SELECTIONS)
+            raise InputError(
+                f" = {show(creases)}: {suggest(creases, SELECTIONS)}give crease numbers, as in "
+                f"[0, 1], or one of {words}",
+                name,
+            )
+        return creases
+    return indices(name, creases, "crease", "or one of " + ", ".join(map(show, SELECTIONS)))
+
+
+def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDArray[np.int64]:
+    """Numbers of creases of a structure from numbers or a word.
+
+    Parameters
+    ----------
+    structure : Structure
+        Its folds bound the numbers; its pattern's assignments serve words.
+    creases : str or tuple of int
+        As `check_creases` returns them; numbers are kept in the order given.
+    name : str
+        Name of the field for messages.
+
+    Raises
+    ------
+    InputError
+        The structure has no folds, a number is out of range, or no crease has the assignment.
+    """
+    count = len(structure.folds)
+    if count == 0:
+        raise InputError(
+            f"{name} = {show(creases)}: this structure has no folds to actuate; give a pattern "
+            "with creases"
+        )
+    if isinstance(creases, str):
+        return _assigned(structure.pattern, creases, name)
+    return _in_range(name, creases, count, "crease")
+
+
+def _assigned(pattern: Any, word: str, name: str) -> NDArray[np.int64]:
+    if pattern is None:
+        raise InputError(
+            f'{name} = "{word}": this structure has no pattern with assignments; give crease '
+            "numbers"
+        )
+    chosen = np.flatnonzero([letter in SELECTIONS[word] for letter in pattern.assignments])
+    if not chosen.size:
+        wanted = "that is not flat" if word == "all" else f"assigned {word}"
+        raise InputError(
+            f'{name} = "{word}": this pattern has no crease {wanted}; give crease numbers, or '
+            "assignments to the pattern"
+        )
+    return chosen
 
 
 class _Selector:
@@ -169,19 +242,10 @@ class _Selector:
         if not isinstance(left, ast.Name) or left.id not in _AXES:
             raise self._error("compare x, y or z with a number")
         difference = self.points[:, _AXES[left.id]] - self._number(right)
-        if isinstance(operator, ast.Lt):
-            return difference < -self.tolerance
-        if isinstance(operator, ast.LtE):
-            return difference <= self.tolerance
-        if isinstance(operator, ast.Gt):
-            return difference > self.tolerance
-        if isinstance(operator, ast.GtE):
-            return difference >= -self.tolerance
-        if isinstance(operator, ast.Eq):
-            return np.abs(difference) <= self.tolerance
-        if isinstance(operator, ast.NotEq):
-            return np.abs(difference) > self.tolerance
-        raise self._error("compare with <, <=, >, >=, == or !=")
+        compare = _COMPARISONS.get(type(operator))
+        if compare is None:
+            raise self._error("compare with <, <=, >, >=, == or !=")
+        return compare(difference, self.tolerance)
 
     def _number(self, node: ast.expr) -> float:
         sign = 1.0

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foldyn.cases.function import as_history
-from foldyn.cases.histories import History
-from foldyn.cases.part import Part, given_keys
+from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
-from foldyn.values import number, number_or_list, show
+from foldyn.values import choice, number, number_or_list, show
 
 AXES = "xyz"
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
@@ -34,7 +33,6 @@ class Fix(Part):
     axes: str = "xyz"
 
     keys = {"nodes": "nodes", "axes": "axes"}
-    missing = {"nodes": "give its value"}
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -72,7 +70,6 @@ class Impose(Part):
 
     keys = {"nodes": "nodes", "axis": "axis", "displacement": "value"}
     missing = {
-        "nodes": "give its value",
         "axis": 'give the axis of the displacement, as in axis = "x"',
         "displacement": "give it (m), or write axes instead of axis to hold nodes",
     }
@@ -158,8 +155,7 @@ def check_axis(name: str, axis: Any) -> str:
 
 def signed(name: str, direction: Any) -> tuple[int, float]:
     """Return the number of the axis and the sign of a direction: "-z" is (2, -1)."""
-    if not isinstance(direction, str) or direction not in DIRECTIONS:
-        raise InputError(f" = {show(direction)}: must be one of {', '.join(DIRECTIONS)}", name)
+    direction = choice(name, direction, DIRECTIONS)
     return AXES.index(direction[-1]), -1.0 if direction.startswith("-") else 1.0
 
 

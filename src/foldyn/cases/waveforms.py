@@ -1,8 +1,8 @@
-"""Histories inside compiled loops: the formulas of all built-in ones, and calls of the user's own.
+"""Histories inside compiled loops: the formulas of the built-in ones, and calls of users' own.
 
-A formula stands here once; `History.factor` and the integrators both evaluate it. Each gives the
-factor and its first and second derivative in time, which imposed motions need; where a derivative
-jumps, the value after the jump.
+Each formula is written once, here; `History.factor` and the integrators both evaluate it. It gives
+the factor and its first and second derivative in time, which imposed motions need; where a
+derivative jumps, the value after the jump.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.call import call1
 from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import call1
 
 CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
 CALLED = -1
@@ -69,7 +69,7 @@ def pack(histories: Sequence[Any], callbacks: Callbacks, span: float = 0.0) -> W
     """Histories as arrays for compiled code.
 
     A history has `code` and `parameters()`, tables also `polynomials()`; one whose code is
-    `CALLED` is called through `callbacks`. `span` is a time (s) short against its variations.
+    `CALLED` is called through `callbacks`. `span` (s) is short compared with its variations.
     """
     parameters = np.zeros((len(histories), PARAMETERS))
     knots, cubics = [np.zeros(0)], [np.zeros((0, 4))]
@@ -198,8 +198,8 @@ def waveform_table(w, row, times):
 def unseen(w, first, last, before, after, out):
     """Mean distance (h,) of histories from straight lines between their values at two times.
 
-    before, after : factors (h, 3) at the times `first` and `last`. What lies between them and what
-    a step with its load averaged over both ends does not see.
+    before, after : factors (h, 3) at the times `first` and `last`. The distance is what a step
+    misses that takes the load as the average of both ends.
     """
     for row in range(out.size):
         rate = (after[row, 0] - before[row, 0]) / (last - first)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import Results, held
-from foldyn.cli.force import add_force
-from foldyn.cli.speech import speech
+from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.options import add_results
 from foldyn.cli.stamp import Owner
-from foldyn.errors import ComputationError, InputError
+from foldyn.cli.streams import progress_bar, speech
+from foldyn.errors import InputError
 
 if TYPE_CHECKING:
     from foldyn.experiment import Course, Estimate, Fit
@@ -62,15 +61,7 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--axis", default="x", help="with a case file: axis of the data (default: x)")
     fit.add_argument("--starts", type=int, help="searches, from random starts within the bounds")
     fit.add_argument("--processes", type=int, help="evaluations that run at a time")
-    fit.add_argument("--out", help="folder of the results (default: NAME-fit)")
-    fit.add_argument(
-        "--replace", action="store_true", help="replace a fit of another file that is in the folder"
-    )
-    fit.add_argument(
-        "--no-figures", action="store_true", help="write the numbers only, no figures and report"
-    )
-    fit.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-    add_force(fit)
+    add_results(fit, "NAME-fit")
 
 
 def run_fit(given: argparse.Namespace) -> Path:
@@ -81,7 +72,7 @@ def run_fit(given: argparse.Namespace) -> Path:
     owner = Owner.of("fit", plan.path, folder)
     say = speech(given.quiet)
     with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
-        found = _found(plan, results, given.quiet or not sys.stderr.isatty())
+        found = _fit(plan, results, given.quiet)
         for one in found.estimates:
             say(f"  {_line(one, found.confidence)}")
         for score in found.scores:
@@ -92,19 +83,20 @@ def run_fit(given: argparse.Namespace) -> Path:
             results.keep(name, write)
         say(f"wrote {folder / WRITTEN[0]}")
         if not given.no_figures:
-            say(f"wrote {_drawn(found, plan, folder)}")
+            from foldyn.experiment.calibration.fit_page import write_fit
+
+            with drawing(folder):
+                say(f"wrote {write_fit(found, folder, plan.title)}")
     return folder
 
 
-def _found(plan: FitFile, results: Results, hidden: bool) -> Fit:
+def _fit(plan: FitFile, results: Results, quiet: bool) -> Fit:
     """Fit; every evaluation is kept."""
-    from tqdm import tqdm
-
     from foldyn.experiment import fit
 
     kept = results.folder / KEPT
     layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
-    with tqdm(bar_format=layout, leave=False, mininterval=0.0, disable=hidden) as bar:
+    with progress_bar(quiet, bar_format=layout, mininterval=0.0) as bar:
         bar.set_postfix_str("first use compiles kernels, up to half a minute")
 
         def tell(course: Course) -> None:
@@ -119,17 +111,6 @@ def _found(plan: FitFile, results: Results, hidden: bool) -> Fit:
             plan.case, plan.data, plan.parameters, ties=plan.ties, folder=kept,
             progress=tell, **plan.solver,
         )  # fmt: skip
-
-
-def _drawn(found: Fit, plan: FitFile, folder: Path) -> Path:
-    from foldyn.experiment.calibration.fit_page import write_fit
-
-    try:
-        return write_fit(found, folder, plan.title)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt("interrupted while figures were drawn") from None
-    except InputError as error:  # the input was right: something else went wrong
-        raise ComputationError(f"{folder}: {error}") from None
 
 
 def _line(one: Estimate, confidence: float) -> str:
@@ -148,10 +129,10 @@ def plan_of(given: argparse.Namespace) -> FitFile:
 
     path = find_case(given.file)
     if is_fit_file(path):
-        extra = {"DATA": given.data, "--vary": given.vary, "--tie": given.tie}
-        for name, told in {**extra, "--sigma": given.sigma}.items():
-            if told:
-                raise InputError(f"{name}: {path} is a fit file, which says that itself")
+        for name in ("data", "vary", "tie", "sigma"):
+            if getattr(given, name):
+                option = "DATA" if name == "data" else f"--{name}"
+                raise InputError(f"{option}: {path} is a fit file, which says that itself")
         plan = read_fit(path, find_case)
     else:
         plan = _of_case(path, given)
@@ -179,9 +160,8 @@ def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
         for file, sigma in zip(given.data, sigmas, strict=True)
     ]
     ties = dict(_halves(text, "--tie") for text in given.tie)
-    return FitFile(
-        path, "", path, tuple(data), tuple(map(_parameter, given.vary)), ties, {}
-    )  # fmt: skip
+    parameters = tuple(map(_parameter, given.vary))
+    return FitFile(path, "", path, tuple(data), parameters, ties, {})
 
 
 def _halves(text: str, option: str) -> tuple[str, str]:

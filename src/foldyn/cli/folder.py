@@ -27,7 +27,7 @@ def check_folder(folder: Path, out: str | None, names: Sequence[str]) -> None:
 
 @contextmanager
 def _made(folder: Path, out: str | None, names: Sequence[str]) -> Iterator[None]:
-    """Have a folder that can be written to; it goes again where nothing was written."""
+    """Make a folder and check that it can be written to; it is removed again if it stays empty."""
     if out == "":
         raise InputError("--out: is empty; name a folder")
     made: list[Path] = []
@@ -77,21 +77,21 @@ class Results:
     folder : Path
     kept : list of str
         What has been saved, where it is.
-    goes_on : bool
-        Whether the same command would go on from there.
+    resumable : bool
+        Whether the same command would continue from there.
     """
 
     def __init__(self, folder: Path, owner: Owner, drawn: Sequence[str], old: list[str]) -> None:
         self.folder, self.owner, self.drawn = folder, owner, drawn
         self.kept: list[str] = []
-        self.goes_on = False
+        self.resumable = False
         self._old, self._new = old, list[str]()
         self._before = stamp.raw(folder)
         self._begun = self._cleared = False
 
     def begin(self, name: str) -> None:
-        """Note a folder to which results go one by one, so that the same command goes on."""
-        self.goes_on = True
+        """Note a folder that collects results one by one, from which the same command continues."""
+        self.resumable = True
         self.kept.append(str(self.folder / name))
         self._new.append(name)
         self._stamp("running")
@@ -110,8 +110,9 @@ class Results:
                 self._stamp("running")  # a kill from here on leaves nothing old for new
                 write(file)
             except (OSError, InputError) as error:  # the folder has changed since it was checked
-                self.kept.append(elsewhere(file, write, reason(error)))
-                raise unwritten(file, reason(error)) from None
+                saved, failure = rescued(file, write, error)
+                self.kept.append(saved)
+                raise failure from None
             self.kept.append(str(file))
             self._new.append(name)
             self.clear()
@@ -119,7 +120,7 @@ class Results:
                 self._stamp("running")
 
     def clear(self) -> None:
-        """Remove the files of an earlier run, and its figures, which would belie this one."""
+        """Remove the files and figures of an earlier run, which would contradict this one."""
         if self._cleared:
             return
         self._cleared = True
@@ -130,18 +131,18 @@ class Results:
         self._old = []
 
     def end(self, state: str) -> None:
-        """Stamp the folder for the last time; as it was before, where nothing was written."""
+        """Stamp the folder for the last time, or restore its stamp if nothing was written."""
         with suppress(OSError):
             if self._new:
                 self._stamp(state)
             elif self._begun:
                 stamp.restore(self.folder, self._before)
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """What was kept, for the end of a message."""
         if not self.kept:
             return ""
-        further = "; the same command goes on from there" if self.goes_on else ""
+        further = "; the same command goes on from there" if self.resumable else ""
         return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
 
     def _stamp(self, state: str) -> None:
@@ -149,8 +150,12 @@ class Results:
         self._begun = True
 
 
-def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
-    """Save what cannot be saved as a file in the system's temporary folder; says where.
+def rescued(
+    file: Path, write: Callable[[Path], None], failure: BaseException
+) -> tuple[str, ComputationError]:
+    """Save in the system's temporary folder what could not be saved as a file.
+
+    Returns where it is, and what is to be raised.
 
     Raises
     ------
@@ -158,6 +163,7 @@ def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
         Nor can it be saved there.
     """
     made = None
+    place = f"{file}: cannot be written ({reason(failure)})"
     try:
         made = Path(tempfile.mkdtemp(prefix="foldyn-"))
         write(made / file.name)
@@ -165,16 +171,11 @@ def elsewhere(file: Path, write: Callable[[Path], None], why: str) -> str:
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)
         raise ComputationError(
-            f"{file}: cannot be written ({why}), nor can a temporary folder ({reason(error)}): it "
-            "is lost; make room, or name another place with --out"
+            f"{place}, nor can a temporary folder ({reason(error)}): it is lost; make room, or "
+            "name another place with --out"
         ) from None
-    return str(made / file.name)
-
-
-def unwritten(file: Path, why: str) -> ComputationError:
-    """What is raised where something has been saved elsewhere."""
-    told = f"{file}: cannot be written ({why}): make room, or name another place with --out"
-    return ComputationError(told)
+    remedy = "make room, or name another place with --out"
+    return str(made / file.name), ComputationError(f"{place}: {remedy}")
 
 
 @contextmanager
@@ -227,20 +228,20 @@ def held(
 
 @contextmanager
 def _naming(results: Results) -> Iterator[None]:
-    """Name what was kept where a run ends early."""
+    """Name what was kept if a run ends early."""
     try:
         yield
     except KeyboardInterrupt as stop:
-        raise KeyboardInterrupt(f"{str(stop) or 'interrupted'}{results.told()}") from None
+        raise KeyboardInterrupt(f"{str(stop) or 'interrupted'}{results.summary()}") from None
     except (FoldynError, OSError, MemoryError) as error:
         if not results.kept and not isinstance(error, ComputationError):
             raise
         partial = getattr(error, "partial", None)
-        raise ComputationError(f"{reason(error)}{results.told()}", partial) from None
+        raise ComputationError(f"{reason(error)}{results.summary()}", partial) from None
 
 
 def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: bool) -> list[str]:
-    """Results in a folder that a run replaces; refuses what is not its own."""
+    """Results in a folder that a run replaces; refuses those of others."""
     found = stamp.read(folder)
     if found is None:
         there = [path.name for path in folder.iterdir() if _RESULT.fullmatch(path.name)]
@@ -260,8 +261,20 @@ def _old(folder: Path, place: str, names: Sequence[str], owner: Owner, replace: 
     return list(dict.fromkeys(old))
 
 
+@contextmanager
+def drawing(place: object, kept: str = "") -> Iterator[None]:
+    """Report that figures could not be drawn, for whatever reason, and what was kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted while figures were drawn{kept}") from None
+    except Exception as error:
+        kind = "" if isinstance(error, FoldynError | OSError) else f"{type(error).__name__}: "
+        raise ComputationError(f"{place}: figures: {kind}{reason(error)}{kept}") from None
+
+
 def reason(error: BaseException) -> str:
-    """What an error says; of one of the system what it was about, without its number."""
+    """Message of an error; for one of the system, the file and the reason without its number."""
     if isinstance(error, MemoryError):
         return "not enough memory: take fewer cells, divisions, steps or samples"
     if not isinstance(error, OSError) or not error.strerror:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Callable
 from importlib import metadata
 
 from foldyn import __version__
@@ -17,12 +18,17 @@ def info() -> str:
     """Text of the command."""
     from foldyn.cases.models import MODELS
     from foldyn.dynamics import METHODS, compiled
+    from foldyn.experiment.camera import opencv
     from foldyn.formats import FORMATS
     from foldyn.linear.frf import METHODS as FRF_METHODS
     from foldyn.mechanics.threads import MOST
     from foldyn.patterns import GENERATORS
+    from foldyn.plots.writers import find_ffmpeg
     from foldyn.statics import METHODS as PATH_METHODS
+    from foldyn.statics import SOLVERS
 
+    video = _part(find_ffmpeg, "imageio-ffmpeg")
+    camera = _part(lambda: opencv().__version__, "opencv-python-headless")
     lines = [
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
@@ -32,9 +38,14 @@ def info() -> str:
     for name in METHODS:
         lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
     lines += [
-        f"optional parts: ffmpeg for MP4 animations, {_ffmpeg()}",
-        f"optional part for camera tracking: OpenCV, {_opencv()}",
-        *(f"optional solver for large structures: {text}" for text in _solvers()),
+        f"optional parts: ffmpeg for MP4 animations, {video}",
+        f"optional part for camera tracking: OpenCV, {camera}",
+        *(
+            f"optional solver for large structures: {name}, "
+            f"{'found' if solver.present else f'missing: pip install {solver.module}'}"
+            for name, solver in SOLVERS.items()
+            if solver.worthwhile > 0
+        ),
         f"methods of paths: {', '.join(PATH_METHODS)}",
         f"methods of frequency responses: {', '.join(FRF_METHODS)}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
@@ -48,36 +59,16 @@ def info() -> str:
     return "\n".join(lines)
 
 
-def _ffmpeg() -> str:
-    from foldyn.plots.writers import find_ffmpeg
-
+def _part(look: Callable[[], object], package: str) -> str:
+    """Say where a part was found, or how to install it."""
     try:
-        return f"found: {find_ffmpeg()}"
+        return f"found: {look()}"
     except InputError:
-        return "missing: pip install imageio-ffmpeg"
-
-
-def _opencv() -> str:
-    from foldyn.experiment.opencv import opencv
-
-    try:
-        return f"found: {opencv().__version__}"
-    except InputError:
-        return "missing: pip install opencv-python-headless"
-
-
-def _solvers() -> list[str]:
-    from foldyn.statics import SOLVERS
-
-    others = [(name, item) for name, item in SOLVERS.items() if item.worthwhile > 0]
-    return [
-        f"{name}, {'found' if item.present else 'missing: pip install ' + item.module}"
-        for name, item in others
-    ]
+        return f"missing: pip install {package}"
 
 
 def _version(name: str) -> str:
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
-        return "missing: pip install " + name
+        return f"missing: pip install {name}"

@@ -1,4 +1,4 @@
-"""A lock on a folder that the system lifts when its process ends, however that happens."""
+"""A lock on a folder, which the system lifts when its process ends, however that happens."""
 
 from __future__ import annotations
 

@@ -12,26 +12,28 @@ import shlex
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
-from foldyn.cli.force import add_force
+from foldyn.cli.options import add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
+from foldyn.cli.study import add_study, study
 from foldyn.cli.track import add_track, track
 from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+OTHERS = {"fit": run_fit, "track": track, "study": study}
+"""Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
-"""Environment of OpenCV: what decoders would say of a broken film is ours to say."""
-REPLACE = "replace results of another case file or command that the folder holds"
+"""Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """One whose messages have a length."""
+    """A parser that keeps its messages short."""
 
     def error(self, message: str) -> NoReturn:
         super().error(shortened(message))
@@ -78,33 +80,7 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
-    study = commands.add_parser(
-        "study",
-        help="the study of a paper, its numbers beside ours",
-        description="Compute the case studies of a paper, with a shell and with every mass "
-        "distribution; results, figures and report.html go to a folder. What is in the folder "
-        "already is not computed again.",
-    )
-    study.add_argument("name", choices=("herkal",), help="which: herkal (Herkal et al.)")
-    study.add_argument(
-        "--quick", action="store_true", help="coarser shell, longer steps: minutes, no measure"
-    )
-    study.add_argument(
-        "--sensitivity",
-        action="store_true",
-        help="instead: the same under other pulses, loads, bends and calibrations",
-    )
-    study.add_argument(
-        "--data",
-        nargs="+",
-        metavar="FILE",
-        help="measurements of the specimen instead of synthetic ones: a film of its release, "
-        "tracks (NetCDF), or tables (CSV)",
-    )
-    study.add_argument("--out", help="folder of the results (default: NAME-study or NAME-quick)")
-    study.add_argument("--replace", action="store_true", help=REPLACE)
-    study.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-
+    add_study(commands)
     add_fit(commands)
     add_track(commands)
     commands.add_parser(
@@ -120,11 +96,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     command.add_argument(
         "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
     )
-    command.add_argument("--out", help=f"folder of the results (default: NAME-{results})")
-    command.add_argument("--replace", action="store_true", help=REPLACE)
-    command.add_argument(
-        "--no-figures", action="store_true", help="write the result only, no figures and report"
-    )
+    add_results(command, f"NAME-{results}")
     command.add_argument(
         "--model",
         metavar="bars_and_hinges|shell",
@@ -133,12 +105,10 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     command.add_argument(
         "--divisions", type=int, metavar="N", help="pieces of every edge of a shell (16)"
     )
-    command.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
-    add_force(command)
 
 
 def _add_state(command: argparse.ArgumentParser) -> None:
-    """Add what says about which state a structure vibrates."""
+    """Add the options for the state about which a structure vibrates."""
     command.add_argument(
         "--state",
         metavar="rest|equilibrium|FILE",
@@ -171,7 +141,7 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings()
-            with at_most(1.0 if getattr(given, "force", True) else HALF):
+            with at_most(1.0 if given.command == "info" or given.force else HALF):
                 _call(given)
     except InputError as error:
         return _say(str(error), BAD_INPUT)
@@ -197,65 +167,31 @@ def _say(message: str, status: int) -> int:
 
 
 def _call(given: argparse.Namespace) -> None:
-    """Call what the command line asks for."""
+    """Run the command that was named."""
     if given.command == "info":
         from foldyn.cli.info import info
 
         print(info())
-        return
-    if given.command == "fit":
-        run_fit(given)
-        return
-    if given.command == "track":
-        track(given)
-        return
-    if given.command == "study":
-        from foldyn.cli.study import study
-
-        study(
-            given.name, given.quick, given.out, given.quiet, given.sensitivity, given.data,
-            given.replace,
-        )  # fmt: skip
-        return
-    from foldyn.analyses.reading import read_as, read_case
-    from foldyn.cli.run import run
-
-    model = given.model, given.divisions
-    how: dict[str, Any] = {"figures": not given.no_figures, "quiet": given.quiet}
-    how |= {"command": given.command, "replace": given.replace, "typed": given.typed}
-    if given.command == "run":
-        how |= {"read": lambda path: read_case(path, *model), "results": "results"}
+    elif given.command in OTHERS:
+        OTHERS[given.command](given)
     else:
-        kind, flags = given.command, _flags(given)
-        how |= {"read": lambda path: read_as(path, kind, flags, *model), "results": kind}
-    if given.model is not None:
-        how["results"] = f"{given.model}-{how['results']}"
-        how["command"] += f" --model {given.model}"
-    run(given.case, given.out, **how)
+        from foldyn.cli.run import run
 
-
-def _flags(given: argparse.Namespace) -> dict[str, Any]:
-    """Keys of [analysis] that the command line gives; None where it does not."""
-    flags = {key: getattr(given, key, None) for key in ("count", "method", "state", "secant")}
-    if getattr(given, "frequencies", None) is not None:
-        first, last, count = given.frequencies
-        whole = int(count) if count.is_integer() else count
-        flags["frequencies"] = {"first": first, "last": last, "count": whole}
-    return flags
+        run(given)
 
 
 class _Warnings:
-    """Writes warnings as the command's own lines, each once: mass rules would repeat them."""
+    """Writes each warning once, as a line of the command: mass rules would repeat them."""
 
     def __init__(self) -> None:
-        self.told: set[str] = set()
+        self.shown: set[str] = set()
 
     def __call__(self, message: Warning | str, category: type[Warning], *_: object) -> None:
         name = "" if issubclass(category, FoldynWarning) else f"{category.__name__}: "
         text = f"foldyn: warning: {name}{message}"
-        if text not in self.told:
+        if text not in self.shown:
             print(text, file=sys.stderr)
-        self.told.add(text)
+        self.shown.add(text)
 
 
 if __name__ == "__main__":

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 import warnings
+from argparse import Namespace
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
-from foldyn.cli.folder import Results, held, reason
-from foldyn.cli.speech import speech
+from foldyn.analyses.reading import read_as
+from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.stamp import Owner
-from foldyn.errors import ComputationError, FoldynError, InputError, MotionInterrupted
+from foldyn.cli.streams import speech
+from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
@@ -23,52 +25,60 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "bars_and_hinges": ("nodes", "bars", "folds", "bends"),
     "shell": ("nodes", "triangles", "folds"),
 }
-"""What is counted of the structure of each model."""
+"""What is counted in the structure of each model."""
 DRAWN = (
     "report.html", "structure.png", "laws.png",
     *(name for kind in ANALYSES.values() for name in kind.files),
 )  # fmt: skip
-"""All that pages come with."""
+"""Files of all pages."""
 
 
-def run(
-    case: str,
-    out: str | None,
-    figures: bool = True,
-    quiet: bool = False,
-    read: Callable[[Path], CaseFile] = read_case,
-    results: str = "results",
-    command: str = "run",
-    replace: bool = False,
-    typed: str = "",
-) -> Path:
-    """Run a case file and write its results; returns their folder, by default NAME-`results`.
+def run(given: Namespace) -> Path:
+    """Run a case file and write its results; returns their folder.
 
     Everything is checked before the first step is computed and before anything is written. The
     folder is stamped with the command and the case file: others' results in it are refused, or
-    replaced where that is asked for. The page shows what was `typed`.
+    replaced where that is asked for.
     """
-    path = find_case(case)
-    folder = Path(f"{path.stem}-{results}" if out is None else out)
-    with warnings.catch_warnings(record=True) as told:  # bad input gets its one message only
-        case_file = read(path)
+    path, figures = find_case(given.case), not given.no_figures
+    command, suffix = given.command, "results" if given.command == "run" else given.command
+    if given.model is not None:
+        command, suffix = f"{command} --model {given.model}", f"{given.model}-{suffix}"
+    folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
+    with warnings.catch_warnings(record=True) as caught:  # bad input gets its one message only
+        case_file = _read(path, given)
         task = [case_file.computation(mass) for mass in case_file.masses]
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], figures)
         if figures:
             _check_video(case_file)
     names = [one.file for one in task]
-    say = speech(quiet)
-    introduction = _Introduction(case_file, task, told, say)
+    say = speech(given.quiet)
+    introduction = _introduction(case_file, task, caught, say)
     owner = Owner.of(command, path, folder)
     pages = ["report.html"] if figures else []
-    with held(folder, out, [*names, *pages], owner, replace, DRAWN) as kept:
-        done = _computed(task, kept, introduction, not quiet and sys.stderr.isatty(), say)
+    with held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept:
+        done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
         say(f"wrote {', '.join(kept.kept)}")
         if figures:
-            page = _drawn(case_file, done, folder, typed, say)
+            say("drawing figures")
+            with drawing(case_file.path):  # whatever keeps them from it, the results are there
+                page = case_file.analysis.page(case_file, done, folder, given.typed)
             say(f"wrote figures and {page}")
     return folder
+
+
+def _read(path: Path, given: Namespace) -> CaseFile:
+    """Read a case file, for `foldyn modes` and `foldyn frf` as one of that kind."""
+    model = given.model, given.divisions
+    if given.command == "run":
+        return read_case(path, *model)
+    keys = {key: getattr(given, key, None) for key in ("count", "method", "state", "secant")}
+    if getattr(given, "frequencies", None) is not None:
+        first, last, count = given.frequencies
+        whole = int(count) if count.is_integer() else count
+        keys["frequencies"] = {"first": first, "last": last, "count": whole}
+    return read_as(path, given.command, keys, *model)
 
 
 def _computed(
@@ -76,6 +86,8 @@ def _computed(
     say: Callable[[str], None],
 ) -> dict[str, xarray.Dataset]:  # fmt: skip
     """Compute all there is, and save each result as soon as it is there."""
+    from foldyn.results import save
+
     done: dict[str, xarray.Dataset] = {}
     for one in task:
         try:
@@ -84,47 +96,23 @@ def _computed(
             failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
-                _keep(error.partial, one, results)
+                results.keep(one.file, partial(save, error.partial))
             raise failed from None
         result = done[one.mass]
-        _keep(result, one, results)
+        results.keep(one.file, partial(save, result))
         say(one.case_file.analysis.line(one.mass, result))
         _tell_missing(one.place, result, say)
     return done
 
 
-def _keep(result: xarray.Dataset, one: Computation, results: Results) -> None:
-    from foldyn.results import save
-
-    results.keep(one.file, partial(save, result))
-
-
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say which values a result lacks; it has failed where it may lack none."""
-    from foldyn.results.missing import REASONS, told
+    """Say which values a result lacks; raise if it should not lack them."""
+    from foldyn.results.quantities import REASONS, missing_values
 
-    for name, text in told(result).items():
+    for name, text in missing_values(result).items():
         if name not in REASONS:
             raise ComputationError(f"{place}{name}: {text}", result)
         say(f"  {name}: {text}")
-
-
-def _drawn(
-    case_file: CaseFile,
-    done: Mapping[str, xarray.Dataset],
-    folder: Path,
-    typed: str,
-    say: Callable[[str], None],
-) -> Path:
-    """Draw the figures; whatever keeps them from being drawn, the results are there."""
-    try:
-        say("drawing figures")
-        return case_file.analysis.page(case_file, done, folder, typed)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt("interrupted while figures were drawn") from None
-    except Exception as error:
-        kind = "" if isinstance(error, FoldynError | OSError) else f"{type(error).__name__}: "
-        raise ComputationError(f"{case_file.path}: figures: {kind}{reason(error)}") from None
 
 
 def _check_video(case_file: CaseFile) -> None:
@@ -139,31 +127,26 @@ def _check_video(case_file: CaseFile) -> None:
         raise InputError(f'{case_file.path}: output.animation = "mp4": {error}') from None
 
 
-class _Introduction:
-    """Says what is run, once, when nothing is left to be refused."""
+def _introduction(
+    case_file: CaseFile,
+    task: list[Computation],
+    caught: list[warnings.WarningMessage],
+    say: Callable[[str], None],
+) -> Callable[[], None]:
+    """Return a function that announces the run, once, when nothing is left to be refused."""
 
-    def __init__(
-        self,
-        case_file: CaseFile,
-        task: list[Computation],
-        told: list[warnings.WarningMessage],
-        say: Callable[[str], None],
-    ) -> None:
-        self.case_file, self.task, self.told, self.say = case_file, task, told, say
-        self.given = False
-
-    def __call__(self) -> None:
-        if self.given:
-            return
-        self.given = True
-        for one in self.told:
+    @cache
+    def introduce() -> None:
+        for one in caught:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
-        structure = self.case_file.case().structure
-        parts = PARTS[self.case_file.model]
+        structure = case_file.case().structure
+        parts = PARTS[case_file.model]
         counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)
-        self.say(f"{self.case_file.title or self.case_file.path.name}: {counted}")
-        if self.case_file.analysis.compiles([one.compute for one in self.task]):
-            self.say(
+        say(f"{case_file.title or case_file.path.name}: {counted}")
+        if case_file.analysis.compiles([one.compute for one in task]):
+            say(
                 "compiling the kernels: first use, up to half a minute; they are kept for later "
                 "runs"
             )
+
+    return introduce

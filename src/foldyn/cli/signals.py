@@ -32,7 +32,7 @@ class Endings:
 
     @contextmanager
     def heeded(self) -> Iterator[None]:
-        """Heed signals meanwhile; those that are ignored, as by nohup, stay ignored."""
+        """Handle signals within the block; those that are ignored, as under nohup, stay ignored."""
         self.first, self._due = None, False
         before = {}
         if threading.current_thread() is threading.main_thread():
@@ -51,7 +51,7 @@ class Endings:
 
     @contextmanager
     def saving(self) -> Iterator[None]:
-        """Have the first signal wait meanwhile."""
+        """Let the first signal wait until the end of the block."""
         self._saving = True
         try:
             yield

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn import __version__
+from foldyn.input_files import file_digest
 from foldyn.studies import shipped_cases
 from foldyn.writing import write_bytes, write_text
 
@@ -40,7 +40,7 @@ class Owner:
     def of(cls, command: str, file: Path, folder: Path) -> Owner:
         """Owner of a folder of results of a file."""
         shipped = [name for name, path in shipped_cases().items() if path == file]
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+        digest = file_digest(file)
         with suppress(ValueError, OSError):  # on another drive; where there is no such place
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
         source = shipped[0] if shipped else file.as_posix()
@@ -52,19 +52,19 @@ class Owner:
 
 
 def read(folder: Path) -> dict[str, Any] | None:
-    """Stamp of a folder; None where it has none, or none that can be understood."""
+    """Stamp of a folder; None if it has none, or an unreadable one."""
     try:
         found = json.loads(raw(folder) or b"")
-        told = [found[key] for key in ("command", "source", "state")]
+        texts = [found[key] for key in ("command", "source", "state")]
         files = [*found["results"], *found["outdated"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    names = [name for name in files if isinstance(name, str) and Path(name).name == name]
-    return found if all(isinstance(one, str) for one in told) and len(names) == len(files) else None
+    sound = all(isinstance(text, str) for text in (*texts, *files))
+    return found if sound and all(Path(name).name == name for name in files) else None
 
 
 def raw(folder: Path) -> bytes | None:
-    """Content of the stamp, None where there is none."""
+    """Content of the stamp; None if there is none."""
     try:
         return (folder / NAME).read_bytes()
     except OSError:
@@ -93,9 +93,9 @@ def write(
     results, outdated : sequence of str
         Files of this run, and of one before, which go when the first of this one is there.
     """
-    told = {"foldyn_version": __version__, **asdict(owner), "state": state}
-    told |= {"results": list(results), "outdated": list(outdated)}
-    write_text(folder / NAME, json.dumps(told, indent=1) + "\n")
+    stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
+    stamp |= {"results": list(results), "outdated": list(outdated)}
+    write_text(folder / NAME, json.dumps(stamp, indent=1) + "\n")
 
 
 def named(stamp: dict[str, Any], folder: Path) -> str:

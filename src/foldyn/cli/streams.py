@@ -1,11 +1,12 @@
-"""Standard output and error that a run can rely on, be they closed, full or short of letters."""
+"""What a command prints; standard output and error may be closed, full or short of letters."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, TextIO
 
 
@@ -39,7 +40,7 @@ class Outlet:
             self._lose(failure, 0)
 
     def _lose(self, failure: OSError, size: int) -> int:
-        """From now on nothing is written; what waits in the buffer goes nowhere, too."""
+        """Write nothing from now on; drop what waits in the buffer."""
         self.failure = failure
         with suppress(OSError, ValueError):
             place = os.open(os.devnull, os.O_WRONLY)
@@ -53,7 +54,7 @@ class Outlet:
 
 @contextmanager
 def steady_streams() -> Iterator[Outlet]:
-    """Make both streams steady meanwhile; gives standard output."""
+    """Make both streams reliable within the block; yields standard output."""
     _fill_closed()
     before = sys.stdout, sys.stderr
     with open(os.devnull, "w", encoding="utf-8") as nowhere:  # for one that was closed before
@@ -68,9 +69,21 @@ def steady_streams() -> Iterator[Outlet]:
 
 
 def _fill_closed() -> None:
-    """Take the numbers of closed streams: a file that gets one would be written to by others."""
+    """Occupy the numbers of closed streams: output would go to any file that got one."""
     while True:
         place = os.open(os.devnull, os.O_RDWR)
         if place > 2:
             os.close(place)
             return
+
+
+def speech(quiet: bool) -> Callable[[str], None]:
+    """Return what prints a line at once, or nothing if the command is to be quiet."""
+    return (lambda text: None) if quiet else partial(print, flush=True)
+
+
+def progress_bar(quiet: bool, **options: Any) -> Any:
+    """Progress bar of tqdm, hidden if the command is to be quiet or nobody watches."""
+    from tqdm import tqdm
+
+    return tqdm(disable=quiet or not sys.stderr.isatty(), leave=False, **options)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import sys
+from argparse import Namespace
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, held
-from foldyn.cli.speech import silence
+from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
+from foldyn.cli.streams import progress_bar, speech
 from foldyn.errors import ComputationError, FoldynError, InputError
 
 if TYPE_CHECKING:
@@ -21,31 +23,31 @@ PROCESSES = 2
 INSIDE = ("runs", "runs/specimen", "sensitivity")  # folders that are written to
 
 
-def study(
-    name: str,
-    quick: bool,
-    out: str | None,
-    quiet: bool = False,
-    sensitivity: bool = False,
-    data: Sequence[str] | None = None,
-    replace: bool = False,
-) -> Path:
-    """Compute what a study has not computed yet and write its page; returns its path.
+def add_study(commands: Any) -> None:
+    """Add the command and its arguments."""
+    study = commands.add_parser(
+        "study",
+        help="the study of a paper, its numbers beside ours",
+        description="Compute the case studies of a paper, with a shell and with every mass "
+        "distribution; results, figures and report.html go to a folder. What is in the folder "
+        "already is not computed again.",
+    )
+    study.add_argument("name", choices=("herkal",), help="which: herkal (Herkal et al.)")
+    flag(study, "--quick", "coarser shell, longer steps: minutes, no measure")
+    sensitivity = "instead: the same under other pulses, loads, bends and calibrations"
+    flag(study, "--sensitivity", sensitivity)
+    study.add_argument(
+        "--data",
+        nargs="+",
+        metavar="FILE",
+        help="measurements of the specimen instead of synthetic ones: a film of its release, "
+        "tracks (NetCDF), or tables (CSV)",
+    )
+    add_results(study, "NAME-study or NAME-quick", figures=False)
 
-    Parameters
-    ----------
-    name : str
-    quick : bool
-        Coarser shells.
-    out : str or None
-        Folder.
-    quiet : bool
-    sensitivity : bool
-        The combinations of what the paper leaves unsaid, instead of the study itself.
-    data : sequence of str, optional
-        Files with measurements of the specimen; synthetic ones by default.
-    replace : bool
-        Whether another study in the folder is replaced.
+
+def study(given: Namespace) -> Path:
+    """Compute what a study has not computed yet and write its page; returns its path.
 
     Raises
     ------
@@ -56,33 +58,24 @@ def study(
     """
     from tqdm import tqdm
 
-    say = silence if quiet else tqdm.write
-    if sensitivity and data:
+    say = speech(True) if given.quiet else tqdm.write
+    if given.sensitivity and given.data:
         raise InputError("--data: belongs to the study; leave out --sensitivity")
-    plan = "quick" if quick else "study"
-    folder = Path(f"{name}-{plan}" if out is None else out)
-    page = "sensitivity.html" if sensitivity else "report.html"
-    owner = Owner("study --quick" if quick else "study", name)
-    with held(folder, out, [page], owner, replace, [page], INSIDE) as results:
-        measured = None if sensitivity else _data(data, say)
-        hidden = quiet or not sys.stderr.isatty()
-        if sensitivity:
-            written, ended = _vary(quick, results, say, hidden)
-        else:
-            written, ended = _study(quick, results, measured, say, hidden)
+    plan = "quick" if given.quick else "study"
+    folder = Path(f"{given.name}-{plan}" if given.out is None else given.out)
+    page = "sensitivity.html" if given.sensitivity else "report.html"
+    owner = Owner("study --quick" if given.quick else "study", given.name)
+    with held(folder, given.out, [page], owner, given.replace, [page], INSIDE) as results:
+        compute = _vary if given.sensitivity else _study
+        written, ended = compute(given, results, say)
         say(f"wrote {written}")
-        _check(ended, results)
+        failed = [done for done in ended if done.failure]
+        if failed:
+            raise ComputationError(
+                f"{len(failed)} of {len(ended)} runs failed, the first of them "
+                f"{failed[0].task.name}: {failed[0].failure}"
+            )
     return written
-
-
-def _check(ended: Sequence[Done], results: Results) -> None:
-    """Raise where computations failed."""
-    failed = [done for done in ended if done.failure]
-    if failed:
-        raise ComputationError(
-            f"{len(failed)} of {len(ended)} runs failed, the first of them {failed[0].task.name}: "
-            f"{failed[0].failure}"
-        )
 
 
 def _data(names: Sequence[str] | None, say: Say) -> Data | None:
@@ -100,60 +93,52 @@ def _data(names: Sequence[str] | None, say: Say) -> Data | None:
     return data_of([])
 
 
-def _study(
-    quick: bool, results: Results, data: Data | None, say: Say, hidden: bool
-) -> tuple[Path, Sequence[Done]]:
+def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
     from foldyn.studies.herkal import report
     from foldyn.studies.herkal.study import FULL, QUICK, RESULTS, Study
 
-    one = Study(QUICK if quick else FULL, results.folder, data)
+    data = _data(given.data, say)
+    one = Study(QUICK if given.quick else FULL, results.folder, data)
     n = one.plan.numerics
     say(
         f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} mass "
         f"distributions, {n.duration:g} s of motion"
     )
     if data is not None:
-        given = "a synthetic film" if data.synthetic else ", ".join(data.names)
-        say(f"the specimen: calibrated to {given}")
-    ended = _told(one.compute, one.count, results, RESULTS, say, hidden)
+        names = ", ".join(file.name for file in data.files.values())
+        say(f"the specimen: calibrated to {names or 'a synthetic film'}")
+    ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
     return report.write(one), ended
 
 
-def _vary(quick: bool, results: Results, say: Say, hidden: bool) -> tuple[Path, Sequence[Done]]:
-    from foldyn.studies.herkal import pool, report, variations
-    from foldyn.studies.herkal import sensitivity as how
+def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
+    from foldyn.studies.herkal import pool, report, sensitivity, variations
     from foldyn.studies.herkal.study import CASES, QUICK, VARIED
 
-    numerics = QUICK.numerics if quick else VARIED
-    tasks = how.tasks(CASES, numerics)
-    folder = results.folder
-    inside = folder / report.SENSITIVITY
+    numerics = QUICK.numerics if given.quick else VARIED
+    tasks = sensitivity.tasks(CASES, numerics)
+    inside = results.folder / report.SENSITIVITY
     inside.mkdir(parents=True, exist_ok=True)
     say(
         f"sensitivity of the case studies: {len(tasks)} tasks of a motion of the shell with "
-        f"{numerics.divisions} divisions and {4 * len(how.MODELS)} of bars and hinges each"
+        f"{numerics.divisions} divisions and {4 * len(sensitivity.MODELS)} of bars and hinges each"
     )
-
-    def compute(tell: Callable[[Done], None], processes: int) -> list[Done]:
-        return pool.run(tasks, inside, tell, processes)
-
-    ended = _told(compute, len(tasks), results, report.SENSITIVITY, say, hidden)
-    found = how.variations(inside, CASES, numerics)
+    compute = partial(pool.run, tasks, inside)
+    ended = _computed(compute, len(tasks), results, report.SENSITIVITY, say, given.quiet)
+    found = sensitivity.variations(inside, CASES, numerics)
     variations.write(inside, found)
     if not found.motions:
         return inside, ended
-    return report.write_sensitivity(folder, found), ended
+    return report.write_sensitivity(results.folder, found), ended
 
 
-def _told(
+def _computed(
     compute: Callable[[Callable[[Done], None], int], list[Done]], count: int, results: Results,
-    inside: str, say: Say, hidden: bool,
+    inside: str, say: Say, quiet: bool,
 ) -> list[Done]:  # fmt: skip
     """Compute with a progress bar, and say what took long, failed or was skipped."""
-    from tqdm import tqdm
-
-    with tqdm(total=count, unit="run", disable=hidden, leave=False) as bar:
+    with progress_bar(quiet, total=count, unit="run") as bar:
 
         def tell(done: Done) -> None:
             if not done.failure and not results.kept:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.folder import check_folder, elsewhere, reason, unwritten
+from foldyn.cli.folder import check_folder, drawing, rescued
+from foldyn.cli.options import add_switches
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.speech import speech
+from foldyn.cli.streams import progress_bar, speech
 from foldyn.errors import ComputationError, InputError
+from foldyn.input_files import check_file
 from foldyn.studies import find_case
 from foldyn.values import number
 from foldyn.values import whole as whole_number
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     import argparse
 
     import xarray
+    from matplotlib.figure import Figure
 
-    from foldyn.experiment import Model, Tracking
+    from foldyn.experiment import TrackedModel, Tracking
 
 _SHOWN = 3  # nodes in the figure of histories
 _KEPT = "\nfoldyn: kept what was computed: "
@@ -68,8 +69,7 @@ def add_track(commands: Any) -> None:
     track.add_argument("--nodes", metavar="N,N,...", help="nodes that must be found")
     track.add_argument("--loads", metavar="N,N,...", help="load of each photograph (N)")
     track.add_argument("--reach", metavar="PIXELS", help="length of the edges that make a corner")
-    track.add_argument("--no-figures", action="store_true", help="write NetCDF and CSV only")
-    track.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    add_switches(track)
 
 
 def track(given: Namespace) -> Path:
@@ -82,10 +82,9 @@ def track(given: Namespace) -> Path:
         raise InputError(f"--out {given.out}: name a file that ends in .nc")
     check_folder(out.parent, given.out, [out.name, out.with_suffix(".csv").name])
     photos = _are_photos(given.inputs)
-    how = _tracking(given)
-    roi = None if given.roi is None else tuple(wholes("--roi", given.roi, 4))
-    rate = None if given.rate is None else numbers("--rate", given.rate, 1)[0]
-    loads = None if given.loads is None else numbers("--loads", given.loads)
+    settings = _tracking(given)
+    roi, rate = whole_numbers(given, "roi", 4), one_number(given, "rate")
+    loads = numbers(given, "loads")
     if loads is not None and not photos:
         raise InputError("--loads: a film has times; loads belong to photographs")
     film = None if photos else experiment.open_film(given.inputs[0], roi, rate)  # type: ignore
@@ -96,25 +95,28 @@ def track(given: Namespace) -> Path:
             "followed, and only a model tells which is which"
         )
     say = speech(given.quiet)
-    tell, close = _progress(given, None if film is None else film.path)
-    try:
+    total, unit = (len(given.inputs), "photo") if film is None else (None, "frame")
+    with progress_bar(given.quiet, total=total, unit=unit) as bar:
+
+        def tell(number: int) -> None:
+            bar.update()
+
         if film is None:
-            ds = experiment.track_photos(given.inputs, model, how, loads, roi, tell)  # type: ignore
+            ds = experiment.track_photos(given.inputs, model, settings, loads, roi, tell)  # type: ignore
         else:
-            ds = experiment.track_film(film, model, how, tell)
-    finally:
-        close()
+            ds = experiment.track_film(film, model, settings, tell)
     out.parent.mkdir(parents=True, exist_ok=True)
     _save(ds, out)
     say(summary(ds))
     say(f"wrote {out}, {out.with_suffix('.csv')}")
     if not given.no_figures:
-        say(f"wrote {', '.join(_figures(ds, out, given.inputs, film))}")
+        with drawing(out, f"{_KEPT}{out}"):
+            say(f"wrote {', '.join(_figures(ds, out, given.inputs, film))}")
     return out
 
 
 def _save(ds: xarray.Dataset, out: Path) -> None:
-    """Save the tracks and their table, the tracks elsewhere where there is no room."""
+    """Save the tracks and their table; without room for them, save the tracks elsewhere."""
     from foldyn import experiment
 
     try:
@@ -122,48 +124,61 @@ def _save(ds: xarray.Dataset, out: Path) -> None:
             experiment.save_tracks(ds, out)
             experiment.write_csv(ds, out.with_suffix(".csv"))
     except (OSError, InputError) as error:
-        saved = elsewhere(out, lambda path: experiment.save_tracks(ds, path), reason(error))
-        raise ComputationError(f"{unwritten(out, reason(error))}{_KEPT}{saved}") from None
+        saved, failure = rescued(out, lambda path: experiment.save_tracks(ds, path), error)
+        raise ComputationError(f"{failure}{_KEPT}{saved}") from None
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted{_KEPT}{out}") from None
 
 
-def numbers(name: str, text: str, count: int | None = None) -> list[float]:
-    """Numbers that a person gave, separated by commas."""
+def numbers(given: Namespace, name: str, count: int | None = None) -> list[float] | None:
+    """Numbers of an option, separated by commas; None if it was not given."""
+    text = getattr(given, name)
+    return None if text is None else _numbers(f"--{name}", text, count)
+
+
+def one_number(given: Namespace, name: str) -> float | None:
+    """Number of an option; None if it was not given."""
+    found = numbers(given, name, 1)
+    return None if found is None else found[0]
+
+
+def whole_numbers(given: Namespace, name: str, count: int | None = None) -> tuple[int, ...] | None:
+    """Whole numbers of an option, separated by commas; None if it was not given."""
+    values = numbers(given, name, count)
+    if values is None:
+        return None
+    for value in values:
+        if not value.is_integer():
+            raise InputError(f"--{name} {getattr(given, name)}: {value:g} is not a whole number")
+    return tuple(whole_number(f"--{name}", int(value)) for value in values)
+
+
+def _numbers(option: str, text: str, count: int | None) -> list[float]:
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
-        raise InputError(f"{name} {text}: give numbers separated by commas") from None
+        raise InputError(f"{option} {text}: give numbers separated by commas") from None
     if count is not None and len(values) != count:
-        raise InputError(f"{name} {text}: {len(values)} numbers; {count} are needed")
+        raise InputError(f"{option} {text}: {len(values)} numbers; {count} are needed")
     if not all(map(math.isfinite, values)):
-        raise InputError(f"{name} {text}: every number must be finite")
-    return [number(name, value) for value in values]
+        raise InputError(f"{option} {text}: every number must be finite")
+    return [number(option, value) for value in values]
 
 
-def wholes(name: str, text: str, count: int | None = None) -> list[int]:
-    """Whole numbers that a person gave, separated by commas."""
-    values = numbers(name, text, count)
-    for value in values:
-        if not value.is_integer():
-            raise InputError(f"{name} {text}: {value:g} is not a whole number")
-    return [whole_number(name, int(value)) for value in values]
-
-
-def model_of(name: str) -> Model:
-    """Model of a result, of a case at rest, or with all states of the path of a static case."""
+def model_of(name: str) -> TrackedModel:
+    """Model from a result, from a case at rest, or with all states of a static case's path."""
     import foldyn as fd
-    from foldyn.experiment import Model
+    from foldyn.experiment import TrackedModel
 
     if name.endswith(".nc"):
-        return Model.of(fd.load(name))
+        return TrackedModel.of(fd.load(name))
     case_file = fd.read_case(find_case(name))
     static = case_file.analysis.kind == "statics"
-    return Model.of(case_file.run() if static else case_file.case())
+    return TrackedModel.of(case_file.run() if static else case_file.case())
 
 
 def summary(ds: xarray.Dataset) -> str:
-    """What was tracked, in a few words."""
+    """Summary of what was tracked."""
     import numpy as np
 
     along = "photo" if "photo" in ds.dims else "time"
@@ -181,7 +196,7 @@ def summary(ds: xarray.Dataset) -> str:
 
 
 def _are_photos(inputs: Sequence[str]) -> bool:
-    """Whether the inputs are photographs; they are all of a kind, and a film is alone."""
+    """Whether the inputs are photographs; refuses a mixture, and several films."""
     from foldyn.experiment.tracking.films import PHOTOS
 
     photos = [Path(name).suffix.lower() in PHOTOS for name in inputs]
@@ -190,10 +205,7 @@ def _are_photos(inputs: Sequence[str]) -> bool:
     if not any(photos) and len(inputs) > 1:
         raise InputError(f"{inputs[1]}: one film at a time")
     for name in inputs:
-        if os.path.isdir(name):
-            raise InputError(f"{name}: is a folder; give a film, or all photographs in it")
-        if not os.path.isfile(name):
-            raise InputError(f"{name}: there is no such file")
+        check_file(name, "a film, or all photographs in it")
     if photos == [True]:
         raise InputError(
             f"{inputs[0]}: one photograph alone shows no displacement; give at least two, the "
@@ -207,37 +219,21 @@ def _tracking(given: Namespace) -> Tracking:
 
     if given.scale is not None and given.reference:
         raise InputError("--scale, --reference: give one or the other")
-    scale = None
-    if given.scale is not None:
-        scale = Scale(numbers("--scale", given.scale, 1)[0]).metres_per_pixel
+    scale = one_number(given, "scale")
+    if scale is not None:
+        scale = Scale(scale).metres_per_pixel
     if given.reference:
-        lengths = [numbers("--reference", one, 5) for one in given.reference]
+        lengths = [_numbers("--reference", one, 5) for one in given.reference]
         scale = scale_of_lengths(lengths).metres_per_pixel
-    distance = None if given.distance is None else numbers("--distance", given.distance, 1)[0]
-    nodes = None if given.nodes is None else tuple(wholes("--nodes", given.nodes))
+    nodes = whole_numbers(given, "nodes")
     if nodes is not None and given.model is None:
         raise InputError("--nodes: which nodes there are is known with a --model only")
-    reach = None if given.reach is None else numbers("--reach", given.reach, 1)[0]
     return Tracking(
-        corners=CornerSettings(reach=reach),
-        placing=Placing(given.up, given.facing, scale, distance),
+        corners=CornerSettings(reach=one_number(given, "reach")),
+        placing=Placing(given.up, given.facing, scale, one_number(given, "distance")),
         match=given.match,
         nodes=nodes,
     )
-
-
-def _progress(given: Namespace, film: Path | None) -> tuple[Callable[[int], None], Callable]:
-    from tqdm import tqdm
-
-    total = len(given.inputs) if film is None else None
-    hidden = given.quiet or not sys.stderr.isatty()
-    unit = "photo" if film is None else "frame"
-    bar = tqdm(total=total, unit=unit, disable=hidden, leave=False)
-
-    def tell(number: int) -> None:
-        bar.update()
-
-    return tell, bar.close
 
 
 def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) -> list[str]:
@@ -245,29 +241,22 @@ def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) ->
     from foldyn import plots
     from foldyn.experiment import read_photo
 
-    written = []
-    try:
-        if film is not None:
-            at = int(ds.attrs["match_frame"]) if "displacement" in ds else 0
-            pictures = {f"{out.stem}-overlay.png": (film.picture(at), at)}
-        else:
-            pictures = {
-                f"{out.stem}-overlay-{k}.png": (read_photo(name), k)
-                for k, name in enumerate(inputs)
-            }
-        for name, (picture, at) in pictures.items():
-            with whole(out.with_name(name)) as part:
-                plots.draw_overlay(picture, ds, at).savefig(part)
-            written.append(str(out.with_name(name)))
-        if "displacement" in ds:
-            history = plots.plot_tracks(ds, _best(ds))
-            with whole(out.with_name(f"{out.stem}-history.png")) as part:
-                history.savefig(part)
-            written.append(str(out.with_name(f"{out.stem}-history.png")))
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted while figures were drawn{_KEPT}{out}") from None
-    except (InputError, OSError) as error:
-        raise ComputationError(f"figures: {reason(error)}{_KEPT}{out}") from None
+    written: list[str] = []
+
+    def save(name: str, figure: Figure) -> None:
+        file = out.with_name(f"{out.stem}-{name}.png")
+        with whole(file) as part:
+            figure.savefig(part)
+        written.append(str(file))
+
+    if film is not None:
+        at = int(ds.attrs["match_frame"]) if "displacement" in ds else 0
+        save("overlay", plots.draw_overlay(film.picture(at), ds, at))
+    else:
+        for k, name in enumerate(inputs):
+            save(f"overlay-{k}", plots.draw_overlay(read_photo(name), ds, k))
+    if "displacement" in ds:
+        save("history", plots.plot_tracks(ds, _best(ds)))
     return written
 
 

@@ -6,7 +6,7 @@ stiffness: what the energy audit needs.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,27 +29,19 @@ class Actuators(NamedTuple):
     address: int  # of its energy, if it is the user's own
 
 
-def actuators(body: Body, law: HingeLaw, terms: Any, histories: list) -> tuple[Body, Actuators]:
-    """The body with rest angles of its own, and its folds, of one law, that turn."""
-    numbers, spans, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
-    for span, history in terms:
-        turned = np.flatnonzero(span)
-        numbers.append(turned)
-        spans.append(np.asarray(span)[turned])
-        rows.append(np.full(len(turned), histories.index(history)))
-    folds = np.concatenate(numbers)
+def actuators(
+    body: Body, law: HingeLaw, folds: NDArray, span: NDArray, row: NDArray
+) -> tuple[Body, Actuators]:
+    """A body whose rest angles can be changed, and its actuated folds, all of one law.
+
+    folds, span, row : (f,) numbers of folds, how far each turns (rad), and its waveform.
+    """
     hinge, place = np.zeros(0, np.int64), np.zeros(0, np.int64)
     if len(folds):
         body, hinge, place = body.actuated(folds)
-    found = Actuators(
-        hinge=hinge,
-        start=body.turned()[0][hinge],
-        span=np.concatenate(spans)[place],
-        row=np.concatenate(rows).astype(np.int64)[place],
-        code=int(law.code),
-        address=int(law.addresses[0]) if law.addresses else 0,
-    )
-    return body, found
+    address = int(law.addresses[0]) if law.addresses else 0
+    start = body.turned()[0][hinge]
+    return body, Actuators(hinge, start, span[place], row[place], int(law.code), address)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Energy audit: kinetic + strain + dissipated - work stays what it was at the start.
 
-The audit tells nothing where the energies at play are rounding: that of the energies themselves, of
-the bars' forces at displacements of that size, and of dihedrals, which come from positions. All of
-these are measured by what the motion holds, none by a fixed number.
+The audit says nothing where the energies at play are no larger than rounding errors: those of the
+energies themselves, of the bars' forces at displacements of that size, and of the dihedrals, which
+are computed from positions. All of these follow from the motion; none is a fixed number.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from foldyn.mechanics.body import Body
 EPS = float(np.finfo(float).eps)
 MARGIN = 16.0  # times the rounding errors of single operations: what they add up to
 ANGLE = 16.0 * EPS  # rad: rounding of a dihedral
-BEGUN = 1e-6  # of the longest bar: displacements below that have not grown without bound
+BEGUN = 1e-6  # of the longest bar: a motion with smaller displacements has not become unbounded
 
 AUDITED = ("kinetic", "dissipated", "work")
 
@@ -41,6 +41,12 @@ def energy_scale(energy: NDArray) -> float:
     return float(np.nanmax(np.abs(moving)))
 
 
+def relative_errors(energy: NDArray) -> NDArray:
+    """Energy errors over the energies at play, per sample; 0 where nothing is at play."""
+    scale = energy_scale(energy) if len(energy) else 0.0
+    return np.abs(energy_error(energy)) / scale if scale > 0.0 else np.zeros(len(energy))
+
+
 class Rounding:
     """What rounding hides in the motions of a body."""
 
@@ -49,7 +55,7 @@ class Rounding:
         self._force, self._moment = float(np.linalg.norm(body.scale())), body.turning_moments()
 
     def energy(self, energy: NDArray, moved: float) -> float:
-        """Energy (J) that rounding makes in a motion with displacements up to `moved` (m).
+        """Energy (J) of the rounding errors in a motion with displacements up to `moved` (m).
 
         energy : (samples, columns), as audited.
         """
@@ -58,15 +64,15 @@ class Rounding:
         turns = self._moment * ANGLE * min(strain, math.pi)
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
 
-    def told_by(self, energy: NDArray, moved: float) -> bool:
-        """Whether an error as large as the energies at play tells that a motion is unstable.
+    def reveals(self, energy: NDArray, moved: float) -> bool:
+        """Whether an error as large as the energies at play shows that a motion is unstable.
 
-        The first steps under a load that begins slowly may miss what little there is by far:
-        implicit ones measure their error by no less than `BEGUN`.
+        In the first steps under a load that begins slowly the little energy that there is may be
+        far off: implicit methods measure their errors against no less than `BEGUN`.
         """
         far = moved > BEGUN * self.length
         return far and energy_scale(energy) > self.energy(energy, moved)
 
     def least_motion(self, accuracy: float) -> float:
-        """Displacement (m) below which dihedrals do not follow with an accuracy; 0 without any."""
+        """Displacement (m) below which dihedrals are less accurate than that; 0 without hinges."""
         return self.length * ANGLE / accuracy if self._moment > 0.0 else 0.0

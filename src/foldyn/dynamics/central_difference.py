@@ -11,9 +11,8 @@ import numpy as np
 
 from foldyn.dynamics.course import Outcome, observe, tell
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 2
 
@@ -24,18 +23,12 @@ def growth(omega, damping, dt):
     Spectral radius of the step as a matrix on (u, v, a).
     """
     w, c = np.broadcast_arrays(omega * dt, damping * dt)
-    one, zero = np.ones_like(w), np.zeros_like(w)
+    one = np.ones_like(w)
     # in units of the step: u' = u + v + a/2, a' = -w^2 u' - c (v + a), v' = v + (a + a')/2
     a_row = [-(w**2), -(w**2) - c, -0.5 * w**2 - c]
-    step = np.stack(
-        [
-            np.stack([one, one, 0.5 * one], -1),
-            np.stack([0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]], -1),
-            np.stack([*a_row[:2], a_row[2] + zero], -1),
-        ],
-        -2,
-    )
-    return np.abs(np.linalg.eigvals(step)).max(axis=-1)
+    v_row = [0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]]
+    step = np.array([[one, one, 0.5 * one], v_row, a_row])
+    return np.abs(np.linalg.eigvals(np.moveaxis(step, (0, 1), (-2, -1)))).max(axis=-1)
 
 
 @shared
@@ -59,9 +52,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         powers[0], powers[1] = acceleration(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
-        found, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
-        if found != Outcome.DONE:
-            return found, hinge
+        outcome, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
+        if outcome != Outcome.DONE:
+            return outcome, hinge
     for step in range(begun + 1, end + 1):
         for i in range(u.size):
             v[i] += 0.5 * dt * fa[i]
@@ -79,7 +72,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         powers[0], powers[1] = power_in, power_out
         if team.number == 0:
             course.tally.evaluations += 1
-        found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-        if found != Outcome.DONE:
-            return found, hinge
+        outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+        if outcome != Outcome.DONE:
+            return outcome, hinge
     return Outcome.DONE, -1

@@ -1,4 +1,4 @@
-"""Where a motion stands, where it goes and what it leaves behind: the arguments of integrators."""
+"""State, step plan and samples of a motion: the arguments of integrators."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.system import record
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.mechanics import largest, part, total, wait
+from foldyn.mechanics.threads import largest, part, total, wait
 
 
 class Outcome(IntEnum):
@@ -24,10 +24,10 @@ class Outcome(IntEnum):
     NOT_CONVERGED = 5  # the equations of an implicit step were not solved, however small the step
 
 
-WORK, DISSIPATED, WRONG, HINGE, FOUND = range(5)  # places of a member's notes to its team
+WORK, DISSIPATED, WRONG, HINGE, OUTCOME = range(5)  # places of a member's notes to its team
 
 
-class Plan(NamedTuple):
+class StepPlan(NamedTuple):
     """Steps and samples. With a fixed step, step n is at start + n dt; `end` serves the others."""
 
     start: float  # s
@@ -73,6 +73,10 @@ class Samples(NamedTuple):
     velocity: NDArray  # (k, n, 3)
     reaction: NDArray  # (k, s)
     energy: NDArray  # (k, columns) as `audit.audited` names them
+
+    def doubled(self) -> Samples:
+        """These, with room for as many again."""
+        return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in self))
 
 
 def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
@@ -121,18 +125,18 @@ def sample(model, system, mass, u, v, a, t, course, out, work, s):
 
 @scalar
 def tell(team, work_in, work_out, wrong):
-    """Tell the team what a step came to: work, energy dissipated (J), values not finite."""
+    """Note for the team the work, the energy dissipated (J), and how many values are not finite."""
     note = team.note[team.number]
     note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
 
 
 @scalar
 def observe(model, system, mass, course, a, step, plan, out, work, s):
-    """What follows `acceleration` at the time of a step, with a fixed step; all of a team call it.
+    """Look at a fixed step after `acceleration` at its end; every member of a team calls it.
 
-    The works that the members have told are added up. Motions that are no longer finite and
-    panels that passed through each other end the motion, and every plan.every steps a sample is
-    written. Returns (outcome, hinge), the same to all.
+    Adds up the work that the members have noted. The motion ends where it is no longer finite and
+    where panels pass through each other; every plan.every steps a sample is written. Returns
+    (outcome, hinge), the same to all.
     """
     team, tally = work.team, course.tally
     wait(team)  # for the others' accelerations, dihedrals and notes
@@ -148,13 +152,13 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         tally.dissipated += total(team, DISSIPATED)
         tally.time = t
         tally.steps = step
-        found = Outcome.DONE
+        outcome = Outcome.DONE
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
-            found = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
-        team.note[0, FOUND] = found + 0  # as a number
+            outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
+        team.note[0, OUTCOME] = outcome + 0  # as a number
     wait(team)
     if wrong > 0.0:
         return Outcome.NOT_FINITE, -1
     if hinge >= 0:
         return Outcome.PENETRATION, hinge
-    return int(team.note[0, FOUND]), -1
+    return int(team.note[0, OUTCOME]), -1

@@ -3,7 +3,7 @@
 alpha M v, the *drag*, is never assembled: it slows every mass by alpha v, and takes v alpha M v or
 2 alpha times the kinetic energy. beta K0 v, the *viscous* force, is a product with a sparse matrix.
 Where supports move, free nodes are slowed by the velocity w without S f' (see `system`), and the
-drag on S f' itself is overcome by those who move the supports.
+drag on S f' itself is overcome by whatever moves the supports.
 
 In the matrix of an implicit step with dw = rate dq, drag adds alpha rate to the factor of M.
 """
@@ -18,9 +18,9 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
-from foldyn.dynamics.numbering import Numbering
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.body import Numbering
 
 
 class Damping(NamedTuple):
@@ -77,7 +77,8 @@ def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
         return 0.0, 0.0
     carried = moving_energy(moved_mass, before) + moving_energy(moved_mass, after)
     carried *= damping.alpha * h
-    taken = 2.0 * damping.alpha * h * kinetic_energy(mass, velocity, product)
+    kinetic = kinetic_energy(mass, velocity, product, (0, velocity.shape[0]))
+    taken = 2.0 * damping.alpha * h * kinetic
     return carried, taken + carried
 
 

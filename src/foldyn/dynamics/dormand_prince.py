@@ -13,9 +13,8 @@ import numpy as np
 from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 5
 
@@ -32,37 +31,15 @@ A = np.array(
     ]
 )
 # weights of the solution of order 5 minus those of order 4
-E = np.array(
-    [71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
-)
+E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 # column j: the weights of theta^(j+1) at the fraction theta of a step
 P = np.array(
     [
-        [
-            1.0,
-            -8048581381 / 2820520608,
-            8663915743 / 2820520608,
-            -12715105075 / 11282082432,
-        ],
+        [1.0, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432],
         [0.0, 0.0, 0.0, 0.0],
-        [
-            0.0,
-            131558114200 / 32700410799,
-            -68118460800 / 10900136933,
-            87487479700 / 32700410799,
-        ],
-        [
-            0.0,
-            -1754552775 / 470086768,
-            14199869525 / 1410260304,
-            -10690763975 / 1880347072,
-        ],
-        [
-            0.0,
-            127303824393 / 49829197408,
-            -318862633887 / 49829197408,
-            701980252875 / 199316789632,
-        ],
+        [0.0, 131558114200 / 32700410799, -68118460800 / 10900136933, 87487479700 / 32700410799],
+        [0.0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072],
+        [0.0, 127303824393 / 49829197408, -318862633887 / 49829197408, 701980252875 / 199316789632],
         [0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
         [0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
     ]
@@ -150,11 +127,11 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         )
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
-            found = sample(
+            outcome = sample(
                 model, system, mass, course.u, course.v, a, plan.start, course, out, work, s
             )
-            if found != Outcome.DONE:
-                return found, -1
+            if outcome != Outcome.DONE:
+                return outcome, -1
     else:
         powers[0, 0], powers[1, 0] = tally.power_in, tally.power_out
         for i in range(n):
@@ -220,9 +197,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
             acceleration(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
-            found = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
-            if found != Outcome.DONE:
-                return found, -1
+            outcome = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
+            if outcome != Outcome.DONE:
+                return outcome, -1
             due = plan.start + tally.samples * plan.interval
         tally.work = _integral(begun[0], powers[0], h, A[6], 6)
         tally.dissipated = _integral(begun[1], powers[1], h, A[6], 6)
@@ -246,9 +223,11 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         if plan.every > 0 and tally.steps % plan.every == 0:
             acceleration(model, system, mass, course.u, course.v, after, a, work, s)
             tally.evaluations += 1
-            found = sample(model, system, mass, course.u, course.v, a, after, course, out, work, s)
-            if found != Outcome.DONE:
-                return found, -1
+            outcome = sample(
+                model, system, mass, course.u, course.v, a, after, course, out, work, s
+            )
+            if outcome != Outcome.DONE:
+                return outcome, -1
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
     for i in range(n):
         flat(course.carry)[i] = accelerations[0, i]

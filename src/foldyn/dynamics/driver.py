@@ -1,4 +1,4 @@
-"""`simulate`: the motion of a case from an initial state, and what makes it ready to run."""
+"""`simulate`: the motion of a case from an initial state, and `prepare`, which checks it first."""
 
 from __future__ import annotations
 
@@ -6,33 +6,22 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Rayleigh, State
-from foldyn.dynamics import generalized_alpha
-from foldyn.dynamics.choice import AUTO, choose
-from foldyn.dynamics.course import Plan
-from foldyn.dynamics.critical_step import critical_step
+from foldyn.dynamics import generalized_alpha, timing
+from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
+from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
+from foldyn.dynamics.method_choice import AUTO, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
-from foldyn.dynamics.resolution import knots, warn_of_coarse_steps, warn_of_functions
 from foldyn.dynamics.sampling import Sampler
-from foldyn.dynamics.start import begin, check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.system import pack
-from foldyn.dynamics.timing import (
-    check_samples,
-    counted_in_seconds,
-    expected_samples,
-    fixed_steps,
-    positive,
-    variable_steps,
-)
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
 from foldyn.values import number
@@ -40,14 +29,13 @@ from foldyn.values import number
 if TYPE_CHECKING:
     import xarray
 
-DAMPING_COST = 10.0  # shrinking of the critical step by beta above which the user is told
+DAMPING_COST = 10.0  # by how much beta may shrink the critical step before the user is warned
 SHARPEST = 1e-9  # of the time at the start: shorter steps than that have lost their digits
-MANY_STEPS = 20_000_000  # beyond which the user is told before the run
+MANY_STEPS = 20_000_000  # beyond which the user is warned before the run
 TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
-MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on: see `resolution`
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -159,7 +147,7 @@ def prepare(
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of("rk4") if method == AUTO else suited(method, case.structure)
-    positive("duration", duration)
+    duration = number("duration", duration, above=0.0)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
     if not len(case.free_dofs):
@@ -170,7 +158,7 @@ def prepare(
     u, v = check_start(case, initial)
     reason = ""
     if method == AUTO:
-        counted_in_seconds(duration, every)
+        timing.counted_in_seconds(duration, every)
         method, reason = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE
         )
@@ -178,9 +166,9 @@ def prepare(
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.structure.mass):
         check_mass(case.structure.mass, case.fixed)
-    critical = critical_step(case, method, u)
+    critical = integrator.critical_step(case, u)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
-    _warn_of_damping(case, method, u, critical)
+    _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, u)
     if plan.dt < SHARPEST * abs(plan.start):
         raise InputError(
@@ -194,32 +182,30 @@ def prepare(
             "one or leave dt out (force = true integrates all the same)",
             "dt",
         )
-    check_samples(expected_samples(plan), len(u), len(case.supported_dofs))
+    timing.check_samples(timing.expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
         check_fill(case.structure.fill, case.structure.body.size)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
-        memory = IMPLICIT_MEMORY if integrator.implicit else MEMORY
-        warn_of_coarse_steps(case, plan, integrator.looks, memory, integrator.implicit, 4)
+        timing.warn_of_coarse_steps(case, plan, integrator.looks, integrator.implicit)
     elif integrator.implicit:
-        warn_of_functions(case, 4)
+        timing.warn_of_functions(case)
     steps = (plan.end - plan.start) / plan.dt
     if steps > MANY_STEPS:
         warnings.warn(
-            f"{steps:.3g} steps of {plan.dt:.3g} s are a long way (critical step "
+            f"{steps:.3g} steps of {plan.dt:.3g} s will take a long time (critical step "
             f"{critical:.3g} s); stiff bars, light nodes and strong damping make it small",
             FoldynWarning,
             stacklevel=3,
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u)
-    beginning = partial(begin, case, u, v, plan, packed)
     sampler = Sampler(case, sample or {}, u, v, plan.start)
-    return Motion(case, integrator, plan, critical, force, beginning, packed, sampler, reason)
+    return Motion(case, integrator, plan, critical, force, (u, v), packed, sampler, reason)
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:
-    """The method with the spectral radius that is asked for."""
+    """The method with a spectral radius, if one is given."""
     if spectral_radius is None:
         return method
     if method.name != "generalized_alpha":
@@ -235,10 +221,10 @@ def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrato
 def _plan(
     case: Case, method: Integrator, duration: float, dt: float | None, every: int | float,
     critical: float, force: bool, tolerance: float | None, start: float,
-) -> Plan:  # fmt: skip
+) -> StepPlan:  # fmt: skip
     """Steps and samples that the arguments of `simulate` ask for."""
     if tolerance is not None:
-        positive("tolerance", tolerance)
+        number("tolerance", tolerance, above=0.0)
         if not method.adaptive and not method.implicit:
             raise InputError(
                 f" = {tolerance!r}: {method.name} has fixed steps; give dt, or choose "
@@ -249,15 +235,17 @@ def _plan(
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
         tolerance, floor = tolerance or default, FLOOR * case.structure.body.longest()
-        return variable_steps(duration, dt, every, largest, start, tolerance, floor, knots(case))
-    return fixed_steps(duration, dt, every, critical, start)
+        return timing.variable_steps(
+            duration, dt, every, largest, start, tolerance, floor, timing.knots(case)
+        )
+    return timing.fixed_steps(duration, dt, every, critical, start)
 
 
-def _warn_of_damping(case: Case, method: str, u: NDArray, critical: float) -> None:
+def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:
     """Say so where stiffness-proportional damping makes an explicit step very small."""
     if case.damping.beta == 0.0 or not math.isfinite(critical):
         return
-    without = critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), method, u)
+    without = method.critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), u)
     if without > DAMPING_COST * critical:
         warnings.warn(
             f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "

@@ -11,101 +11,81 @@ Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not r
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.course import Course
 from foldyn.dynamics.damping import add_viscous, drag, drag_works, viscous_work
-from foldyn.dynamics.implicit.convergence import Goal
-from foldyn.dynamics.implicit.discrete_gradient import (
-    add_bar_forces,
-    add_bar_tangent,
-    add_hinge_forces,
-    add_hinge_tangent,
-)
+from foldyn.dynamics.implicit import discrete_gradient
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import Bench, clear_supported, load_square
+from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
-from foldyn.jit.borrow import borrowed
+from foldyn.dynamics.system import Packed, carry
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
 ORDER = 2
-TOLERANCE = 1e-11  # of the residual: what is left of it is energy
 
 
-class EnergyMomentum:
-    """Steps of the method; see `implicit.scheme.Scheme`."""
+class EnergyMomentum(Scheme):
+    """Steps of the method; see `Scheme`."""
 
     symmetric = False
-    tolerance = TOLERANCE
-    facts: Mapping[str, float] = {}
+    tolerance = 1e-11  # what is left of the residual is energy
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
-        self._stress, self._start = np.zeros((2, len(bench.packed.model.bars)))
+    def __init__(self, packed: Packed, course: Course) -> None:
+        super().__init__(packed, course)
+        self._stress, self._start = np.zeros((2, len(packed.model.bars)))
         self._before = 0.0  # the last step, s
 
     def begin(self, t: float) -> None:
         """See `Scheme`."""
-        self.bench.begin(t)
+        super().begin(t)
         self._before = 0.0
 
     def accept(self, h: float) -> None:
         """See `Scheme`."""
-        self.bench.accept(h)
+        super().accept(h)
         self._before = h
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`."""
-        return Weights(1.0, (2.0 / h + self.bench.packed.system.damping.alpha) / h, 1.0 / h)
+        return Weights(1.0, (2.0 / h + self.packed.system.damping.alpha) / h, 1.0 / h)
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
-        b, packed = self.bench, self.bench.packed
         return residual(
-            packed.model, packed.system, packed.mass, h, t, b.old, b.new, b.shift, b.out,
-            b.course.angle, b.work.angle, b.scratch,
+            *self.packed.arrays, h, t, self.old, self.new, self.shift, self.out, self.course.angle,
+            self.work.angle, self.scratch,
         )  # fmt: skip
-
-    def keep_on(
-        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
-        most: int,
-    ) -> tuple[int, float, int] | None:  # fmt: skip
-        """See `Scheme`; its matrices are not symmetric."""
-        return None
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        b, model, pattern = self.bench, self.bench.packed.model, matrix.pattern
-        u0, u1 = b.displacement(), b.moved()
+        model, pattern, out = self.packed.model, matrix.pattern, matrix.stiffness
+        u0, u1, slots = self.displacement(), self.moved(), pattern.hinge_slots
         expected_stress(model, u0, u0, False, self._start)
         expected_stress(model, u1, before, again, self._stress)
         stress = 0.5 * (self._start + self._stress)
-        matrix.stiffness[:] = 0.0
-        add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, matrix.stiffness)
-        slots = pattern.hinge_slots
-        add_hinge_tangent(model, u0, u1, b.course.angle, FLOOR, slots, matrix.stiffness)
+        out[:] = 0.0
+        discrete_gradient.add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, out)
+        discrete_gradient.add_hinge_tangent(model, u0, u1, self.course.angle, FLOOR, slots, out)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
-        b, packed = self.bench, self.bench.packed
-        done, lost = _works(packed.system, packed.mass, h, b.old, b.new, b.shift, b.scratch)
-        if packed.system.turns:
-            u0, u1 = b.displacement(), b.moved()
-            done += _actuation(packed.model, packed.system, b.old, b.new, u0, u1, b.scratch)
+        (model, system, mass), old, new = self.packed.arrays, self.old, self.new
+        done, lost = _works(system, mass, h, old, new, self.shift, self.scratch)
+        if system.turns:
+            u0, u1 = self.displacement(), self.moved()
+            done += _actuation(model, system, old, new, u0, u1, self.scratch)
         return done, lost
 
     def change(self, h: float) -> NDArray:
         """See `Scheme`: accelerations belong to the middle of the steps."""
-        old, new = self.bench.old, self.bench.new
-        return h**3 / (6.0 * (h + self._before)) * (new.a - old.a)
+        return h**3 / (6.0 * (h + self._before)) * (self.new.a - self.old.a)
 
 
 @kernel
@@ -134,11 +114,11 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     mean = 0.5 * (old.factor + new.factor)
     if system.turns:
         turn(model, system.actuators, mean)
-    _place(system.moved, old, s.displacement)
-    _place(system.moved, new, s.velocity)
+    carry(system.moved, old.factor, 0, old.q, s.displacement)
+    carry(system.moved, new.factor, 0, new.q, s.velocity)
     new.force[:] = 0.0
-    add_bar_forces(model, s.displacement, s.velocity, new.force)
-    add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
+    discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
+    discrete_gradient.add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
     u0, u1 = flat(s.displacement), flat(s.velocity)
     if system.damping.data.size > 0:
         speed = flat(s.product)
@@ -153,27 +133,13 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     for i in range(q0.size):
         inertia += left[i] * left[i]
         left[i] += bracket[i]
-    reference = max(inertia, clear_supported(system, out), load_square(system, mean))
-    norm = 0.0
-    for i in range(q0.size):
-        norm += left[i] * left[i]
-    return math.sqrt(norm), math.sqrt(reference)
-
-
-@kernel
-def _place(moved, phase, out):
-    """Displacement (n, 3) of a phase with that of the supports."""
-    u, q = flat(out), flat(phase.q)
-    for i in range(u.size):
-        u[i] = q[i]
-    for k in range(moved.dof.size):
-        u[moved.dof[k]] += moved.value[k] * phase.factor[moved.row[k], 0]
+    return norms(system, out, inertia, mean)
 
 
 @kernel
 def _works(system, mass, h, old, new, shift, s):
     """Work put in and energy dissipated in a step."""
-    moved, loads, bracket = system.moved, system.loads, flat(new.force)
+    moved, bracket = system.moved, flat(new.force)
     du, speed = flat(s.displacement), flat(s.moving)
     for i in range(du.size):
         du[i] = flat(shift)[i]
@@ -186,10 +152,7 @@ def _works(system, mass, h, old, new, shift, s):
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
         du[dof] += along
         done += bracket[dof] * along
-    for k in range(loads.dof.size):
-        row = loads.row[k]
-        mean = 0.5 * (old.factor[row, 0] + new.factor[row, 0])
-        done += loads.value[k] * mean * du[loads.dof[k]]
+    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.displacement, s.displacement) / h
 
 

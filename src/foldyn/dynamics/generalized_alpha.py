@@ -1,20 +1,61 @@
 """The generalized-alpha method of Chung and Hulbert, J. Appl. Mech. 60, 1993, and Newmark's.
 
-Both are of order 2 and unconditionally stable for linear systems. The spectral radius r, the factor
-by which a step multiplies the free vibrations of infinite frequency, is a parameter: am =
-(2r - 1)/(r + 1), af = r/(r + 1), gamma = 1/2 - am + af, beta = (1 - am + af)^2 / 4. Of all methods
-that damp the highest frequencies so, it damps the low ones least.
+With accelerations a and h the step, displacements and velocities follow Newmark,
+
+    q1 = q0 + h w0 + h^2 ((1/2 - beta) a0 + beta a1),   w1 = w0 + h ((1 - gamma) a0 + gamma a1),
+
+and the equation of motion holds between both ends,
+
+    M ((1 - am) a1 + am a0) + alpha M ((1 - af) w1 + af w0) + (1 - af) b1 + af b0 = 0,
+
+with b = F_int + beta K0 v - p at each end: the forces are averaged, not the displacements, so that
+b1 is what equilibrium at the end needs (Erlicher, Bonaventura and Bursi, Comput. Mech. 28, 2002).
+
+Both methods are of order 2 and unconditionally stable for linear systems. The spectral radius r,
+the factor by which a step multiplies the free vibrations of infinite frequency, is a parameter:
+am = (2r - 1)/(r + 1), af = r/(r + 1), gamma = 1/2 - am + af, beta = (1 - am + af)^2 / 4. Of all
+methods that damp the highest frequencies so, it damps the low ones least.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import NamedTuple
 
-from foldyn.dynamics.implicit.alpha import Alpha, Parameters
-from foldyn.dynamics.implicit.scheme import Bench
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.algebra.banded import substitute
+from foldyn.dynamics.actuation import actuator_power, turn
+from foldyn.dynamics.course import Course
+from foldyn.dynamics.damping import drag, drag_works, viscous_work
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.implicit.scheme import (
+    GO_ON,
+    NOT_CONVERGED,
+    Goal,
+    Scheme,
+    add_load_work,
+    judge,
+    norms,
+)
+from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.system import Packed, acceleration
+from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
+
+
+class Parameters(NamedTuple):
+    """Parameters of a method of the family."""
+
+    am: float
+    af: float
+    beta: float
+    gamma: float
 
 
 def parameters(spectral_radius: float) -> Parameters:
@@ -24,20 +65,167 @@ def parameters(spectral_radius: float) -> Parameters:
     return Parameters(am, af, 0.25 * (1.0 - am + af) ** 2, 0.5 - am + af)
 
 
-def newmark(bench: Bench) -> Alpha:
-    """Steps of Newmark's method with constant average acceleration, the trapezoidal rule.
+class Alpha(Scheme):
+    """A method of the family; see `Scheme`."""
 
-    N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959.
-    Without numerical damping: a linear system keeps its energy; another one may gain some with
-    large steps.
-    """
-    return Alpha(bench, Parameters(am=0.0, af=0.0, beta=0.25, gamma=0.5))
+    symmetric, tolerance = True, 1e-7
+
+    def __init__(
+        self, packed: Packed, course: Course, parameters: Parameters,
+        facts: Mapping[str, float] = Scheme.facts,
+    ) -> None:  # fmt: skip
+        super().__init__(packed, course)
+        self._p, self.facts = parameters, facts
+
+    def weights(self, h: float) -> Weights:
+        """See `Scheme`; the mass carries what multiplies alpha M too."""
+        am, af, beta, gamma = self._p
+        rate = (1.0 - af) * gamma / (beta * h)
+        mass = (1.0 - am) / (beta * h * h) + rate * self.packed.system.damping.alpha
+        return Weights(1.0 - af, mass, rate)
+
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """See `Scheme`."""
+        return residual(
+            *self.packed.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.work,
+            self.scratch,
+        )  # fmt: skip
+
+    def iterate(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int]:  # fmt: skip
+        """See `Scheme`; with the factors of a band it is one compiled function."""
+        if matrix.band is None:
+            return super().iterate(matrix, goal, h, t, last, lowest, most)
+        return _iterate(
+            *self.packed.arrays, self._p, h, t, self.old, self.new, self.shift, self.out, self.work,
+            self.scratch, self.earlier, matrix.band, matrix.free, goal, last, lowest, most,
+        )  # fmt: skip
+
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """See `Scheme`."""
+        body, u = self.packed.body, self.moved()
+        matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
+
+    def works(self, h: float) -> tuple[float, float]:
+        """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
+        model, system, mass = self.packed.arrays
+        done, lost = _works(system, mass, h, self.old, self.new, self.shift, self.scratch)
+        if system.turns:
+            done += _actuation(model, system, self.old, self.new, self.folds, self.work.fold_angle)
+        return done, lost
+
+    def change(self, h: float) -> NDArray:
+        """See `Scheme`.
+
+        Since a stands for the acceleration at t + (am - af) h, the displacement's error is
+        (am/2 - af/2 + beta - 1/6) h^3 times its third derivative: 1/12 for the trapezoidal rule.
+        """
+        am, af, beta, _ = self._p
+        constant = 0.5 * (am - af) + beta - 1.0 / 6.0
+        return constant * h * h * (self.new.a - self.old.a)
 
 
-def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Bench], Alpha]:
+newmark = partial(Alpha, parameters=Parameters(am=0.0, af=0.0, beta=0.25, gamma=0.5))
+"""Newmark's method with constant average acceleration, the trapezoidal rule.
+
+N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959. Without
+numerical damping: a linear system keeps its energy; another one may gain some with large steps.
+"""
+
+
+def scheme(spectral_radius: float = SPECTRAL_RADIUS) -> Callable[[Packed, Course], Alpha]:
     """Make the steps of the method for a spectral radius."""
+    facts = {"spectral_radius": spectral_radius}
+    return partial(Alpha, parameters=parameters(spectral_radius), facts=facts)
 
-    def make(bench: Bench) -> Alpha:
-        return Alpha(bench, parameters(spectral_radius), {"spectral_radius": spectral_radius})
 
-    return make
+@kernel
+def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
+    """Residual of a step into `out`; returns its norm and that of the forces at play, N."""
+    model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
+    old, new, s = borrowed(old), borrowed(new), borrowed(s)
+    am, af, beta, gamma = p
+    q0, w0, a0, b0 = flat(old.q), flat(old.w), flat(old.a), flat(old.force)
+    q1, w1, a1, b1 = flat(new.q), flat(new.w), flat(new.a), flat(new.force)
+    d, x, left = flat(shift), flat(s.moving), flat(out)
+    curvature = 1.0 / (beta * h * h)
+    for i in range(q0.size):
+        q1[i] = q0[i] + d[i]
+        a1[i] = curvature * (d[i] - h * w0[i]) - (0.5 - beta) / beta * a0[i]
+        w1[i] = w0[i] + h * ((1.0 - gamma) * a0[i] + gamma * a1[i])
+    for node in range(mass.diagonal.size):
+        if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
+            for i in range(3 * node, 3 * node + 3):
+                a1[i], w1[i] = 0.0, d[i] / h
+    acceleration(model, system, mass, new.q, new.w, t, out, work, s)
+    for i in range(q0.size):
+        b1[i] = flat(s.force)[i]
+        slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
+        x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
+    new.factor[:] = s.factor
+    times_mass(mass, s.moving, out)
+    inertia = 0.0
+    for i in range(q0.size):
+        inertia += left[i] * left[i]
+        left[i] += (1.0 - af) * b1[i] + af * b0[i]
+    return norms(system, out, inertia, s.factor)
+
+
+@kernel
+def _iterate(
+    model, system, mass, p, h, t, old, new, shift, out, work, s, earlier, band, free, goal, last,
+    lowest, most,
+):  # fmt: skip
+    """Iterate with the factors of a band; see `Scheme.iterate`."""
+    d, q, before, left = flat(shift), flat(new.q), flat(earlier), flat(out)
+    step = np.empty(free.size)
+    norm = np.inf
+    for steps in range(most):
+        norm, reference = residual(model, system, mass, p, h, t, old, new, shift, out, work, s)
+        verdict = judge(goal, norm, reference, last, lowest)
+        if verdict != GO_ON:
+            return verdict, norm, steps
+        lowest, last = min(lowest, norm), norm
+        for i in range(q.size):
+            before[i] = q[i]
+        for k in range(free.size):
+            step[k] = left[free[k]]
+        substitute(band, step)
+        for k in range(free.size):
+            d[free[k]] -= step[k]
+    return NOT_CONVERGED, norm, most
+
+
+@kernel
+def _works(system, mass, h, old, new, shift, s):
+    """Work put in and energy dissipated in a step."""
+    du = flat(s.displacement)
+    v0, v1, b0, b1 = flat(old.w), flat(new.w), flat(old.force), flat(new.force)
+    moved = system.moved
+    for i in range(du.size):
+        du[i] = flat(shift)[i]
+        flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
+    done, lost = drag_works(
+        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity, s.product
+    )
+    for k in range(moved.dof.size):
+        dof, row = moved.dof[k], moved.row[k]
+        along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
+        du[dof] += along
+        flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
+        done += 0.5 * (b0[dof] + b1[dof]) * along
+    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
+    return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
+
+
+@kernel
+def _actuation(model, system, old, new, angle0, angle1):
+    """Work of the actuators in a step, from angles angle0 to angle1 of the folds."""
+    change = np.zeros_like(new.factor)
+    change[:, 1] = 0.5 * (new.factor[:, 0] - old.factor[:, 0])
+    turn(model, system.actuators, old.factor)
+    done = actuator_power(model, system.actuators, change, angle0)
+    turn(model, system.actuators, new.factor)
+    return done + actuator_power(model, system.actuators, change, angle1)

@@ -6,13 +6,14 @@ nodes (axes with equal supports share it) and solved by sparse triangular substi
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg
 
+from foldyn.algebra.superlu import factorize
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar, summing
 
@@ -67,15 +68,8 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         factor_of_axis, factors = np.zeros(3, np.int64), []
     else:
         inverse = np.zeros((0, 3))
-        free = [np.flatnonzero(~fixed[:, axis]) for axis in range(3)]
-        sets: list[NDArray] = []
-        factor_of_axis = np.zeros(3, np.int64)
-        for axis, nodes in enumerate(free):
-            same = [k for k, known in enumerate(sets) if np.array_equal(known, nodes)]
-            factor_of_axis[axis] = same[0] if same else len(sets)
-            if not same:
-                sets.append(nodes)
-        factors = [_factor(mass, nodes) for nodes in sets]
+        distinct, factor_of_axis = np.unique(fixed, axis=1, return_inverse=True)
+        factors = [_factor(mass, np.flatnonzero(~held)) for held in distinct.T]
     return Inertia(
         lumped,
         diagonal,
@@ -83,58 +77,42 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         mass.indptr.astype(np.int64),
         mass.indices.astype(np.int64),
         mass.data.astype(float),
-        factor_of_axis,
+        factor_of_axis.ravel(),
         *_join(factors),
     )
 
 
 def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
-    """L and U without their diagonals, the orders and the pivots of the free part."""
+    """Free nodes, orders, L and U without their diagonals, and pivots of the free part."""
     if not len(nodes):
         empty = sparse.csc_array((0, 0))
         return nodes, nodes, nodes, empty, empty, np.zeros(0)
-    block = sparse.csc_array(mass[nodes][:, nodes])
-    options = {"SymmetricMode": True}
-    lu = linalg.splu(block, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    lower, upper = sparse.csc_array(lu.L), sparse.csc_array(lu.U)
-    return (
-        nodes,
-        lu.perm_r,
-        lu.perm_c,
-        sparse.csc_array(sparse.tril(lower, -1)),
-        sparse.csc_array(sparse.triu(upper, 1)),
-        1.0 / upper.diagonal(),
-    )
+    lu = factorize(sparse.csc_array(mass[nodes][:, nodes]))
+    lower = sparse.csc_array(sparse.tril(sparse.csc_array(lu.L), -1))
+    upper = sparse.csc_array(lu.U)
+    above = sparse.csc_array(sparse.triu(upper, 1))
+    return nodes, lu.perm_r, lu.perm_c, lower, above, 1.0 / upper.diagonal()
 
 
 def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
     """Arrays of all factors end to end, column pointers made absolute."""
 
-    def column(parts, kind):
+    def column(parts: Iterable[NDArray], kind: type) -> NDArray:
         return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
 
-    def pointers(matrices):
-        # every factor keeps its own closing pointer, so factor k's columns start at start[k] + k
-        out, base = [], 0
-        for m in matrices:
-            out.append(m.indptr.astype(np.int64) + base)
-            base += m.nnz
-        return column(out, np.int64)
-
-    lowers, uppers = [f[3] for f in factors], [f[4] for f in factors]
-    return (
-        np.concatenate([[0], np.cumsum([len(f[0]) for f in factors])]).astype(np.int64),
-        column([f[0] for f in factors], np.int64),
-        column([f[1] for f in factors], np.int64),
-        column([f[2] for f in factors], np.int64),
-        pointers(lowers),
-        column([m.indices for m in lowers], np.int64),
-        column([m.data for m in lowers], float),
-        pointers(uppers),
-        column([m.indices for m in uppers], np.int64),
-        column([m.data for m in uppers], float),
-        column([f[5] for f in factors], float),
+    nodes, rows, columns, lowers, uppers, pivots = (
+        zip(*factors, strict=True) if factors else 6 * [()]
     )
+    joined = [column(parts, np.int64) for parts in (nodes, rows, columns)]
+    for triangles in (lowers, uppers):
+        # every factor keeps its own closing pointer, so factor k's columns start at start[k] + k
+        base = np.cumsum([0, *(m.nnz for m in triangles)])
+        joined += [
+            column((m.indptr + b for m, b in zip(triangles, base[:-1], strict=True)), np.int64),
+            column((m.indices for m in triangles), np.int64),
+            column((m.data for m in triangles), float),
+        ]
+    return (np.cumsum([0, *map(len, nodes)]), *joined, column(pivots, float))
 
 
 @kernel
@@ -195,14 +173,12 @@ def moving_energy(mass, factor):
 
 
 @scalar
-def kinetic_energy(m, v, product):
-    """v M v / 2 (J), v (n, 3); product (n, 3) is scratch, used if the matrix is not diagonal."""
-    return own_kinetic_energy(m, v, product, (0, v.shape[0]))
+def kinetic_energy(m, v, product, own):
+    """v M v / 2 (J) of the nodes own[0] to own[1], of all if the matrix is not diagonal.
 
-
-@scalar
-def own_kinetic_energy(m, v, product, own):
-    """`kinetic_energy` of the nodes own[0] to own[1], of all if the matrix is not diagonal."""
+    v : (n, 3).
+    product : (n, 3), scratch, used if the matrix is not diagonal.
+    """
     if m.lumped:
         return 0.5 * _lumped_sum(m.diagonal[own[0] : own[1]], v[own[0] : own[1]])
     total = 0.0

@@ -1,14 +1,28 @@
-"""Initial states from results."""
+"""How a motion starts: the state of a result, checked against the supports and their motions."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
-from foldyn.cases import State
-from foldyn.errors import InputError
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.cases import Case, State
+from foldyn.dynamics.actuation import turn
+from foldyn.dynamics.course import TALLY, Course, StepPlan
+from foldyn.dynamics.inertia import moving_energy
+from foldyn.dynamics.system import Packed, follow, place, scratch
+from foldyn.dynamics.timing import histories
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.results.contents import check_variable
+
+AXES = "xyz"
+FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
+ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
+AGREES = 1e-9  # of the longest bar: how near a node must stand to where it is imposed
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -32,9 +46,106 @@ def initial_state(result: Any, at: int = -1) -> State:
     if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
         raise InputError(f" = {at!r}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
-    found = {
+    state = {
         name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
         for name in ("displacement", "velocity")
         if name == "displacement" or name in sample
     }
-    return State(**found)
+    return State(**state)
+
+
+def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
+    """Displacement and velocity (n, 3) at the start, checked."""
+    if initial is not None and not isinstance(initial, State):
+        raise InputError(
+            f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
+            "velocity=...) or fd.initial_state(result)"
+        )
+    shape = case.structure.nodes.shape
+    pair = []
+    for name in ("displacement", "velocity"):
+        value = getattr(initial, name, None)
+        array = np.zeros(shape) if value is None else np.array(value, float)
+        if array.shape != shape:
+            raise InputError(f"initial: {name} of shape {array.shape}: the case has {shape}")
+        pair.append(np.ascontiguousarray(array))
+    held = case.fixed & ~case.imposed
+    for vector, _ in case.base_terms:
+        held &= vector == 0.0
+    if (pair[1][held] != 0.0).any():
+        node = int(np.argwhere((pair[1] != 0.0) & held)[0][0])
+        raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
+    return pair[0], pair[1]
+
+
+def check_steady(case: Case, start: float, end: float) -> None:
+    """Refuse a support or a fold that would have to jump."""
+    for what, history in histories(case):
+        times = [time for time in history.jumps() if start < time < end]
+        if times and what != "a load":
+            section = "loads" if what == "an actuation" else "supports"
+            raise InputError(
+                f"{section}: {what} with the history {history.kind} jumps at t = {times[0]:g} s, "
+                "but nothing can move in no time: use a ramp, a half sine or a table"
+            )
+
+
+def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
+    """Warn where damping follows the stiffness at the start u (n, 3), and this is not positive."""
+    if case.damping.beta == 0.0 or case.damping.state != "start":
+        return
+    free = np.asarray(case.free_dofs)
+    body = case.structure.body
+    matrix = sparse.csc_array(body.tangent(body.dofs(u))[free][:, free])
+    shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
+    try:
+        factors = SuperLU(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
+        negative = factors.negative()
+    except SingularTangentError:
+        return
+    if negative:
+        warnings.warn(
+            f'damping: with state = "start" beta K0 drives {negative} '
+            f"motion{'s' if negative > 1 else ''} instead of damping "
+            f"{'them' if negative > 1 else 'it'}: the stiffness is not positive where the motion "
+            'starts; take state = "rest", or start from a stable state',
+            FoldynWarning,
+            stacklevel=4,
+        )
+
+
+def begin(case: Case, u: NDArray, v: NDArray, plan: StepPlan, packed: Packed) -> Course:
+    """State of the integrators at the start of a motion with displacement u and velocity v."""
+    body, system, mass, callbacks, by = packed
+    s = scratch(system)
+    place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
+    if callbacks.error is not None:
+        raise callbacks.error
+    carried, imposed = by.outward(s.displacement), case.imposed
+    q, w = u - carried, v - by.outward(follow(mass, by.inward(np.where(case.fixed, v, 0.0))))
+    apart = np.where(imposed, np.abs(q), 0.0)
+    if apart.max() > AGREES * case.structure.bar_length.max():
+        node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
+        raise InputError(
+            f"supports: node {node} is imposed {carried[node, axis]:.6g} m along "
+            f"{AXES[axis]} at the start, but stands at {u[node, axis]:.6g} m: give a history that "
+            "begins there, as a ramp does from rest, or start from a state that has been brought "
+            "there"
+        )
+    q[imposed] = 0.0
+    tally = np.zeros(1, TALLY)[0]
+    tally.work = -moving_energy(system.moved_mass, s.factor)
+    first = min(1.0, FIRST * plan.tolerance**0.2) * plan.dt
+    tally.time, tally.wanted, tally.error, tally.shortest = plan.start, first, 1e-4, np.inf
+    inward = by.inward(q)
+    if len(body.hidden):  # they stand where they are in balance
+        if system.turns:
+            turn(body.model, system.actuators, s.factor)
+        inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)])[body.hidden]
+    return Course(
+        u=inward,
+        v=by.inward(w),
+        carry=np.zeros_like(inward),
+        tally=tally,
+        angle=body.angles(by.inward(u)),
+    )

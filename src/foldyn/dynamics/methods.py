@@ -5,22 +5,75 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from foldyn.cases import Case
+from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics import (
     central_difference,
     dormand_prince,
     energy_momentum,
     generalized_alpha,
-    resolution,
     rk4,
 )
-from foldyn.dynamics.engine import Compiled, Engine, threads_of
-from foldyn.dynamics.implicit.alpha import residual
+from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
-from foldyn.dynamics.stability import Growth
-from foldyn.dynamics.system import Packed
+from foldyn.dynamics.stability import MARGIN, Growth, largest_frequency, stability_limit
+from foldyn.dynamics.system import Packed, scratches
+from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
+from foldyn.mechanics.threads import run_together
+
+
+class Compiled:
+    """An explicit method, whose whole loop is compiled.
+
+    Parameters
+    ----------
+    loop : callable
+        See `rk4.advance`.
+    packed : Packed
+        The case.
+    course : Course
+    plan : StepPlan
+    threads : int
+        On how many threads it shall run at most; fewer where elements reach too far.
+    """
+
+    def __init__(
+        self, loop: Callable[..., tuple[int, int]], packed: Packed, course: Course, plan: StepPlan,
+        threads: int,
+    ) -> None:  # fmt: skip
+        self._loop, self._arguments = loop, (*packed.arrays, course, plan)
+        self._works = packed.body.workspaces(threads)
+        self._memories = scratches(packed.system, self._works)
+        self.threads = len(self._works)
+
+    def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
+        """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
+        arguments = [
+            (*self._arguments, out, work, memory, stretch)
+            for work, memory in zip(self._works, self._memories, strict=True)
+        ]
+        return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+
+    def facts(self) -> dict[str, Any]:
+        """Statistics of its own, for the result's attributes: none."""
+        return {}
+
+
+def threads_of(packed: Packed) -> int:
+    """Threads on which a motion of a case runs fastest.
+
+    One where something would have to be done by each of them: functions of the user, moving
+    supports, actuated folds, the substitutions of a consistent mass matrix.
+    """
+    system = packed.system
+    called = bool((system.waves.code == CALLED).any())
+    alone = system.moves or system.turns or called or not packed.mass.lumped
+    return 1 if alone else packed.body.threads
 
 
 class Integrator(NamedTuple):
@@ -42,7 +95,7 @@ class Integrator(NamedTuple):
     adaptive : bool
         Whether it always chooses its steps by their error.
     scheme : callable, optional
-        Of an implicit method: its steps from a `Bench`.
+        Of an implicit method: its `Scheme` from a case and a course.
     massless : bool
         Whether it takes dofs without mass beside the displacements, as those of a shell.
     conserving : bool
@@ -67,52 +120,43 @@ class Integrator(NamedTuple):
         """Whether a step solves equations: then nothing but accuracy limits it."""
         return self.scheme is not None
 
-    def engine(self, case: Case, packed: Packed) -> Engine:
-        """The method with a case and the memory that it works with."""
+    def engine(
+        self, case: Case, packed: Packed, course: Course, plan: StepPlan
+    ) -> Compiled | Implicit:
+        """The method with a case, its motion and the memory that it works with."""
         if self.scheme is not None:
-            return Implicit(self.scheme, packed, resolution.jumps(case))
-        return Compiled(self.loop, packed, 1 if self.adaptive else threads_of(packed))
+            return Implicit(self.scheme, packed, course, plan, jumps(case))
+        return Compiled(self.loop, packed, course, plan, 1 if self.adaptive else threads_of(packed))
+
+    def critical_step(self, case: Case, u: ArrayLike | None = None) -> float:
+        """See `critical_step`."""
+        if self.growth is None:
+            return np.inf
+        return MARGIN * stability_limit(self.growth, largest_frequency(case, u), case.damping)
+
+
+def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
+    """The integrator of a file, which has its name."""
+    name = module.__name__.rpartition(".")[2]
+    return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
+
+
+def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any) -> Integrator:
+    return Integrator(name, module.ORDER, module.residual, scheme=scheme, **traits)
 
 
 METHODS: Mapping[str, Integrator] = {
     method.name: method
     for method in (
-        Integrator("rk4", rk4.ORDER, rk4.advance, rk4.growth, 4, looks=(0.0, 0.5, 1.0)),
-        Integrator(
-            "central_difference",
-            central_difference.ORDER,
-            central_difference.advance,
-            central_difference.growth,
-            1,
+        _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
+        _explicit(central_difference, 1),
+        _explicit(dormand_prince, 6, adaptive=True),
+        _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
+        _implicit(
+            "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
         ),
-        Integrator(
-            "dormand_prince",
-            dormand_prince.ORDER,
-            dormand_prince.advance,
-            dormand_prince.growth,
-            6,
-            adaptive=True,
-        ),
-        Integrator(
-            "newmark",
-            generalized_alpha.ORDER,
-            residual,
-            scheme=generalized_alpha.newmark,
-            massless=True,
-        ),
-        Integrator(
-            "generalized_alpha",
-            generalized_alpha.ORDER,
-            residual,
-            scheme=generalized_alpha.scheme(),
-            massless=True,
-        ),
-        Integrator(
-            "energy_momentum",
-            energy_momentum.ORDER,
-            energy_momentum.residual,
-            scheme=energy_momentum.EnergyMomentum,
-            conserving=True,
+        _implicit(
+            "energy_momentum", energy_momentum, energy_momentum.EnergyMomentum, conserving=True
         ),
     )
 }
@@ -128,11 +172,10 @@ def method_of(name: str) -> Integrator:
 def suited(name: str, structure: Any) -> Integrator:
     """Integrator by its name, for a structure."""
     method = method_of(name)
-    found = _lacking(method, structure)
-    if found:
+    if lacking := _lacking(method, structure):
         fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, structure))
         raise InputError(
-            f" = {name!r}: {found}, which this method needs; choose one of {fit}", "method"
+            f" = {name!r}: {lacking}, which this method needs; choose one of {fit}", "method"
         )
     return method
 
@@ -149,3 +192,24 @@ def _lacking(method: Integrator, structure: Any) -> str:
 def compiled(name: str) -> bool:
     """Whether a method's kernels are kept on disk (else its first use compiles)."""
     return ready(method_of(name).loop)
+
+
+def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -> float:
+    """Critical time step (s) of an explicit method for a case: 0.9 of its stability limit.
+
+    Parameters
+    ----------
+    case : Case
+    method : str
+        One of `foldyn.dynamics.METHODS`; nothing but accuracy limits the step of an implicit one:
+        inf.
+    u : (n, 3), optional
+        Displacement (m) about which the stiffness is taken; rest by default.
+
+    Notes
+    -----
+    With the damped spectrum s^2 + (alpha + beta w^2) s + w^2 = 0, the limit is the largest dt
+    with which no vibration grows, for all frequencies w up to the highest of the structure: for
+    RK4 ``|R(s dt)| <= 1``.
+    """
+    return suited(method, case.structure).critical_step(case, u)

@@ -5,20 +5,19 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.dynamics.audit import Rounding, audited, energy_error, energy_scale
-from foldyn.dynamics.course import Course, Outcome, Plan, Samples, samples
-from foldyn.dynamics.critical_step import MARGIN, largest_frequency
-from foldyn.dynamics.engine import Engine
-from foldyn.dynamics.methods import Integrator
+from foldyn.dynamics.audit import Rounding, audited, energy_scale, relative_errors
+from foldyn.dynamics.course import Outcome, Samples, StepPlan, samples
+from foldyn.dynamics.initial import begin
+from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.stability import is_stable, stability_limit
+from foldyn.dynamics.stability import MARGIN, is_stable, largest_frequency, stability_limit
 from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import expected_samples
 from foldyn.errors import (
@@ -44,17 +43,17 @@ class Motion:
     """A motion that is ready to be computed; made by `prepare`."""
 
     def __init__(
-        self, case: Case, method: Integrator, plan: Plan, critical: float, force: bool,
-        begin: Callable[[], Course], packed: Packed, sampler: Sampler, reason: str = "",
+        self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
+        state: tuple[NDArray, NDArray], packed: Packed, sampler: Sampler, reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
-        self._begin, self._packed, self._sampler = begin, packed, sampler
-        self._course, self._out = begin(), self._room(0)
-        self.at_rest = not (self._course.u.any() or self._course.v.any())
-        self.seconds = 0.0
+        self._state, self._packed, self._sampler = state, packed, sampler
         self._rounding = Rounding(packed.body)
-        self._engine: Engine | None = None
+        self._engine: Compiled | Implicit | None = None
+        self.seconds = 0.0
+        self._start(0)
+        self.at_rest = not (self._course.u.any() or self._course.v.any())
 
     @property
     def expected_samples(self) -> int:
@@ -73,23 +72,27 @@ class Motion:
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
-        self._course, self._out = self._begin(), self._room(self.expected_samples)
+        self._start(self.expected_samples)
         self._sampler.clear()
         self._integrate(*reporter(progress))
-        if told := self._doubts(self._audit()):
-            warnings.warn(told, FoldynWarning, stacklevel=3)
+        if doubts := self._doubts(self._audit()):
+            warnings.warn(doubts, FoldynWarning, stacklevel=3)
         return self._written()
 
-    def _room(self, count: int) -> Samples:
+    def _start(self, count: int) -> None:
+        """Go back to the start, with room for `count` samples."""
         structure = self.case.structure
-        energies = len(audited(structure.energy_groups))
-        return samples(count, len(structure.nodes), len(self.case.supported_dofs), energies)
+        self._course = begin(self.case, *self._state, self.plan, self._packed)
+        self._out = samples(
+            count, len(structure.nodes), len(self.case.supported_dofs),
+            len(audited(structure.energy_groups)),
+        )  # fmt: skip
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
-        """Advance in stretches, between which progress is told and the motion is audited."""
+        """Advance in stretches; after each, report the progress and audit the motion."""
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
-        engine = self._engine = self.method.engine(self.case, self._packed)
+        engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
         memory = scratch(system)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
@@ -99,15 +102,17 @@ class Motion:
                 done = int(course.tally.steps)
                 stretch = min(length, recheck - done % recheck)
                 clock = time.perf_counter()
-                code, hinge = engine.advance(course, plan, self._out, stretch)
+                code, hinge = engine.advance(self._out, stretch)
                 clock = time.perf_counter() - clock
                 began = time.perf_counter() if began is None else began
                 self.seconds = time.perf_counter() - began
                 self._sample()
+                if isinstance(callbacks.error, Exception):
+                    self._stop(str(callbacks.error), cause=callbacks.error)
                 if callbacks.error is not None:
-                    self._raise(callbacks.error)
+                    raise callbacks.error
                 if code == Outcome.FULL:
-                    self._out = _enlarged(self._out)
+                    self._out = self._out.doubled()
                 elif code != Outcome.DONE:
                     self._fail(code, hinge)
                 step, now = int(course.tally.steps), float(course.tally.time)
@@ -134,35 +139,29 @@ class Motion:
         try:
             self._sampler.take(self._out, self.stored)
         except SamplingError as error:
-            raise ComputationError(str(error), self._dataset()) from error
+            self._stop(str(error), ComputationError, error)
 
-    def _raise(self, error: BaseException) -> None:
-        """Raise what a function of time of the user's has raised."""
-        if isinstance(error, Exception):
-            raise InstabilityError(str(error), self._dataset()) from error
-        raise error
+    def _stop(self, message: str, kind: type = InstabilityError, cause: Any = None) -> NoReturn:
+        """End the motion with an error, which carries what was computed until then."""
+        raise kind(message, self._dataset()) from cause
 
     def _audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        energy = self._out.energy[: self.stored]
-        error, scale = energy_error(energy), energy_scale(energy)
-        if scale == 0.0:
-            return 0.0
-        relative = np.abs(error) / scale
+        energy = self._written().energy
+        relative = relative_errors(energy)
         worst = float(relative.max())
-        if worst > EXPLODED and self._rounding.told_by(energy, self._farthest()):
+        if worst > EXPLODED and self._rounding.reveals(energy, self._farthest()):
             bad = int(np.argmax(relative > EXPLODED))
             self._course.tally.samples = bad
-            raise InstabilityError(
+            self._stop(
                 f"the motion is unstable: at t = {self._out.time[bad]:.6g} s the energy balance is "
-                f"off by more than the energies at play; {self._smaller_step()}",
-                self._dataset(),
+                f"off by more than the energies at play; {self._smaller_step()}"
             )
         return worst
 
     def _farthest(self) -> float:
         """Largest displacement (m) of a sample so far."""
-        moved = self._out.displacement[: self.stored]
+        moved = self._written().displacement
         return max(float(moved.max()), -float(moved.min()))
 
     def _smaller_step(self) -> str:
@@ -180,47 +179,44 @@ class Motion:
         assert growth is not None  # of explicit methods
         if not is_stable(growth, omega, self.case.damping, self.plan.dt):
             limit = stability_limit(growth, omega, self.case.damping)
-            raise InstabilityError(
+            self._stop(
                 f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
-                f"dt = {0.5 * MARGIN * limit:.3g} or smaller",
-                self._dataset(),
+                f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
             )
 
-    def _fail(self, code: int, hinge: int) -> None:
+    def _fail(self, code: int, hinge: int) -> NoReturn:
+        """Say why no further step can be taken."""
         plan, tally, order = self.plan, self._course.tally, self._packed.numbering.order
-        model = self._packed.model
-        moment = f"t = {tally.time:.6g} s (step {tally.steps})"
+        hinges = self._packed.model.hinges
+        moment = f"at t = {tally.time:.6g} s (step {tally.steps})"
         rest, rows = self._packed.body.turned()
         turned = rows[np.isnan(rest)]
         if len(turned):
-            j, k = order[model.hinges[turned[0], :2]].tolist()
-            raise InstabilityError(
-                f"at {moment} the rest dihedral of the crease between nodes {j} and {k} leaves 0 "
-                "to 360 degrees: change the angle or the history that actuates it",
-                self._dataset(),
+            j, k = order[hinges[turned[0], :2]].tolist()
+            self._stop(
+                f"{moment} the rest dihedral of the crease between nodes {j} and {k} leaves 0 to "
+                "360 degrees: change the angle or the history that actuates it"
             )
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
         if code == Outcome.PENETRATION:
-            j, k, i, l = order[model.hinges[hinge]].tolist()  # noqa: E741
-            raise PenetrationError(
-                f"at {moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
+            j, k, i, l = order[hinges[hinge]].tolist()  # noqa: E741
+            self._stop(
+                f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
                 f"{i}, {l}) jumped by more than pi; a fold law that locks (EnhancedLinear) or a "
                 "smaller step keeps panels apart",
-                self._dataset(),
+                PenetrationError,
             )
         if code == Outcome.STUCK:
-            raise InstabilityError(
-                f"at {moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps "
-                "too often, or the motion is too violent; raise the tolerance, or use rk4",
-                self._dataset(),
+            self._stop(
+                f"{moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps too "
+                "often, or the motion is too violent; raise the tolerance, or use rk4"
             )
         if code == Outcome.NOT_CONVERGED:
-            raise InstabilityError(
-                f"at {moment} no end of a step was found that is in equilibrium, however small the "
-                "step: a mass or a stiffness may be missing, or the motion is too violent",
-                self._dataset(),
+            self._stop(
+                f"{moment} no equilibrium was found at the end of a step, however small the step: "
+                "a mass or a stiffness may be missing, or the motion is too violent"
             )
         reason = "a load is not finite"
         if plan.steps and not self.method.implicit:
@@ -228,28 +224,25 @@ class Motion:
                 f"the step of {plan.dt:.3g} s is too large (critical at the start: "
                 f"{self.critical:.3g} s) or {reason}"
             )
-        raise InstabilityError(
-            f"at {moment} the motion is no longer finite: {reason}", self._dataset()
-        )
+        self._stop(f"{moment} the motion is no longer finite: {reason}")
 
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
         out = self._written()
-        energies: dict[str, NDArray] = dict(
-            zip(audited(self.case.structure.energy_groups), out.energy.T, strict=True)
-        )
+        names = audited(self.case.structure.energy_groups)
+        energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         return trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
-            self._statistics(self.plan), self._sampler.columns(self.stored),
+            self._statistics(), self._sampler.columns(self.stored),
         )  # fmt: skip
 
     def _written(self) -> Samples:
         return Samples(*(array[: self.stored] for array in self._out))
 
-    def _statistics(self, plan: Plan) -> dict[str, Any]:
-        tally = self._course.tally
+    def _statistics(self) -> dict[str, Any]:
+        plan, tally, engine = self.plan, self._course.tally, self._engine
         steps = int(tally.steps)
-        told: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "method": self.method.name,
             "dt": plan.dt,
             "steps": plan.steps,
@@ -258,14 +251,14 @@ class Motion:
             "every": plan.every,
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
-            "threads": self._engine.threads if self._engine else 1,
-            "energy_error": self._relative_error(),
+            "threads": engine.threads if engine else 1,
+            "energy_error": float(relative_errors(self._written().energy).max(initial=0.0)),
             "started_from": "rest" if self.at_rest else "state",
         }
         if self.reason:
-            told["method_reason"] = self.reason
+            facts["method_reason"] = self.reason
         if not plan.steps:
-            told |= {
+            facts |= {
                 "dt": float(tally.time - plan.start) / max(steps, 1),
                 "steps": steps,
                 "every": plan.every or plan.interval,
@@ -274,19 +267,12 @@ class Motion:
                 "smallest_step": float(tally.shortest) if steps else 0.0,
                 "largest_step": float(tally.longest),
             }
-        told["force_evaluations"] = int(tally.evaluations)
-        return told | (self._engine.facts() if self._engine else {})
-
-    def _relative_error(self) -> float:
-        energy = self._out.energy[: self.stored]
-        if not len(energy):
-            return 0.0
-        scale = energy_scale(energy)
-        return float(np.abs(energy_error(energy)).max() / scale) if scale > 0.0 else 0.0
+        facts["force_evaluations"] = int(tally.evaluations)
+        return facts | (engine.facts() if engine else {})
 
     def _doubts(self, error: float) -> str:
-        """What to say of a motion with a relative energy error; empty where nothing."""
-        energy, farthest = self._out.energy[: self.stored], self._farthest()
+        """Warning about a motion with a relative energy error; empty if there is none."""
+        energy, farthest = self._written().energy, self._farthest()
         least = self._rounding.least_motion(INACCURATE)
         if 0.0 < farthest < least:
             return (
@@ -308,11 +294,6 @@ class Motion:
         if scale <= rounding:
             return (
                 f"{off}, {scale:.2g} J: they are below the rounding errors of forces and "
-                f"displacements of this size ({rounding:.2g} J), and what moves may be these errors"
+                f"displacements of this size ({rounding:.2g} J), which may be all that moves"
             )
         return f"{off}: {self._smaller_step()}"
-
-
-def _enlarged(out: Samples) -> Samples:
-    """Samples with room for twice as many."""
-    return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in out))

@@ -1,4 +1,4 @@
-"""What a long run tells while it runs."""
+"""Progress reports of long runs."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def reporter(choice: bool | Reporter | None) -> tuple[Reporter, Callable[[], Non
         if not first:
             first.append(time.perf_counter())
         pace = state.steps / max(time.perf_counter() - first[0], 1e-9)
-        told = f"{pace:,.0f} steps/s, energy error {state.energy_error:.1e}"
-        bar.set_postfix_str(told, refresh=False)
+        text = f"{pace:,.0f} steps/s, energy error {state.energy_error:.1e}"
+        bar.set_postfix_str(text, refresh=False)
         bar.update(state.time - bar.n)
 
     return show, bar.close

@@ -7,9 +7,8 @@ import numpy as np
 from foldyn.dynamics.course import Outcome, observe, tell
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.borrow import borrowed
 from foldyn.jit.compiled import shared
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 4
 
@@ -55,9 +54,9 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             work_out += weight * power_out
             ahead = 0.5 * dt if stage < 2 else dt
             if stage == 0:
-                found, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-                if found != Outcome.DONE or step == end:
-                    return found, hinge
+                outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
+                if outcome != Outcome.DONE or step == end:
+                    return outcome, hinge
                 for i in range(u.size):
                     du[i], dv[i] = vt[i], fa[i]
                     ut[i] = u[i] + ahead * vt[i]

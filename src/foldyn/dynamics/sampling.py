@@ -88,12 +88,12 @@ class Sampler:
 
     def columns(self, count: int) -> dict[str, tuple[Quantity, NDArray]]:
         """Quantities with their values at the first `count` samples, nan where there is none."""
-        found = {}
+        columns = {}
         for name, (quantity, shape) in self._quantities.items():
             column, values = np.full((count, *shape), np.nan), self._values[name][:count]
             column[: len(values)] = np.reshape(values, (-1, *shape))
-            found[name] = quantity, column
-        return found
+            columns[name] = quantity, column
+        return columns
 
 
 def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:

@@ -1,14 +1,24 @@
-"""When the free vibrations of a damped linear system stop growing under an explicit method."""
+"""The largest stable time step of an explicit method, and the frequency that it depends on.
+
+A step is stable where the free vibrations of a damped linear system do not grow.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse import linalg
 
-from foldyn.cases import Rayleigh
+from foldyn.algebra.superlu import SingularTangentError, factorize
+from foldyn.cases import Case, Rayleigh
+from foldyn.dynamics.inertia import is_lumped
+from foldyn.errors import ComputationError
 
+MARGIN = 0.9  # of the stability limit: room for stiffening
+_DENSE = 60  # dofs below which a dense eigensolver is quicker and safer
 # of frequencies (n,), damping (n,) and a step: largest factor of a free vibration in a step (n,)
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
@@ -46,3 +56,50 @@ def stability_limit(growth: Growth, omega: float, damping: Rayleigh) -> float:
         stable = is_stable(growth, omega, damping, middle)
         low, high = (middle, high) if stable else (low, middle)
     return low
+
+
+def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
+    """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
+
+    Hinges count with at least their nominal stiffness, so that superlinear bends, which have
+    none at rest, cannot make the answer too small.
+    """
+    structure, free = case.structure, np.asarray(case.free_dofs)
+    if not len(free):
+        return 0.0
+    state = np.zeros_like(structure.nodes) if u is None else np.asarray(u, float)
+    k = structure.body.tangent(state, 1.0)[free][:, free]
+    m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    try:
+        return _largest_frequency(k, m)
+    except (linalg.ArpackError, np.linalg.LinAlgError, SingularTangentError) as error:
+        raise ComputationError(
+            f"the largest frequency, which the critical step needs, cannot be computed: {error}"
+        ) from error
+
+
+def _largest_frequency(k: sparse.csr_array, m: sparse.csr_array) -> float:
+    if k.shape[0] <= _DENSE:
+        values = _dense(k.toarray(), m.toarray())
+    elif is_lumped(m):
+        root = sparse.diags_array(1.0 / np.sqrt(m.diagonal()))
+        values = _largest(sparse.csr_array(root @ k @ root))
+    else:
+        solve = factorize(sparse.csc_array(m), symmetric=False).solve
+        values = _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
+    return float(np.sqrt(max(values, 0.0)))
+
+
+def _dense(k: NDArray, m: NDArray) -> float:
+    root = np.linalg.inv(np.linalg.cholesky(m))
+    return float(np.linalg.eigvalsh(root @ k @ root.T)[-1])
+
+
+def _largest(
+    k: sparse.csr_array, m: sparse.csr_array | None = None, solve: object | None = None
+) -> float:
+    start = np.random.default_rng(0).standard_normal(k.shape[0])  # same answer in every run
+    largest = linalg.eigsh(
+        k, 1, m, which="LA", v0=start, tol=1e-4, Minv=solve, return_eigenvectors=False
+    )
+    return 1.0002 * float(largest[0])  # Lanczos values come from below

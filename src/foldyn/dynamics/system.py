@@ -26,16 +26,14 @@ from foldyn.dynamics.inertia import (
     inertia,
     kinetic_energy,
     moving_energy,
-    own_kinetic_energy,
     substitute,
     times_mass,
 )
-from foldyn.dynamics.numbering import Numbering, renumbered
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.jit.flat import flat
-from foldyn.mechanics import wait
-from foldyn.mechanics.body import Body
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.body import Body, Numbering, renumbered
 from foldyn.mechanics.kernels import energies_of, force_of
+from foldyn.mechanics.threads import wait
 
 
 class Entries(NamedTuple):
@@ -98,6 +96,11 @@ class Packed(NamedTuple):
         """The arrays of the body's kernels."""
         return self.body.model
 
+    @property
+    def arrays(self) -> tuple[Any, System, Inertia]:
+        """What compiled loops take first."""
+        return self.model, self.system, self.mass
+
 
 def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads.
@@ -116,8 +119,10 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         (follow(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
     ]
+    loads = [(by.inward(vector), history) for vector, history in case.load_terms]
     callbacks = Callbacks()
-    body, turned = actuators(body, structure.fold_law, case.actuation_terms, histories)
+    turns = _entries(case.actuation_terms, histories)
+    body, turned = actuators(body, structure.fold_law, *turns)
     system = System(
         varies=bool(histories),
         moves=bool(moves),
@@ -128,8 +133,8 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         supported=by.dofs(case.supported_dofs),
         damping=damping_of(case, by, start),
         waves=pack_waveforms(histories, callbacks, span),
-        loads=_entries([(by.inward(p), history) for p, history in case.load_terms], histories),
-        moved=_entries(moves, histories),
+        loads=_ordered(_entries(loads, histories)),
+        moved=_ordered(_entries(moves, histories)),
         moved_mass=_moved_mass(nodal, moves, histories),
         actuators=turned,
     )
@@ -139,16 +144,18 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
 def _entries(terms, histories) -> Entries:
     dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
     for vector, history in terms:
-        entries = vector.ravel()
+        entries = np.ravel(vector)
         where = np.flatnonzero(entries)
         dofs.append(where)
         values.append(entries[where])
         rows.append(np.full(len(where), histories.index(history)))
-    dof = np.concatenate(dofs).astype(np.int64)
-    order = np.argsort(dof, kind="stable")
-    return Entries(
-        dof[order], np.concatenate(values)[order], np.concatenate(rows).astype(np.int64)[order]
-    )
+    return Entries(*map(np.concatenate, (dofs, values, rows)))
+
+
+def _ordered(entries: Entries) -> Entries:
+    """Entries by their dofs."""
+    order = np.argsort(entries.dof, kind="stable")
+    return Entries(*(column[order] for column in entries))
 
 
 def follow(mass: Inertia, shape: NDArray) -> NDArray:
@@ -202,20 +209,18 @@ def place(system, q, w, t, s):
     """Displacement and velocity at time t, q + S f and w + S f', into `s`."""
     evaluate(system.waves, t, True, s.factor)
     s.time[0] = t
-    _carry(system.moved, s.factor, q, w, s.displacement, s.velocity)
+    carry(system.moved, s.factor, 0, q, s.displacement)
+    carry(system.moved, s.factor, 1, w, s.velocity)
 
 
 @kernel
-def _carry(moved, factor, q, w, displacement, velocity):
-    """Add the motion of the supports, S f and S f', to q and w."""
-    u, v = flat(displacement), flat(velocity)
-    still_u, still_v = flat(q), flat(w)
-    for i in range(u.size):
-        u[i], v[i] = still_u[i], still_v[i]
+def carry(moved, factor, derivative, still, out):
+    """Add the motion of the supports, S f or a derivative of it, to q, w or q'', all (n, 3)."""
+    values, rest = flat(out), flat(still)
+    for i in range(values.size):
+        values[i] = rest[i]
     for k in range(moved.dof.size):
-        dof, row = moved.dof[k], moved.row[k]
-        u[dof] += moved.value[k] * factor[row, 0]
-        v[dof] += moved.value[k] * factor[row, 1]
+        values[moved.dof[k]] += moved.value[k] * factor[moved.row[k], derivative]
 
 
 @kernel
@@ -244,7 +249,8 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     if system.turns:
         turn(model, system.actuators, s.factor)
     if system.moves:
-        _carry(system.moved, s.factor, q, w, s.displacement, s.velocity)
+        carry(system.moved, s.factor, 0, q, s.displacement)
+        carry(system.moved, s.factor, 1, w, s.velocity)
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
     wait(work.team)  # for q and w of the others
@@ -271,7 +277,7 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         for i in range(relative.size):
             accelerated[i] = -accelerated[i] - drag(damping, relative[i])
     if damping.alpha > 0.0:
-        kinetic = own_kinetic_energy(mass, v, s.product, work.strips.own)
+        kinetic = kinetic_energy(mass, v, s.product, work.strips.own)
         power_out += drag_power(damping, kinetic)
     if system.moves:
         power_in += _moving_power(system.moved, system.moved_mass, damping, s.force, s.factor)
@@ -287,16 +293,9 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
     gets the strain energies, the kinetic energy, what was dissipated and the work.
     """
-    moved = system.moved
-    u, v, moving = flat(s.displacement), flat(s.velocity), flat(s.moving)
-    still_u, still_v, still_a = flat(q), flat(w), flat(a)
-    for i in range(u.size):
-        u[i], v[i], moving[i] = still_u[i], still_v[i], still_a[i]
-    for k in range(moved.dof.size):
-        dof, row, value = moved.dof[k], moved.row[k], moved.value[k]
-        u[dof] += value * s.factor[row, 0]
-        v[dof] += value * s.factor[row, 1]
-        moving[dof] += value * s.factor[row, 2]
+    carry(system.moved, s.factor, 0, q, s.displacement)
+    carry(system.moved, s.factor, 1, w, s.velocity)
+    carry(system.moved, s.factor, 2, a, s.moving)
     for i in range(system.order.size):
         for c in range(3):
             displacement[system.order[i], c] = s.displacement[i, c]
@@ -306,7 +305,7 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
     for k in range(system.supported.size):
         reaction[k] = product[system.supported[k]] + force[system.supported[k]]
     groups = s.energy.size
-    energy[groups] = kinetic_energy(mass, s.velocity, s.product)
+    energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
     for k in range(system.supported.size):
         reaction[k] += drag(system.damping, product[system.supported[k]])

@@ -1,38 +1,46 @@
-"""Steps and samples: how duration, time step and output interval fit together."""
+"""Steps and samples: how duration, time step and output interval fit together and to the loads.
+
+Pulses that fall between the ends of steps would be lost silently. Methods that choose their steps
+end them at the knots of the histories and look between. With a fixed step the user is told
+beforehand how far what the method sees of a history lies from the history.
+"""
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Iterator
 from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.course import Plan
-from foldyn.errors import InputError
+from foldyn.cases import Case, History
+from foldyn.cases.waveforms import CALLED
+from foldyn.dynamics.course import StepPlan
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.memory import check_memory
 from foldyn.values import number, show, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
-SAME_TIME = 1e-12  # of the largest time: stops as near as that are one
-NO_STOPS = np.zeros(0)
-
-
-def positive(name: str, value: object) -> float:
-    """Return a positive finite number, or refuse it."""
-    return number(name, value, above=0.0)
+SAME_TIME = 1e-12  # of the largest time: stops that are closer are one
+NOTICED = 0.01  # part of a load that is not seen, above which the user is warned
+MOST_LOOKS = 20_000  # that are looked at; of longer motions, the steps about knots and some others
+MOST_CALLS = 500  # the same for functions of the user's, which are slow
+MOST_PLACES = 100
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+MEMORY, IMPLICIT_MEMORY = 200, 20  # steps in which a vibration moves on
 
 
 def fixed_steps(
-    duration: float, dt: float | None, every: int | float, critical: float, start: float = 0.0
-) -> Plan:
+    duration: float, dt: float | None, every: int | float, critical: float, start: float
+) -> StepPlan:
     """Fit a time step and the sampling to a duration.
 
     `every` counts steps if it is an int and seconds if it is a float. Without `dt` the step is
     half the critical one, shortened so that it divides the sampling interval and the duration.
     """
-    duration = positive("duration", duration)
     in_seconds = counted_in_seconds(duration, every)
     if dt is None:
         target = DEFAULT_FRACTION * critical
@@ -56,20 +64,19 @@ def fixed_steps(
     steps = math.floor(duration / dt * (1.0 + 1e-12) + 1e-9)
     if per_sample > steps:
         raise InputError(f" = {every}: longer than the motion of {steps} steps", "every")
-    interval = per_sample * dt
-    return Plan(start, start + steps * dt, dt, steps, per_sample, interval, 0.0, 0.0, NO_STOPS)
+    end, interval = start + steps * dt, per_sample * dt
+    return StepPlan(start, end, dt, steps, per_sample, interval, 0.0, 0.0, np.zeros(0))
 
 
 def variable_steps(
     duration: float, dt: float | None, every: int | float, largest: float, start: float,
-    tolerance: float, floor: float = 0.0, knots: NDArray = NO_STOPS,
-) -> Plan:  # fmt: skip
+    tolerance: float, floor: float, knots: NDArray,
+) -> StepPlan:  # fmt: skip
     """Plan of a motion whose steps follow their error; `dt` is the largest step.
 
-    Without `dt` it is `largest`, at most a tenth of the motion. Of the knots those are kept that
-    lie within the motion and that time can tell apart.
+    Without `dt` it is `largest`, at most a tenth of the motion. Knots outside the motion are
+    dropped, and so are those that rounding cannot tell apart from the one before.
     """
-    duration = positive("duration", duration)
     in_seconds = counted_in_seconds(duration, every)
     dt = min(largest, 0.1 * duration) if dt is None else _given_step(duration, dt)
     _check_count(duration, dt)
@@ -78,10 +85,10 @@ def variable_steps(
     within = np.sort(knots[(knots > start) & (knots < end)])
     apart = np.diff(within, prepend=start) > SAME_TIME * max(abs(start), abs(end))
     per_sample = 0 if in_seconds else int(every)
-    return Plan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
+    return StepPlan(start, end, dt, 0, per_sample, interval, tolerance, floor, within[apart])
 
 
-def expected_samples(plan: Plan) -> int:
+def expected_samples(plan: StepPlan) -> int:
     """Number of samples, the first at the start; where steps vary and are counted, the least."""
     if plan.steps:
         return plan.steps // plan.every + 1
@@ -97,13 +104,13 @@ def counted_in_seconds(duration: float, every: int | float) -> bool:
     if isinstance(every, Integral):
         whole("every", every, least=1, what="steps")
         return False
-    if positive("every", every) > duration * (1.0 + 1e-9):
+    if number("every", every, above=0.0) > duration * (1.0 + 1e-9):
         raise InputError(f" = {every:g} s: longer than the duration of {duration:g} s", "every")
     return True
 
 
 def _given_step(duration: float, dt: float) -> float:
-    dt = positive("dt", dt)
+    dt = number("dt", dt, above=0.0)
     _check_count(duration, dt)
     if dt > duration * (1.0 + 1e-9):
         raise InputError(f" = {dt:g} s: longer than the duration of {duration:g} s", "dt")
@@ -126,3 +133,136 @@ def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) ->
         "every", f"{samples:.3g} samples of {nodes} nodes{together}",
         8.0 * samples * (6 * nodes + supported + 6), "raise it, or shorten the duration",
     )  # fmt: skip
+
+
+def histories(case: Case) -> Iterator[tuple[str, History]]:
+    """Histories of a case that vary, each with what it drives."""
+    driven = {
+        "a load": case.load_terms,
+        "an imposed displacement": case.imposed_terms,
+        "a base motion": case.base_terms,
+        "an actuation": case.actuation_terms,
+    }
+    for what, terms in driven.items():
+        yield from ((what, history) for _, history in terms if history.kind != "constant")
+
+
+def knots(case: Case) -> NDArray[np.float64]:
+    """Times (s) at which loads, supports or rest angles jump or turn a corner."""
+    return np.unique([time for _, history in histories(case) for time in history.knots() or ()])
+
+
+def jumps(case: Case) -> tuple[float, ...]:
+    """Times (s) at which loads jump, or may: those that the user names of a function."""
+    times: set[float] = set()
+    for _, history in case.load_terms:
+        called = history.code == CALLED
+        times.update((history.knots() or ()) if called else history.jumps())
+    return tuple(sorted(times))
+
+
+def warn_of_functions(case: Case) -> None:
+    """Warn of functions of time, which steps of variable length sample here and there only."""
+    for what, history in histories(case):
+        if history.knots() is None:
+            warnings.warn(
+                f"the history of {what} is a function whose jumps and corners are unknown: each "
+                "step looks at it at eight points, and a pulse shorter than their distance may be "
+                "missed; say when they are: fd.Function(f, at=[0.2, 0.25]), at=[] if it is smooth",
+                FoldynWarning,
+                stacklevel=4,
+            )
+            return
+
+
+def warn_of_coarse_steps(
+    case: Case, plan: StepPlan, looks: tuple[float, ...], implicit: bool
+) -> None:
+    """Warn where steps of dt do not resolve a history.
+
+    looks : where in a step a method looks at the loads, from 0 to 1.
+    """
+    memory = IMPLICIT_MEMORY if implicit else MEMORY
+    for what, history in histories(case):
+        share = overlooked(history, plan, looks, memory, implicit)
+        if share > NOTICED:
+            warnings.warn(
+                f"steps of {plan.dt:.3g} s do not resolve the history {history.kind} of {what}: "
+                f"what they see of it is off by {share:.0%}; take a smaller dt, or a method that "
+                'chooses its steps: "dormand_prince", or an implicit one without dt',
+                FoldynWarning,
+                stacklevel=4,
+            )
+
+
+def overlooked(
+    history: History, plan: StepPlan, looks: tuple[float, ...], memory: int, jumps: bool
+) -> float:
+    """Part of a history that fixed steps do not see; see `warn_of_coarse_steps`.
+
+    The largest integral over `memory` steps of the distance between the history and the
+    polynomial through the points where it is looked at, over the largest one of the history.
+
+    jumps : whether steps are divided where loads jump.
+    """
+    unseen, whole = 0.0, 0.0
+    try:
+        for first, last in _stretches(history, plan, memory):
+            ends = plan.start + plan.dt * np.arange(first, last + 1)
+            if jumps:
+                ends = np.union1d(ends, [t for t in history.jumps() if ends[0] < t < ends[-1]])
+            gap, size = _integrals(history, ends, looks, jumps)
+            unseen = max(unseen, _largest_sum(gap, memory))
+            whole = max(whole, _largest_sum(size, memory))
+    except InputError:  # a function that fails: the motion will stop there, and say why
+        return 0.0
+    return unseen / whole if whole > 0.0 else 0.0
+
+
+def _stretches(history: History, plan: StepPlan, memory: int) -> list[tuple[int, int]]:
+    """Stretches of steps (first, last) that are looked at: all, or those where most may happen."""
+    turns = history.knots()
+    most = MOST_CALLS if turns is None else MOST_LOOKS
+    if plan.steps <= most:
+        return [(0, plan.steps)]
+    length = min(2 * memory, most)
+    places = np.linspace(0, plan.steps, max(2, most // length))
+    if turns:
+        at = (np.array(turns) - plan.start) / plan.dt
+        at = at[(at > -1.0) & (at < plan.steps + 1.0)]
+        places = np.append(places, at[:: max(1, len(at) // MOST_PLACES)])
+    firsts = np.clip(places - 0.5 * length, 0, plan.steps - length).astype(np.int64)
+    return [(int(first), int(first) + length) for first in np.unique(firsts)]
+
+
+def _integrals(
+    history: History, ends: NDArray, looks: tuple[float, ...], jumps: bool
+) -> tuple[NDArray, NDArray]:
+    """Integrals over each step between `ends` of what is not seen of a history, and of its size."""
+    turns = np.array([t for t in history.knots() or () if ends[0] < t < ends[-1]])
+    pieces = np.union1d(ends, turns)
+    length = 0.5 * np.diff(pieces)
+    times = pieces[:-1, None] + length[:, None] * (1.0 + POINTS)
+    step = np.searchsorted(ends, times[:, 0], side="right") - 1
+    h = np.diff(ends)
+    looked = ends[:-1, None] + h[:, None] * np.array(looks)
+    if jumps:  # the end of a step is before a jump there
+        looked[:, -1] = np.nextafter(ends[1:], -np.inf)
+    values, seen = history(times), history(looked)
+    place = (times - ends[step, None]) / h[step, None]
+    line = np.zeros_like(values)
+    for k, at in enumerate(looks):  # Lagrange's polynomials
+        others = [x for x in looks if x != at]
+        basis = np.prod([(place - x) / (at - x) for x in others], axis=0)
+        line += seen[step, k, None] * basis
+    return tuple(
+        np.bincount(step, (np.abs(each) @ WEIGHTS) * length, len(h))
+        for each in (values - line, values)
+    )  # type: ignore[return-value]
+
+
+def _largest_sum(values: NDArray, count: int) -> float:
+    """Largest sum of `count` values in a row."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    count = min(count, len(values))
+    return float((sums[count:] - sums[:-count]).max())

@@ -1,31 +1,47 @@
-"""A perspective camera with radial lens distortion."""
+"""A perspective camera with radial lens distortion, the scale of its pictures, and OpenCV."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from foldyn.errors import InputError
+from foldyn.values import choice, number
 
 _TERMS = 6  # of the polynomial in r^2 that inverts the distortion
 _REACH = 1.08  # part of the half diagonal, up to which it is fitted
+_LARGEST_SPREAD = 0.02  # of the lengths that give a scale
 
 DIRECTIONS = {
     f"{sign}{axis}": (1.0 if sign != "-" else -1.0) * np.eye(3)[k]
     for k, axis in enumerate("xyz")
     for sign in ("", "+", "-")
 }
-"""Directions by the names that a person types: "x", "-x", "+z"."""
+"""Unit vectors by the names that a user types: "x", "-x", "+z"."""
 
 
-def direction(name: str, value: str) -> NDArray[np.float64]:
-    """Unit vector of "x", "-y", "+z"."""
-    if value not in DIRECTIONS:
-        raise InputError(f"{name}: {value!r} is no direction; use x, -x, y, -y, z or -z")
-    return DIRECTIONS[value]
+def opencv() -> Any:
+    """Return the module `cv2`, an optional dependency.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        import cv2  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            "camera tracking needs OpenCV, which is not installed: "
+            "pip install opencv-python-headless (or foldyn[experiment])"
+        ) from None
+    return cv2
 
 
 def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
@@ -48,7 +64,8 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
     InputError
         Not two directions at a right angle.
     """
-    top, toward = direction("up", up), direction("facing", facing)
+    top = DIRECTIONS[choice("up", up, DIRECTIONS)]
+    toward = DIRECTIONS[choice("facing", facing, DIRECTIONS)]
     if abs(top @ toward) > 0.5:
         raise InputError(f"up: {up!r} and facing: {facing!r} lie along the same axis; turn one")
     return np.array([np.cross(top, toward), -top, -toward])
@@ -83,8 +100,7 @@ class Camera:
     k2: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.focal) and self.focal > 0.0):
-            raise InputError(f"focal: {self.focal!r}; give a positive number of pixels")
+        number("focal", self.focal, above=0.0, unit="pixels")
         if min(self.size) < 8:
             raise InputError(f"size: {self.size} pixels; at least 8 x 8 are needed")
         r2 = self._outermost**2 * np.linspace(0.0, 1.0, 64) ** 2
@@ -112,12 +128,8 @@ class Camera:
         `metres_per_pixel` holds in the plane through the target; `turned` are angles (degrees)
         about the image's right, down and forward, by which the camera goes around the target.
         """
-        if not (np.isfinite(distance) and distance > 0.0):
-            raise InputError(f"distance: {distance!r}; give a positive number of m")
-        if not (np.isfinite(metres_per_pixel) and metres_per_pixel > 0.0):
-            raise InputError(f"metres_per_pixel: {metres_per_pixel!r}; give a positive number")
-        from scipy.spatial.transform import Rotation
-
+        number("distance", distance, above=0.0, unit="m")
+        number("metres_per_pixel", metres_per_pixel, above=0.0)
         tilt = Rotation.from_rotvec(np.radians(np.asarray(turned, dtype=float))).as_matrix()
         rotation = tilt @ axes_of_view(up, facing)
         position = np.asarray(target, dtype=np.float64) - distance * rotation[2]
@@ -176,3 +188,104 @@ class Camera:
         top = seen.max() ** 2
         powers = (seen**2 / top)[:, np.newaxis] ** np.arange(_TERMS)
         return np.linalg.lstsq(powers, r / seen, rcond=None)[0] / top ** np.arange(_TERMS)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Scale of the image in one plane before the camera.
+
+    Attributes
+    ----------
+    metres_per_pixel : float
+    spread : float
+        Largest relative deviation of the lengths that it was found from: if they differ, the camera
+        was tilted, or they lie at different depths. NaN for a single length.
+    """
+
+    metres_per_pixel: float
+    spread: float = float("nan")
+
+    def __post_init__(self) -> None:
+        number("--scale", self.metres_per_pixel, above=0.0, unit="m per pixel")
+
+    def at_depth(self, behind: ArrayLike, distance: float) -> NDArray[np.float64]:
+        """Metres per pixel `behind` the plane (m), `distance` (m) being the plane's own.
+
+        A pinhole shows what is farther away smaller, in proportion to its distance.
+        """
+        number("--distance", distance, above=0.0, unit="m")
+        return self.metres_per_pixel * (1.0 + np.asarray(behind, dtype=np.float64) / distance)
+
+
+def scale_of_lengths(references: Sequence[Sequence[float]]) -> Scale:
+    """Scale from lengths between two pixels each.
+
+    Parameters
+    ----------
+    references : sequence of (u1, v1, u2, v2, metres)
+        Usually two, one across and one along.
+
+    Raises
+    ------
+    InputError
+        None, a length of zero, or lengths whose scales differ by more than 2 %.
+    """
+    if not len(references):
+        raise InputError("--reference: give at least one PX1,PY1,PX2,PY2,METRES")
+    scales = []
+    for u1, v1, u2, v2, metres in references:
+        pixels = float(np.hypot(u2 - u1, v2 - v1))
+        if not (np.isfinite(pixels) and pixels > 0.0 and np.isfinite(metres) and metres > 0.0):
+            raise InputError(
+                f"--reference {u1:g},{v1:g},{u2:g},{v2:g},{metres:g}: the two pixels must differ "
+                "and the length be positive"
+            )
+        scales.append(metres / pixels)
+    mean = float(np.mean(scales))
+    spread = float(np.max(np.abs(np.array(scales) / mean - 1.0)))
+    if spread > _LARGEST_SPREAD:
+        listed = ", ".join(f"{scale:.4g}" for scale in scales)
+        raise InputError(
+            f"--reference: the lengths say {listed} metres per pixel, which differ by more than "
+            f"{2 * _LARGEST_SPREAD:.0%}; measure them in one plane, square to the camera"
+        )
+    return Scale(mean, spread if len(scales) > 1 else float("nan"))
+
+
+def scale_of_target(
+    photo: NDArray[np.uint8], columns: int, rows: int, square: float, place: str = "the photo"
+) -> Scale:
+    """Scale from a chessboard, held square to the camera in the plane of the motion.
+
+    Parameters
+    ----------
+    photo : ndarray of uint8, shape (height, width)
+    columns, rows : int
+        Inner corners of the board across and along.
+    square : float
+        Side of its squares (m).
+    place : str
+        What the photo is called in messages.
+
+    Returns
+    -------
+    Scale
+        Its spread is that of the sides of all squares: it grows as the board tilts.
+
+    Raises
+    ------
+    InputError
+        The board is not found.
+    """
+    cv2 = opencv()
+    number("square", square, above=0.0, unit="m")
+    size, accurately = (columns, rows), cv2.CALIB_CB_ACCURACY
+    found, corners = cv2.findChessboardCornersSB(photo, size, flags=accurately)
+    if not found:
+        raise InputError(
+            f"{place}: no chessboard of {columns} x {rows} inner corners; show all of it, with a "
+            "white margin, sharp and evenly lit"
+        )
+    grid = corners.reshape(rows, columns, 2).astype(np.float64)
+    sides = np.concatenate([np.hypot(*np.diff(grid, axis=k).reshape(-1, 2).T) for k in (0, 1)])
+    return Scale(square / float(sides.mean()), float(np.abs(sides / sides.mean() - 1.0).max()))

@@ -1,8 +1,7 @@
-"""Pattern files: one module a format, found by extension through a registry."""
+"""Pattern files: one module for each format, chosen by extension from a registry."""
 
 from __future__ import annotations
 
-from foldyn.formats.files import read_pattern, write_pattern
-from foldyn.formats.registry import FORMATS, Format
+from foldyn.formats.files import FORMATS, Format, read_pattern, write_pattern
 
 __all__ = ["FORMATS", "Format", "read_pattern", "write_pattern"]

@@ -1,13 +1,15 @@
-"""Read and write pattern files of any registered format."""
+"""Pattern files: the registry of formats, and reading and writing by extension."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foldyn.errors import InputError
-from foldyn.formats.registry import FORMATS, Format
+from foldyn.errors import InputError, within
+from foldyn.formats import fold
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
 from foldyn.writing import write_bytes
@@ -16,8 +18,40 @@ MOST = 32
 """Size of a pattern file (MiB)."""
 
 
+@dataclass(frozen=True)
+class Format:
+    """A text format for patterns.
+
+    Reading and writing work on text: opening, decoding and saving files, and naming the file
+    in messages, is done once for all formats.
+
+    Parameters
+    ----------
+    name : str
+        Name of the format.
+    extensions : tuple of str
+        File extensions, lower case with the dot.
+    read : callable or None
+        From the text of a file to a `Pattern`; raises `InputError` naming the field.
+        None: the format is written only.
+    write : callable or None
+        From a `Pattern` to the text of a file. None: the format is read only.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    read: Callable[[str], Pattern] | None = None
+    write: Callable[[Pattern], str] | None = None
+
+
+_FORMATS = (Format("FOLD", (".fold",), read=fold.read, write=fold.write),)
+
+FORMATS: dict[str, Format] = {end: fmt for fmt in _FORMATS for end in fmt.extensions}
+"""The format of each file extension."""
+
+
 def read_pattern(path: str | os.PathLike[str]) -> Pattern:
-    """Read a pattern from a file, whose extension tells the format.
+    """Read a pattern from a file; its extension determines the format.
 
     Parameters
     ----------
@@ -35,19 +69,16 @@ def read_pattern(path: str | os.PathLike[str]) -> Pattern:
         No such file, an unknown extension, or content that is not a sound pattern; the message
         names the file and the field.
     """
-    file = _as_path(path)
-    fmt = _format_of(file)
+    file, fmt = _file_and_format(path)
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
-    text = read_text(file, f"a {fmt.name} file", MOST, "leave out what is no pattern")
-    try:
+    text = read_text(file, f"a {fmt.name} file", MOST, "leave out all but the pattern")
+    with within("", file):
         return fmt.read(text)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
-    """Write a pattern to a file, whose extension tells the format.
+    """Write a pattern to a file; its extension determines the format.
 
     The whole text is made first and the file put in place in one step, so that a failure
     leaves what was there before.
@@ -64,8 +95,7 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
     InputError
         An unknown extension (nothing is touched then), or the file cannot be written.
     """
-    file = _as_path(path)
-    fmt = _format_of(file)
+    file, fmt = _file_and_format(path)
     if fmt.write is None:
         raise InputError(f"{file}: {fmt.name} files can be read but not written.")
     if not isinstance(pattern, Pattern):
@@ -74,28 +104,22 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
     try:
         write_bytes(file, content)
     except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"{file}: cannot be written: {_reason(error)}; check that its directory exists and "
+            f"{file}: cannot be written: {reason}; check that its directory exists and "
             "may be written to."
         ) from None
 
 
-def _as_path(path: Any) -> Path:
+def _file_and_format(path: Any) -> tuple[Path, Format]:
     try:
-        return Path(path)
+        file = Path(path)
     except TypeError:
         raise InputError(f"path = {path!r}: give the path of a file.") from None
-
-
-def _format_of(file: Path) -> Format:
     if os.path.isdir(file):
         raise InputError(f"{file}: is a directory; name a pattern file in it.")
-    found = FORMATS.get(file.suffix.lower())
-    if found is None:
+    fmt = FORMATS.get(file.suffix.lower())
+    if fmt is None:
         has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
         raise InputError(f"{file}: {has}; known ones are {', '.join(sorted(FORMATS))}.")
-    return found
-
-
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+    return file, fmt

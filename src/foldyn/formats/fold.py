@@ -2,7 +2,7 @@
 
 Only the key frame is read: the fields at the top level of the file. The geometry comes from
 `vertices_coords` and `faces_vertices`, the letters of creases from `edges_assignment`;
-`edges_foldAngle` is written but not read, for the vertices say how far a crease is folded.
+`edges_foldAngle` is written but not read: the vertices say how far a crease is folded.
 Source of the format: https://github.com/edemaine/fold (doc/spec.md).
 """
 
@@ -19,7 +19,8 @@ import numpy as np
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
-from foldyn.patterns.seams import seams
+from foldyn.patterns.geometry import seams
+from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 
 _ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 # Units per meter of `frame_unit`; "unit" means none, taken as meters.
@@ -33,8 +34,11 @@ _PER_METER = {
     "in": 1 / 0.0254,
     "pt": 72 / 0.0254,
 }
-_FIELDS = {"vertices": "vertices_coords", "faces": "faces_vertices"}
-_FIELDS["assignments"] = "edges_assignment"
+_FIELDS = {
+    "vertices": "vertices_coords",
+    "faces": "faces_vertices",
+    "assignments": "edges_assignment",
+}
 
 
 def read(text: str) -> Pattern:
@@ -94,10 +98,11 @@ def write(pattern: Pattern) -> str:
     """
     flat = not np.any(pattern.vertices[:, 2])
     folded = bool(np.any(np.abs(pattern.dihedrals - np.pi) > 1e-6)) or not flat
-    row = {(int(a), int(b)): k for k, (a, b) in enumerate(pattern.creases)}
+    row = edge_lookup(pattern.creases)
     pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
     cuts = {edge for pair in pairs for edge in pair}
-    rows = [row.get((int(a), int(b))) for a, b in pattern.edges]
+    edges = [edge_of(a, b) for a, b in pattern.edges.tolist()]
+    rows = [row.get(edge) for edge in edges]
     angles = 180.0 - np.degrees(pattern.dihedrals)
     fields: dict[str, Any] = {
         "file_spec": 1.1,
@@ -111,8 +116,8 @@ def write(pattern: Pattern) -> str:
         "faces_vertices": [list(face) for face in pattern.faces],
         "edges_vertices": pattern.edges.tolist(),
         "edges_assignment": [
-            pattern.assignments[k] if k is not None else "C" if tuple(edge) in cuts else "B"
-            for k, edge in zip(rows, pattern.edges.tolist(), strict=True)
+            pattern.assignments[k] if k is not None else "C" if edge in cuts else "B"
+            for k, edge in zip(rows, edges, strict=True)
         ],
         "edges_foldAngle": [0.0 if k is None else float(angles[k]) for k in rows],
     }
@@ -193,7 +198,7 @@ def _scale(unit: Any) -> float:
     return 1.0
 
 
-def _letters(frame: dict[str, Any], bare: Pattern) -> dict[tuple[int, int], str]:
+def _letters(frame: dict[str, Any], bare: Pattern) -> dict[Edge, str]:
     """Letters of the creases, and "B" for edges that meet others without being joined."""
     if "edges_assignment" not in frame and "edges_vertices" not in frame:
         return {}
@@ -207,9 +212,8 @@ def _letters(frame: dict[str, Any], bare: Pattern) -> dict[tuple[int, int], str]
                 "give one for each edge."
             )
     pairs = [_pair(e, edge, len(bare.vertices)) for e, edge in enumerate(edges)]
-    creases = {(int(a), int(b)) for a, b in bare.creases}
-    boundary = {(int(a), int(b)) for a, b in bare.boundary}
-    letters: dict[tuple[int, int], str] = {}
+    creases, boundary = edge_lookup(bare.creases), edge_lookup(bare.boundary)
+    letters: dict[Edge, str] = {}
     ignored: Counter[str] = Counter()
     for e, pair in enumerate(pairs):
         letter = frame["edges_assignment"][e] if "edges_assignment" in frame else None
@@ -236,16 +240,12 @@ def _letters(frame: dict[str, Any], bare: Pattern) -> dict[tuple[int, int], str]
     return letters
 
 
-def _pair(e: int, edge: Any, n_vertices: int) -> tuple[int, int]:
-    if (
-        not isinstance(edge, list)
-        or len(edge) != 2
-        or not all(isinstance(v, int) and not isinstance(v, bool) for v in edge)
-        or not all(0 <= v < n_vertices for v in edge)
-        or edge[0] == edge[1]
-    ):
+def _pair(e: int, edge: Any, n_vertices: int) -> Edge:
+    known = range(n_vertices)
+    pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
+    if not pair or not all(type(v) is int and v in known for v in edge):
         raise InputError(
             f"edges_vertices[{e}] = {_short(edge)}: give two different vertex numbers from 0 to "
             f"{n_vertices - 1}."
         )
-    return min(edge), max(edge)
+    return edge_of(*edge)

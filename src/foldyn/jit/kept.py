@@ -6,28 +6,41 @@ once may exchange their kernels; and a damaged file is a traceback. Here the nam
 what was compiled: from which sources (`sources.digest`), for which arguments, with the sources of
 the named tuples among them, and for which processor. So what is found is what would be compiled,
 whoever wrote it, and a check sum tells whether it is whole.
+
+They go to the first folder that can be written, in Numba's own order: what NUMBA_CACHE_DIR says,
+`__pycache__` beside the source, the user's cache folder; then, with a warning, a folder for
+temporary files. What is kept there is loaded and run, so that one is the user's alone.
 """
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import inspect
 import os
 import pickle
+import shutil
+import stat
 import tempfile
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from numba.core import config
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
+from numba.misc.appdirs import AppDirs
 
-from foldyn.jit.folder import REMEDY, folder_for, tell
+from foldyn.errors import FoldynWarning
 from foldyn.jit.sources import digest
+from foldyn.writing import write_bytes
 
+REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
 OTHERS = 3  # versions of a function that are kept beside the present one
 _SEAL = hashlib.sha256().digest_size
 
@@ -79,10 +92,12 @@ class Kept(_Cache):
         if path is None or data.library.has_dynamic_globals:
             return
         try:
-            _write(path, data._reduce())
+            content = dumps(data._reduce())
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(path, hashlib.sha256(content).digest() + content)
             self._remove_old()
         except OSError as error:
-            tell(f"compiled kernels cannot be kept in {path.parent}: {error.strerror}; {REMEDY}")
+            _warn(f"compiled kernels cannot be kept in {path.parent}: {error.strerror}")
 
     def _file(self, sig: Any, codegen: Any) -> Path | None:
         arguments = "; ".join(_spelled(kind) for kind in normalize_signature(sig)[0])
@@ -114,9 +129,8 @@ def _spelled(kind: Any) -> str:
     owner = getattr(kind, "instance_class", type(kind))
     text = f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
     # kernels that stand for a general function are chosen by the class, and stand beside it
-    return (
-        text + digest(Path(inspect.getfile(owner)).resolve()) if hasattr(kind, "fields") else text
-    )
+    own = digest(Path(inspect.getfile(owner)).resolve()) if hasattr(kind, "fields") else ""
+    return text + own
 
 
 def _read(path: Path) -> Any:
@@ -131,15 +145,69 @@ def _read(path: Path) -> Any:
     return None
 
 
-def _write(path: Path, content: Any) -> None:
-    """Write a file; others see it whole or not at all."""
-    data = dumps(content)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    number, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem)
+@cache
+def folder_for(source: Path) -> Path | None:
+    """Folder for the kernels of a folder of sources; None where nothing can be written."""
+    named = str(getattr(config, "CACHE_DIR", ""))
+    inside = f"{source.name}_{hashlib.sha1(os.fsencode(source)).hexdigest()[:16]}"
+    if named:
+        folder = Path(named).absolute() / inside
+        if _writable(folder):
+            return folder
+        _warn(f"NUMBA_CACHE_DIR = {named!r} cannot be written: kernels are kept elsewhere")
+    usual = [source / "__pycache__"]
+    home = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
+    if home.is_absolute():  # else there is no home
+        usual.append(home / inside)
+    for folder in usual:
+        if _writable(folder):
+            return folder
+    private = _private()
+    if private is None or not _writable(private / inside):
+        _warn("compiled kernels cannot be kept anywhere: each start compiles anew")
+        return None
+    _warn(
+        "compiled kernels cannot be kept beside the package or in the home folder: they go to "
+        f"{private}, which may not last"
+    )
+    return private / inside
+
+
+@cache
+def _warn(text: str) -> None:
+    """Warn, once of each, and say what to do."""
+    warnings.warn(f"{text}; {REMEDY}", FoldynWarning, stacklevel=2)
+
+
+def _writable(folder: Path) -> bool:
     try:
-        with os.fdopen(number, "wb") as file:
-            file.write(hashlib.sha256(data).digest() + data)
-        os.replace(name, path)
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
     except OSError:
-        Path(name).unlink(missing_ok=True)
-        raise
+        return False
+    return True
+
+
+@cache
+def _private() -> Path | None:
+    """Folder for temporary files that nobody else can write; of this process, if need be."""
+    user = os.getuid() if hasattr(os, "getuid") else "kernels"
+    try:
+        folder = Path(tempfile.gettempdir()) / f"foldyn-{user}"
+        with suppress(FileExistsError):  # a file, or another process was quicker
+            folder.mkdir(mode=0o700)
+        if _ours(folder):
+            return folder
+        folder = Path(tempfile.mkdtemp(prefix="foldyn-"))
+    except OSError:
+        return None
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _ours(folder: Path) -> bool:
+    """Whether a folder is no link, the user's, and closed to all others."""
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or not hasattr(os, "getuid"):
+        return stat.S_ISDIR(status.st_mode)  # folders for temporary files are each user's own there
+    return status.st_uid == os.getuid() and stat.S_IMODE(status.st_mode) & 0o077 == 0

@@ -12,22 +12,17 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
+
+from foldyn.jit.intrinsics import DOUBLE, INT32, INT64, data_of, intrinsic
 
 LANES = 8
-ROW = ir.VectorType(ir.DoubleType(), 4)
-COLUMN = ir.VectorType(ir.DoubleType(), LANES)
-INT = ir.IntType(64)
+ROW = ir.VectorType(DOUBLE, 4)
+COLUMN = ir.VectorType(DOUBLE, LANES)
 
 
 def _shuffle(builder, a, b, places):
-    kind = ir.VectorType(ir.IntType(32), len(places))
+    kind = ir.VectorType(INT32, len(places))
     return builder.shuffle_vector(a, b, ir.Constant(kind, list(places)))
-
-
-def _pointer(context, builder, kind, array):
-    return make_array(kind)(context, builder, array).data
 
 
 def _vector_at(builder, data, index, kind):
@@ -47,26 +42,26 @@ def _store(builder, value, pointer):
 def _row_pointers(context, builder, kinds, values):
     """Pointers to the rows of nodes[start + step q], q = 0..7, their numbers cut by the mask."""
     (rows, nodes), (row_values, node_values, start, step, mask) = kinds, values
-    row_data = _pointer(context, builder, rows, row_values)
-    node_data = _pointer(context, builder, nodes, node_values)
-    found = []
+    row_data = data_of(context, builder, rows, row_values)
+    node_data = data_of(context, builder, nodes, node_values)
+    pointers = []
     for lane in range(LANES):
-        index = builder.add(start, builder.mul(step, INT(lane)))
-        node = builder.zext(builder.load(builder.gep(node_data, [index])), INT)
-        at = builder.shl(builder.and_(node, mask), INT(2))
-        found.append(_vector_at(builder, row_data, at, ROW))
-    return found
+        index = builder.add(start, builder.mul(step, INT64(lane)))
+        node = builder.zext(builder.load(builder.gep(node_data, [index])), INT64)
+        at = builder.shl(builder.and_(node, mask), INT64(2))
+        pointers.append(_vector_at(builder, row_data, at, ROW))
+    return pointers
 
 
 def _columns_at(builder, data, at, stride):
     return [
-        _vector_at(builder, data, builder.add(at, builder.mul(stride, INT(c))), COLUMN)
+        _vector_at(builder, data, builder.add(at, builder.mul(stride, INT64(c))), COLUMN)
         for c in range(3)
     ]
 
 
 @intrinsic
-def _load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
+def load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
     """Coordinates c = 0..2 of eight nodes to out[at + c stride :][:8]; see `_row_pointers`."""
     i8 = types.int64
 
@@ -85,7 +80,7 @@ def _load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
             _shuffle(builder, y, v, low),
             _shuffle(builder, xz, uw, high),
         )
-        data = _pointer(context, builder, out, arguments[5])
+        data = data_of(context, builder, out, arguments[5])
         for value, pointer in zip(columns, _columns_at(builder, data, *arguments[6:]), strict=True):
             _store(builder, value, pointer)
         return context.get_dummy_value()
@@ -94,14 +89,14 @@ def _load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
 
 
 @intrinsic
-def _add_rows(typing_context, rows, nodes, start, step, mask, columns, at, stride, factor, lane):
+def add_rows(typing_context, rows, nodes, start, step, mask, columns, at, stride, factor, lane):
     """Add factor[lane + q] columns[at + c stride + q] to coordinate c of node q, q = 0..7."""
     i8 = types.int64
 
     def codegen(context, builder, signature, arguments):
         pointers = _row_pointers(context, builder, (rows, nodes), arguments[:5])
-        data = _pointer(context, builder, columns, arguments[5])
-        scale = _pointer(context, builder, factor, arguments[8])
+        data = data_of(context, builder, columns, arguments[5])
+        scale = data_of(context, builder, factor, arguments[8])
         scale = _load(builder, _vector_at(builder, scale, arguments[9], COLUMN))
         x, y, z = (
             builder.fmul(scale, _load(builder, pointer))
@@ -122,8 +117,3 @@ def _add_rows(typing_context, rows, nodes, start, step, mask, columns, at, strid
         return context.get_dummy_value()
 
     return types.void(rows, nodes, i8, i8, i8, columns, i8, i8, factor, i8), codegen
-
-
-# callable with one argument less than written: Numba adds the typing context
-load_rows: Any = _load_rows
-add_rows: Any = _add_rows

@@ -32,22 +32,22 @@ _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the 
 @cache
 def digest(source: Path) -> str:
     """Digest of all that the kernels of a file are made from, "1f0c6a2b9d3e4f58"."""
-    found = hashlib.sha256(_tools().encode())
+    content = hashlib.sha256(_tools().encode())
     for path in sorted(made_from(source)):
         inside = path.is_relative_to(PACKAGE)
-        found.update((path.relative_to(PACKAGE).as_posix() if inside else path.name).encode())
-        found.update(_content(path))
-    return found.hexdigest()[:16]
+        content.update((path.relative_to(PACKAGE).as_posix() if inside else path.name).encode())
+        content.update(_content(path))
+    return content.hexdigest()[:16]
 
 
 def made_from(source: Path) -> set[Path]:
     """Files that the kernels of a file are made from."""
-    found, ahead = {source}, [source]
+    files, ahead = {source}, [source]
     while ahead:
-        new = imported(ahead.pop()) - found
-        found |= new
+        new = imported(ahead.pop()) - files
+        files |= new
         ahead += new
-    return found
+    return files
 
 
 @cache

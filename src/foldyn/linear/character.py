@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Case, resolve_nodes
+from foldyn.cases.supports import AXES, check_axis
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
 from foldyn.values import whole
@@ -31,10 +32,9 @@ from foldyn.values import whole
 if TYPE_CHECKING:
     import xarray
 
-AXES = "xyz"
 NODES_PER_STATION = 12
 MOST_STATIONS = 9
-AWAY = 0.2  # from the supports to the middle, of the extent: as far as that is a direction
+AWAY = 0.2  # distance of the supports' center from the sheet's, as a part of its extent
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 
 
@@ -54,7 +54,7 @@ def character(
         From `foldyn.modes`.
     axis : {"x", "y", "z"}, optional
         Main axis of the structure; by default `main_axis` of the case.
-    nodes : array_like of int, optional
+    nodes : int, sequence of int, or str, optional
         Judge the motion of these nodes alone, such as a loaded edge; all unless given.
     stations : int, optional
         Sections along the axis, 1 for a single one; by default one for each dozen of nodes, from
@@ -79,12 +79,16 @@ def character(
     check_result(modes, "modes: ")
     if modes.attrs["foldyn_result"] != "modes":
         raise InputError(f"modes: is a {modes.attrs['foldyn_result']}; give modes")
-    if axis not in (None, *AXES):
-        raise InputError(f"axis = {axis!r}: give 'x', 'y' or 'z'")
     case = case_of(modes) if case is None else case
-    structure, axis = case.structure, axis or main_axis(case)
-    chosen = np.arange(len(structure.nodes)) if nodes is None else _nodes(nodes, structure)
-    count = _stations(stations, len(chosen))
+    structure, axis = case.structure, main_axis(case) if axis is None else check_axis("axis", axis)
+    import xarray
+
+    every = np.arange(len(structure.nodes))
+    chosen = every if nodes is None else resolve_nodes(structure, nodes)
+    if stations is None:
+        count = max(2, min(MOST_STATIONS, len(chosen) // NODES_PER_STATION))
+    else:
+        count = whole("stations", stations, least=1)
     weight = np.asarray(structure.mass.sum(axis=1)).ravel()[chosen]
     x = (structure.nodes + modes["displacement"].values)[chosen]
     parts = _beam_parts(x, weight, AXES.index(axis), count)
@@ -100,7 +104,16 @@ def character(
             for n, what, (first, second, *_) in zip(order, kind, ranked, strict=True)
         ]
     )
-    return _dataset(modes, kinds, share, kind, order, names, axis)
+    return xarray.Dataset(
+        {
+            "share": (("mode", "kind"), share, {"long_name": "share of the mode's motion"}),
+            "kind_of": ("mode", kind, {"long_name": "what the mode does"}),
+            "order": ("mode", order, {"long_name": "number among the modes of its kind"}),
+            "name": ("mode", names, {"long_name": "what the mode does"}),
+        },
+        {"mode": modes["mode"], "kind": kinds},
+        {"axis": axis},
+    )
 
 
 def main_axis(case: Case) -> str:
@@ -113,21 +126,6 @@ def main_axis(case: Case) -> str:
         if away.max() > AWAY * extent.max():
             return AXES[int(away.argmax())]
     return AXES[int(extent.argmax())]
-
-
-def _dataset(modes, kinds, share, kind, order, names, axis) -> xarray.Dataset:
-    import xarray
-
-    return xarray.Dataset(
-        {
-            "share": (("mode", "kind"), share, {"long_name": "share of the mode's motion"}),
-            "kind_of": ("mode", kind, {"long_name": "what the mode does"}),
-            "order": ("mode", order, {"long_name": "number among the modes of its kind"}),
-            "name": ("mode", names, {"long_name": "what the mode does"}),
-        },
-        {"mode": modes["mode"], "kind": kinds},
-        {"axis": axis},
-    )
 
 
 def _beam_parts(x: NDArray, weight: NDArray, a: int, stations: int) -> dict[str, NDArray]:
@@ -187,19 +185,3 @@ def _shares(shapes: NDArray, weight: NDArray, parts: dict[str, NDArray]) -> NDAr
 
 def _ordinal(number: int) -> str:
     return ORDINALS[number - 1] if number <= len(ORDINALS) else f"{number}th"
-
-
-def _nodes(given: Any, structure: Any) -> NDArray:
-    numbers = np.asarray(given)
-    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
-        raise InputError(f"nodes = {given!r}: give a list of numbers of nodes")
-    beyond = numbers[(numbers < 0) | (numbers >= len(structure.nodes))]
-    if beyond.size:
-        raise InputError(f"nodes: there is no node {beyond[0]}; there are {len(structure.nodes)}")
-    return numbers
-
-
-def _stations(given: int | None, nodes: int) -> int:
-    if given is None:
-        return max(2, min(MOST_STATIONS, nodes // NODES_PER_STATION))
-    return whole("stations", given, least=1)

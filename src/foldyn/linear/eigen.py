@@ -3,8 +3,13 @@
 Few dofs are solved in full. Others by shift-invert Lanczos (ARPACK) with one factorization of
 K - s M, the shift s below every eigenvalue: there K - s M is positive definite however singular or
 unstable K is, and the modes nearest to the shift are the lowest. How many eigenvalues lie below
-the shift, and below a gap behind the last mode, is counted (`Pencil.below`); modes that Lanczos
-missed, as it may where many coincide, are sought again beside those found.
+the shift, and below a gap behind the last mode, is counted; modes that Lanczos missed, as it may
+where many coincide, are sought again beside those found.
+
+A factorization of K - s M has as many negative eigenvalues as the problem has eigenvalues below s
+(Sylvester's law of inertia). Two counts, below and above a set of computed modes, prove that none
+between was missed. M is positive definite, but for dofs without mass that follow the others (edge
+rotations of shells): they have no modes, and, K being positive definite on them, no count.
 
 Modes known beforehand (rigid ones) are taken out of the search, so that they come out pure.
 """
@@ -15,12 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
 from foldyn.errors import ComputationError, InputError
-from foldyn.linear.pencil import EPS, Pencil
 
 MOST_DENSE = 6000  # dofs of which nearly all modes may be asked for
 DENSE = 60  # dofs up to which all modes are found at once (the other way is as quick)
@@ -30,6 +36,66 @@ LOWERINGS = 12
 GUARD = 3  # modes beyond those asked for, among which a gap is sought
 GAP = 1e-6  # relative distance of eigenvalues that a count can tell apart
 ROUNDS = 12  # of searches for missed modes
+EPS = float(np.finfo(float).eps)
+ROUNDING = 5.0 * EPS  # of |phi|' |K| |phi|: how far from zero rounding may move an eigenvalue
+NUDGES = 4  # of a shift that hits an eigenvalue
+NUDGE = 1e-7
+
+
+class Pencil:
+    """Stiffness and mass (n, n) of free dofs, with the solver that factorizes K - s M."""
+
+    def __init__(
+        self, stiffness: sparse.csc_array, mass: sparse.csc_array, solver: str = "auto"
+    ) -> None:
+        self.stiffness, self.mass = stiffness, mass
+        self.size = stiffness.shape[0]
+        self.backend, self._factorize = factorizer(solver, self.size)
+        self.factorizations = 0
+        self.heavy = mass.diagonal() > 0.0
+        self.finite = int(self.heavy.sum())  # number of modes
+        self._sizes = abs(stiffness)
+
+    @property
+    def scale(self) -> float:
+        """Mean of the diagonal of K over that of M, rad2/s2: large against the lowest modes."""
+        stiffness = np.abs(self.stiffness.diagonal())[self.heavy]
+        return float(stiffness.sum() / self.mass.diagonal().sum())
+
+    def factorize(self, shift: float) -> Factorization:
+        """Factors of K - s M; s is moved a little where that is singular."""
+        for attempt in range(NUDGES):
+            moved = shift + NUDGE * attempt * (abs(shift) or self.scale * EPS)
+            self.factorizations += 1
+            try:
+                factors = self._factorize(sparse.csc_array(self.stiffness - moved * self.mass))
+                factors.negative()
+                return factors
+            except SingularTangentError:
+                if attempt == NUDGES - 1:
+                    raise
+        raise AssertionError("unreachable")
+
+    def below(self, shift: float) -> int:
+        """How many eigenvalues lie below s."""
+        return self.factorize(shift).negative()
+
+    def noise(self, shapes: NDArray) -> NDArray:
+        """What rounding leaves undetermined (k,) in the eigenvalues of shapes (n, k)."""
+        size = np.abs(shapes)
+        modal = np.einsum("ik,ik->k", shapes, self.mass @ shapes)
+        return ROUNDING * np.einsum("ik,ik->k", size, self._sizes @ size) / modal
+
+    def quotients(self, shapes: NDArray) -> NDArray:
+        """Rayleigh quotients (k,) of shapes (n, k)."""
+        modal = np.einsum("ik,ik->k", shapes, self.mass @ shapes)
+        return np.einsum("ik,ik->k", shapes, self.stiffness @ shapes) / modal
+
+    def residuals(self, values: NDArray, shapes: NDArray) -> NDArray:
+        """|K phi - lambda M phi| relative to its terms (k,); nan for shapes of zeros."""
+        inertia = (self.mass @ shapes) * values
+        terms = np.linalg.norm(self._sizes @ np.abs(shapes), axis=0)
+        return np.linalg.norm(self.stiffness @ shapes - inertia, axis=0) / terms
 
 
 @dataclass(frozen=True)
@@ -40,7 +106,7 @@ class Spectrum:
     shapes: NDArray
     shift: float  # below which there is no eigenvalue; nan where all were computed
     checked: int  # lowest modes that a count has shown to be complete
-    missed: int  # modes that the count tells of and that were not found
+    missed: int  # modes that the count shows but that were not found
 
 
 def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
@@ -60,10 +126,12 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     Raises
     ------
     InputError
-        More than half of the modes of many dofs.
+        More modes than there are, or more than half of those of many dofs.
     ComputationError
         Lanczos did not converge; the pencil cannot be factorized.
     """
+    if count > pencil.finite:
+        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
     if not np.isfinite(pencil.stiffness.data).all():
         raise ComputationError("modes: the tangent in this state is not finite")
     if pencil.size <= DENSE or count + GUARD >= pencil.finite // 2:
@@ -87,7 +155,7 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     mass = pencil.mass[heavy][:, heavy].toarray()
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
     follow = np.zeros((0, len(heavy)))
-    if len(light):  # what has no mass follows statically
+    if len(light):  # massless dofs follow statically
         across = pencil.stiffness[light][:, heavy].toarray()
         follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
         stiffness = stiffness + across.T @ follow
@@ -95,10 +163,10 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
         carried = mass @ known[heavy]
         far = 4.0 * np.abs(stiffness).sum(axis=1).max() / mass.diagonal().min()
         stiffness = stiffness + far * (carried @ carried.T)
-    _, found = eigh(stiffness, mass)
-    found = found[:, : len(heavy) - known.shape[1]]
-    shapes = np.zeros((pencil.size, found.shape[1]))
-    shapes[heavy], shapes[light] = found, follow @ found
+    _, vectors = eigh(stiffness, mass)
+    vectors = vectors[:, : len(heavy) - known.shape[1]]
+    shapes = np.zeros((pencil.size, vectors.shape[1]))
+    shapes[heavy], shapes[light] = vectors, follow @ vectors
     return pencil.quotients(shapes), shapes  # more exact than the values of a full matrix
 
 
@@ -159,7 +227,7 @@ def _lanczos(
             f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "
             "more if many frequencies coincide"
         ) from error
-    if pencil.finite < size:  # M does not see what is without mass
+    if pencil.finite < size:  # M does not act on massless dofs
         shapes = np.stack([inverse(force) for force in (mass @ shapes).T], axis=1)
     shapes = shapes / np.sqrt(np.einsum("ik,ik->k", shapes, mass @ shapes))
     return pencil.quotients(shapes), shapes
@@ -168,7 +236,7 @@ def _lanczos(
 def _sorted(
     pencil: Pencil, values: NDArray, shapes: NDArray, known: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """All modes by eigenvalue; what is zero to rounding is zero, and known modes lead there."""
+    """All modes by eigenvalue; those zero to rounding are set to zero, known modes first there."""
     rounding = pencil.noise(shapes) + EPS * SHIFT * pencil.scale
     values = np.where(np.abs(values) <= rounding, 0.0, values)
     values = np.r_[np.zeros(known.shape[1]), values]

@@ -1,11 +1,26 @@
-"""What drives a frequency response: forces on nodes, or the motion of the base."""
+"""What drives a frequency response, and the response: to forces on nodes, or to a moving base.
+
+The response to a moving base is the absolute displacement over that of the base. With x = t y + z,
+t the unit translation of all nodes along the axis of the base, y the motion of the base and z the
+motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
+
+    M z'' + C z' + K z = -(M t)_f (y'' + alpha y'),
+
+because a translation strains nothing: K t = 0, and so is what beta K0 makes of it. Rayleigh's
+alpha M damps the absolute motion, as air does, and therefore drags at the moving body; beta K0
+damps the strain. For one mass m on a spring k
+
+    x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
+
+the textbook formula with c = beta k where alpha = 0.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +28,29 @@ from numpy.typing import NDArray
 from foldyn.cases import BaseMotion, Case, Constant, Force
 from foldyn.cases.supports import AXES
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.linearized import Linearized
 from foldyn.values import show
+
+NAMED = 5  # frequencies that a warning lists
+
+
+class Answer(NamedTuple):
+    """What a method of frequency response gives.
+
+    Attributes
+    ----------
+    response : ndarray, complex
+        Per unit of the drive: of the free dofs, shape (m, nf), relative to the base, from methods
+        on matrices; of all nodes, shape (m, n, 3), absolute, from simulated motions.
+    more : dict
+        Further variables of the dataset.
+    facts : dict
+        Attributes of the dataset.
+    """
+
+    response: NDArray[Any]
+    more: dict[str, NDArray[Any]]
+    facts: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +82,10 @@ class Drive:
 
     def facts(self) -> dict[str, Any]:
         """Attributes of the dataset."""
-        if self.axis is None:
-            return {"drive_force": self.value, "amplitude": self.amplitude}
-        return {
-            "base_axis": self.axis,
-            "drive_displacement": self.value,
-            "amplitude": self.amplitude,
-        }
+        what = {"drive_force": self.value}
+        if self.axis is not None:
+            what = {"base_axis": self.axis, "drive_displacement": self.value}
+        return {**what, "amplitude": self.amplitude}
 
 
 def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
@@ -94,15 +128,15 @@ def drive_of(case: Case, drive: Any, amplitude: float) -> Drive:
 
 def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
     """A drive by forces; those on held axes reach the supports, not the structure."""
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FoldynWarning)
         try:
             driven = Case(case.structure, case.supports, parts)
         except InputError as error:
             raise InputError(str(error).replace("loads[", "drive[", 1)) from None
-    for warning in told:
+    for warning in caught:
         text = str(warning.message).replace("loads[", "drive[", 1)
-        warnings.warn(text, FoldynWarning, stacklevel=5)
+        warnings.warn(text, FoldynWarning, stacklevel=4)
     vector = amplitude * driven.force_terms[0][0]
     vector[driven.fixed] = 0.0
     size = float(np.linalg.norm(vector, axis=1).sum())
@@ -133,3 +167,45 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     vector = np.zeros(case.fixed.shape)
     vector[held, column] = amplitude * part.value
     return Drive(amplitude, vector, amplitude * part.value, part.axis)
+
+
+def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
+    """Load (nf,) per unit of the drive: forces per N, or masses (kg) that the base accelerates."""
+    if drive.axis is None:
+        load = drive.vector / drive.value
+    else:
+        load = np.zeros_like(drive.vector)
+        mass = np.asarray(system.case.structure.mass.sum(axis=1)).ravel()
+        load[:, AXES.index(drive.axis)] = mass
+    shape = np.zeros(len(system.free))
+    nodal = system.free < load.size
+    shape[nodal] = load.ravel()[system.free[nodal]]
+    return shape
+
+
+def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
+    """Factor on the shape of the load at an angular frequency (rad/s)."""
+    if drive.axis is None:
+        return 1.0
+    return omega**2 - 1j * omega * system.case.damping.alpha
+
+
+def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
+    """Response (m, n, 3) to the drive from that of the free dofs (m, nf), relative to the base."""
+    response = np.zeros((len(relative), drive.vector.size), np.complex128)
+    nodal = system.free < drive.vector.size
+    response[:, system.free[nodal]] = relative[:, nodal]
+    response = response.reshape(-1, *drive.vector.shape)
+    if drive.axis is not None:
+        response[:, :, AXES.index(drive.axis)] += 1.0
+    return response
+
+
+def warn_at(frequency: NDArray, text: str) -> None:
+    """Warn of frequencies (m,), if any, with a text that has a place for them."""
+    if not frequency.size:
+        return
+    listed = ", ".join(f"{f:.6g}" for f in frequency[:NAMED])
+    more = " and others" if frequency.size > NAMED else ""
+    message = f"frequencies: {text.format(f'{listed} Hz{more}')}"
+    warnings.warn(message, FoldynWarning, stacklevel=4)

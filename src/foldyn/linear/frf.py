@@ -1,4 +1,4 @@
-"""`frf`: the frequency response of a case."""
+"""`frf`: the frequency response of a case, as receptance, mobility or accelerance."""
 
 from __future__ import annotations
 
@@ -14,22 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.answer import Answer
-from foldyn.linear.burst_random import BurstRandom, burst_random
-from foldyn.linear.direct import Direct, direct
-from foldyn.linear.eigen import SHIFT
-from foldyn.linear.equilibrium import station
-from foldyn.linear.excitation import Drive, drive_of
+from foldyn.linear.eigen import SHIFT, Pencil
+from foldyn.linear.excitation import Answer, absolute, drive_of
+from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
-from foldyn.linear.impulse import Impulse, impulse
 from foldyn.linear.linearized import Linearized, linearize
-from foldyn.linear.modal import Modal, modal
-from foldyn.linear.pencil import Pencil
 from foldyn.linear.stepped_sine import SteppedSine, stepped_sine
 from foldyn.linear.time_domain import Rig
-from foldyn.linear.transmissibility import absolute
+from foldyn.linear.transients import BurstRandom, Impulse, burst_random, impulse
 from foldyn.memory import check_memory
 from foldyn.results import frf_dataset
+from foldyn.results.quantities import RESPONSES, variable
+from foldyn.signals import convert_response
 from foldyn.values import choice, number, numbers, suggest
 
 if TYPE_CHECKING:
@@ -69,6 +65,7 @@ METHODS: Mapping[str, ResponseMethod] = {
 }
 
 COPIES = 4  # of the response, while it is found and stored
+PER_FORCE = tuple(name for name in RESPONSES if name != "transmissibility")
 
 
 def frf(
@@ -126,7 +123,7 @@ def frf(
         displacement over that of the base. Complex, for the time dependence exp(+i w t): a lag is
         a negative phase; nan where there is none. `displacement` of the state and `drive`, its
         amplitudes. `coherence` (burst_random), `unsteadiness` (stepped_sine) or `swing` (harmonic).
-        Attributes tell the method, its options and facts about the run.
+        Attributes hold the method, its options and facts about the run.
 
     Raises
     ------
@@ -168,44 +165,42 @@ def frf(
         16.0 * COPIES * len(frequency) * case.structure.nodes.size, "take fewer",
     )  # fmt: skip
     driven = drive_of(case, drive, number("amplitude", amplitude, above=0.0))
+    if secant is not None and way.by_amplitude:
+        why = "finds the swing of each hinge itself" if way.linear else "takes the laws as they are"
+        raise InputError(
+            f" = {secant!r}: the method {method} {why}; leave secant out, and give the amplitude "
+            "of the drive instead",
+            "secant",
+        )
     report, close = reporter(progress)
     began = time.perf_counter()
     try:
-        compute = _linear if way.linear else _in_time
-        at, found = compute(
-            case, driven, frequency, state, secant, load_factor, way, chosen, report
-        )
+        if way.linear:
+            system = linearize(case, state, way.secant or secant, load_factor)
+            _warn_of_instability(system)
+            answer = way.compute(system, driven, frequency, chosen, report)
+            response, displacement = absolute(system, driven, answer.response), system.displacement
+            own = {"soft_hinges": system.soft}
+        else:
+            rig = Rig(case, state, load_factor, driven, chosen)
+            answer = way.compute(rig, frequency, chosen, report)
+            response, displacement = answer.response, rig.state
+            own = {"integrator": rig.integrator, "dt": chosen.dt}
     finally:
         close()
     facts = {
-        "method": way.name,
+        "method": method,
         **driven.facts(),
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": secant,
         "alpha": case.damping.alpha,
         "beta": case.damping.beta,
-        **found.facts,
+        **own,
+        **answer.facts,
         "wall_seconds": time.perf_counter() - began,
     }
     return frf_dataset(
-        case, frequency, driven.quantity, found.response, at, driven.vector, facts, found.more
-    )
-
-
-def _linear(
-    case: Case, drive: Drive, frequency: NDArray, state: Any, secant: float | None,
-    load_factor: float, way: ResponseMethod, options: Any, report: Reporter,
-) -> tuple[NDArray, Answer]:  # fmt: skip
-    if way.secant is not None:
-        _refuse_secant(secant, way, "finds the swing of each hinge itself")
-        secant = way.secant
-    system = linearize(case, state, secant, load_factor)
-    _warn_of_instability(system)
-    found = way.compute(system, drive, frequency, options, report)
-    return system.displacement, Answer(
-        absolute(system, drive, found.response),
-        found.more,
-        {"soft_hinges": system.soft, **found.facts},
+        case, frequency, driven.quantity, response, displacement, driven.vector, facts, answer.more
     )
 
 
@@ -217,27 +212,7 @@ def _warn_of_instability(system: Linearized) -> None:
             f"the state is an unstable equilibrium ({unstable} negative eigenvalues): a motion "
             "leaves it, and the response is that of the equations only",
             FoldynWarning,
-            stacklevel=4,
-        )
-
-
-def _in_time(
-    case: Case, drive: Drive, frequency: NDArray, state: Any, secant: float | None,
-    load_factor: float, way: ResponseMethod, options: Any, report: Reporter,
-) -> tuple[NDArray, Answer]:  # fmt: skip
-    _refuse_secant(secant, way, "takes the laws as they are")
-    rig = Rig(station(case, state, load_factor), drive, options)
-    found = way.compute(rig, frequency, options, report)
-    facts = {"integrator": rig.integrator, "dt": options.dt, **found.facts}
-    return rig.state, found._replace(facts=facts)
-
-
-def _refuse_secant(secant: float | None, way: ResponseMethod, why: str) -> None:
-    if secant is not None:
-        raise InputError(
-            f" = {secant!r}: the method {way.name} {why}; leave secant out, and give the "
-            "amplitude of the drive instead",
-            "secant",
+            stacklevel=3,
         )
 
 
@@ -252,7 +227,7 @@ def _options(way: ResponseMethod, given: Mapping[str, Any]) -> Any:
     return way.options(**given)
 
 
-def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray[np.float64]:
+def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray:
     frequency = np.atleast_1d(numbers("frequencies", given))
     if frequency.ndim != 1 or not frequency.size:
         raise InputError(
@@ -267,3 +242,54 @@ def _frequencies(given: ArrayLike, way: ResponseMethod) -> NDArray[np.float64]:
     if frequency[-1] == 0.0 and not way.linear:
         raise InputError(": 0 Hz alone needs statics, or the direct method", "frequencies")
     return frequency
+
+
+def quantity_of(response: xarray.Dataset) -> str:
+    """Which quantity a frequency response holds.
+
+    Raises
+    ------
+    InputError
+        None: not a frequency response.
+    """
+    held = [name for name in RESPONSES if name in getattr(response, "data_vars", ())]
+    if len(held) != 1:
+        raise InputError(
+            f"response: got {type(response).__name__} without {', '.join(RESPONSES)}; give a "
+            "result of fd.frf"
+        )
+    return held[0]
+
+
+def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
+    """Turn a frequency response into receptance, mobility or accelerance.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        A result of `frf` under forces.
+    quantity : {"receptance", "mobility", "accelerance"}
+        What it is to hold: displacement (m/N), velocity (m/(N s)) or acceleration (m/(N s2)) per
+        force.
+
+    Returns
+    -------
+    xarray.Dataset
+        With that variable instead; nan at 0 Hz where a division by i w would be needed.
+
+    Raises
+    ------
+    InputError
+        Not a frequency response, a transmissibility, or an unknown quantity.
+    """
+    choice("quantity", quantity, PER_FORCE)
+    held = quantity_of(response)
+    if held not in PER_FORCE:
+        raise InputError(
+            "response: a transmissibility is a motion per motion: the same for displacements, "
+            "velocities and accelerations"
+        )
+    values = convert_response(response["frequency"].values, response[held].values, held, quantity)
+    other = RESPONSES[quantity]
+    named = variable(tuple(map(str, response[held].dims)), values, other.units, other.text)
+    return response.drop_vars(held).assign({quantity: named})

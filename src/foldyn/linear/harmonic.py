@@ -12,7 +12,6 @@ Problems, 2019). Displacements are taken as small against the structure, but for
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,13 +21,10 @@ from scipy import sparse
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.answer import Answer
-from foldyn.linear.direct import dynamic_stiffness, warn_of_resonances
-from foldyn.linear.excitation import Drive
-from foldyn.linear.linearized import Linearized
-from foldyn.linear.secant import equivalent_slope
-from foldyn.linear.transmissibility import drive_factor, drive_shape
+from foldyn.errors import InputError
+from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
+from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness
+from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
 
@@ -38,7 +34,6 @@ PATIENCE = 25  # accelerated iterations before slow ones are tried
 RELAXED = 0.3  # of the way in a slow iteration
 FURTHEST = 1.5  # times: how far slopes are extrapolated from one frequency to the next
 LEAST = 1e-12  # rad: a swing is never taken as smaller
-_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -63,11 +58,7 @@ class HarmonicBalance:
 
 
 def harmonic(
-    system: Linearized,
-    drive: Drive,
-    frequency: NDArray,
-    options: HarmonicBalance,
-    report: Reporter,
+    system: Linearized, drive: Drive, frequency: NDArray, options: HarmonicBalance, report: Reporter
 ) -> Answer:
     """Balance one harmonic at each frequency, starting from the slopes of the one before.
 
@@ -102,28 +93,31 @@ def harmonic(
     response = np.full((len(frequency), len(shape)), np.nan, np.complex128)
     swing, spent = np.full(len(frequency), np.nan), 0
     done: list[tuple[float, NDArray]] = []
-    failed: list[int] = []
+    converged = np.ones(len(frequency), bool)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = shape * (drive.value * drive_factor(system, drive, omega))
-        found = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
-        motion, slope = found.solution(_ahead(done, float(f), hinges.reference))
-        spent += found.iterations
+        iteration = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
+        motion, slope = iteration.solution(_ahead(done, float(f), hinges.reference))
+        spent += iteration.iterations
         if motion is None:
-            failed.append(k)
+            converged[k] = False
         else:
             done = [*done[-1:], (float(f), slope)]
             response[k] = motion / drive.value
             swing[k] = np.degrees(np.abs(hinges.gradient @ motion).max(initial=0.0))
         report(Progress(k + 1.0, float(len(frequency)), spent, 0.0))
-    _warn_of(frequency[failed], options)
-    warn_of_resonances(np.delete(frequency, failed), np.delete(response, failed, axis=0))
+    warn_at(
+        frequency[~converged],
+        "the harmonic balance does not converge at {} (nan) within "
+        f"{options.iterations} iterations; give more iterations, closer frequencies or more "
+        "damping",
+    )
+    warn_at(frequency[converged & np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {"swing": swing}, {"iterations": spent})
 
 
-def _ahead(
-    done: list[tuple[float, NDArray]], frequency: float, first: NDArray
-) -> NDArray[np.float64]:
+def _ahead(done: list[tuple[float, NDArray]], frequency: float, first: NDArray) -> NDArray:
     """Slopes to begin with: on the straight line through those of the last two frequencies."""
     if not done:
         return first
@@ -139,12 +133,12 @@ class _Hinges:
 
     def __init__(self, system: Linearized) -> None:
         body = system.case.structure.body
-        found = body.soft_hinges(body.dofs(system.displacement))
-        self.gradient = sparse.csr_array(found.gradient[:, system.free])
-        self.offset, self.stiffness = found.offset, found.stiffness
+        hinges = body.soft_hinges(body.dofs(system.displacement))
+        self.gradient = sparse.csr_array(hinges.gradient[:, system.free])
+        self.offset, self.stiffness = hinges.offset, hinges.stiffness
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 
-    def slope(self, motion: NDArray) -> NDArray[np.float64]:
+    def slope(self, motion: NDArray) -> NDArray:
         """Equivalent slopes / k (nh,) in a motion (nf,)."""
         swing = np.maximum(np.abs(self.gradient @ motion), LEAST)
         return equivalent_slope(self.offset, swing)
@@ -171,19 +165,19 @@ class _Balance:
         the branch between two others, where the motion does not stay; then slowly, which converges
         to the others only.
         """
-        quick, slow = (PATIENCE, self._anderson), (self.options.iterations, self._relaxed)
-        for most, step in (quick, slow):
-            motion, slope = self._iterate(start, step, most)
+        for accelerated in (True, False):
+            motion, slope = self._iterate(start, accelerated)
             if motion is not None:
                 return motion, slope
         return None, start
 
-    def _iterate(self, slope: NDArray, step, most: int) -> tuple[NDArray | None, NDArray]:
+    def _iterate(self, slope: NDArray, accelerated: bool) -> tuple[NDArray | None, NDArray]:
+        most = PATIENCE if accelerated else self.options.iterations
         slopes: list[NDArray] = []
         misses: list[NDArray] = []
         before = None
         # a slow step changes less than what is left to go
-        tolerance = self.options.tolerance * (1.0 if step == self._anderson else RELAXED)
+        tolerance = self.options.tolerance * (1.0 if accelerated else RELAXED)
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
             matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
@@ -193,50 +187,35 @@ class _Balance:
             if before is not None:
                 change = np.abs(motion - before).max()
                 if change <= tolerance * np.abs(motion).max():
-                    between = step == self._anderson and _repels(slopes, misses)
+                    between = accelerated and _repels(slopes, misses)
                     return (None if between else motion), slope
             before = motion
             slopes.append(slope)
             misses.append(self.hinges.slope(motion) - slope)
-            slope = step(slopes, misses)
+            slope = _anderson(slopes, misses) if accelerated else slope + RELAXED * misses[-1]
         return None, slope
 
-    @staticmethod
-    def _relaxed(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
-        return slopes[-1] + RELAXED * misses[-1]
 
-    @staticmethod
-    def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
-        """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
-        plain = slopes[-1] + misses[-1]
-        if len(slopes) == 1:
-            return plain
-        moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
-        turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
-        weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
-        ahead = plain - (moved + turned) @ weight
-        return np.where(ahead > 0.0, ahead, 0.5 * plain)
+def _anderson(slopes: list[NDArray], misses: list[NDArray]) -> NDArray:
+    """Next slopes from the last few (Walker and Ni, SIAM J. Numer. Anal. 49, 2011)."""
+    plain = slopes[-1] + misses[-1]
+    if len(slopes) == 1:
+        return plain
+    moved, turned = _steps(slopes), _steps(misses)
+    weight = np.linalg.lstsq(turned, misses[-1], rcond=1e-10)[0]
+    ahead = plain - (moved + turned) @ weight
+    return np.where(ahead > 0.0, ahead, 0.5 * plain)
+
+
+def _steps(values: list[NDArray]) -> NDArray:
+    """Changes (nh, k) in the last few iterations."""
+    return np.diff(np.array(values[-DEPTH - 1 :]).T, axis=1)
 
 
 def _repels(slopes: list[NDArray], misses: list[NDArray]) -> bool:
     """Whether plain iterations would leave the solution: a multiplier above 1, of those seen."""
-    moved = np.diff(np.array(slopes[-DEPTH - 1 :]).T, axis=1)
+    moved, turned = _steps(slopes), _steps(misses)
     if not moved.size:
         return False
-    turned = np.diff(np.array(misses[-DEPTH - 1 :]).T, axis=1)
     seen = np.linalg.lstsq(moved, moved + turned, rcond=1e-8)[0]
     return bool(np.linalg.eigvals(seen).real.max() > 1.0)
-
-
-def _warn_of(failed: NDArray, options: HarmonicBalance) -> None:
-    if not failed.size:
-        return
-    shown = ", ".join(f"{f:.6g}" for f in failed[:_NAMED])
-    more = " and others" if failed.size > _NAMED else ""
-    warnings.warn(
-        f"frequencies: the harmonic balance does not converge at {shown} Hz{more} (nan) within "
-        f"{options.iterations} iterations; give more iterations, closer frequencies or more "
-        "damping",
-        FoldynWarning,
-        stacklevel=5,
-    )

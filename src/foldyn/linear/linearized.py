@@ -1,4 +1,21 @@
-"""A case linearized about a state: M q'' + C q' + K q = f on its free dofs."""
+"""A case linearized about a state: M q'' + C q' + K q = f on its free dofs.
+
+Superlinear hinges may take the slope that is equivalent to an oscillation of finite amplitude.
+A hinge that swings about its angle in the state, d = d0 + A cos(phi) from its rest angle, has the
+moment M(d) = k sgn(d) |d|^p with p = 4/3. The harmonic in phase with the motion is that of a linear
+hinge with the slope
+
+    k_eq = (1 / (pi A)) int_0^2pi M(d0 + A cos phi) cos phi dphi = k A^(1/3) g(|d0| / A)
+
+(describing function; harmonic balance: Krylov and Bogoliubov, Introduction to Non-linear
+Mechanics, 1947). The integral is a Gauss hypergeometric function of a = |d0| / A:
+
+    a <= 1:  g = 2/sqrt(pi) Gamma(p/2 + 1) / Gamma(p/2 + 3/2) F((1-p)/2, -(1+p)/2; 1/2; a^2)
+    a >= 1:  g = p a^(p-1) F((1-p)/2, (2-p)/2; 2; 1/a^2)
+
+About rest k_eq = 0.941 k A^(1/3), where the chord to the largest moment has k A^(1/3); far from
+rest it is the slope there.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +24,23 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.special import gamma, hyp2f1
 
-from foldyn.algebra.fill import check_fill
+from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.inertia import check_mass
 from foldyn.errors import FoldynWarning
-from foldyn.linear.equilibrium import station
-from foldyn.linear.secant import equivalent_slope
+from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
 from foldyn.values import number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
 # (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
+POWER = 4.0 / 3.0
+AT_REST = float(2.0 / np.sqrt(np.pi) * gamma(0.5 * POWER + 1.0) / gamma(0.5 * POWER + 1.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,36 +115,43 @@ def linearize(
     FoldynWarning
         The state is no equilibrium; loads do not act at rest; hinges have no slope.
     """
-    amplitude = _amplitude(secant)
+    amplitude = None
+    if secant is not None:
+        amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
     check_mass(case.structure.mass, case.fixed)
     check_fill(case.structure.fill, case.structure.body.size)
-    where = station(case, state, load_factor)
-    body = where.body
+    point = operating_point(case, state, load_factor)
+    body = point.body
     free = np.concatenate([case.free_dofs, body.hidden])
-    exact = body.tangent(where.dofs)
-    change, soft = _slope_change(body, where.dofs, amplitude)
+    exact = body.tangent(point.dofs)
+    change, soft = _slope_change(body, point.dofs, amplitude)
     if soft:
-        _warn_of(soft)
+        warnings.warn(
+            f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
+            "vanishes: they count without stiffness, and motions that only they resist have the "
+            "frequency zero. Give secant = an amplitude in degrees, such as 1, for the slopes of "
+            'an oscillation of that amplitude, or take bend_law = "linear"',
+            FoldynWarning,
+            stacklevel=3,
+        )
     stiffness = exact if change is None else sparse.csr_array(exact + change)
-    mass = _all_mass(case, len(body.hidden))
+    mass = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
+    if len(body.hidden):
+        massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
+        mass = sparse.block_diag([mass, massless], format="csr")
+    mass = sparse.csr_array(mass)
     return Linearized(
         case=case,
-        displacement=where.displacement,
+        displacement=point.displacement,
         free=free,
         stiffness=_block(stiffness, free),
         mass=_block(mass, free),
         damping=_block(case.damping.matrix(mass, _reference(case, exact)), free),
         soft=soft,
         secant=None if secant is None else float(secant),
-        residual=where.relative,
-        unbalanced=where.residual,
+        residual=point.relative,
+        unbalanced=point.balance.residual,
     )
-
-
-def _amplitude(secant: float | None) -> float | None:
-    if secant is None:
-        return None
-    return math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
 
 
 def _slope_change(
@@ -142,14 +168,6 @@ def _slope_change(
     return (body.soft_tangent(q, change) if change.any() else None), soft
 
 
-def _all_mass(case: Case, hidden: int) -> sparse.csr_array:
-    """Mass (m, m) of all dofs."""
-    nodal = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
-    if hidden:
-        nodal = sparse.block_diag([nodal, sparse.csr_array((hidden, hidden))], format="csr")
-    return sparse.csr_array(nodal)
-
-
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
     if case.damping.state != "rest" or case.damping.beta == 0.0:
@@ -164,12 +182,25 @@ def _block(matrix: sparse.sparray, free: NDArray) -> sparse.csc_array:
     return block
 
 
-def _warn_of(soft: int) -> None:
-    warnings.warn(
-        f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
-        "vanishes: they count without stiffness, and motions that only they resist have the "
-        "frequency zero. Give secant = an amplitude in degrees, such as 1, for the slopes of an "
-        'oscillation of that amplitude, or take bend_law = "linear"',
-        FoldynWarning,
-        stacklevel=4,
-    )
+def equivalent_slope(offset: ArrayLike, amplitude: float) -> NDArray:
+    """Slope / k of the superlinear law equivalent to an oscillation (describing function).
+
+    Parameters
+    ----------
+    offset : array_like
+        Angles (rad) of the state from the rest angle, d0.
+    amplitude : float
+        Amplitude A (rad) of the oscillation about it.
+
+    Returns
+    -------
+    ndarray
+        k_eq / k, of the shape of `offset`.
+    """
+    ratio = np.abs(np.asarray(offset, float)) / amplitude
+    inside = np.minimum(ratio, 1.0)
+    outside = np.maximum(ratio, 1.0)
+    near = AT_REST * hyp2f1(0.5 * (1.0 - POWER), -0.5 * (1.0 + POWER), 0.5, inside**2)
+    far = POWER * outside ** (POWER - 1.0)
+    far = far * hyp2f1(0.5 * (1.0 - POWER), 0.5 * (2.0 - POWER), 2.0, outside**-2.0)
+    return amplitude ** (POWER - 1.0) * np.where(ratio <= 1.0, near, far)

@@ -44,9 +44,8 @@ def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float
         The sets have different nodes, or the mass does not belong to them.
     """
     first, second = _chosen(_shapes("a", a), _shapes("b", b), nodes)
-    left, right = _flat(first), _flat(second)
-    weight = _weight(mass, first.shape[1], first.shape[2])
-    heavy_left, heavy_right = weight(left), weight(right)
+    left, right = (shapes.reshape(len(shapes), -1) for shapes in (first, second))
+    heavy_left, heavy_right = _weighted(first, mass), _weighted(second, mass)
     cross = np.abs(left.conj() @ heavy_right.T) ** 2
     own_left = np.einsum("ki,ki->k", left.conj(), heavy_left).real
     own_right = np.einsum("ki,ki->k", right.conj(), heavy_right).real
@@ -132,14 +131,11 @@ def _at(shapes: NDArray, nodes: Any) -> NDArray:
     return shapes[:, numbers]
 
 
-def _flat(shapes: NDArray) -> NDArray:
-    return shapes.reshape(len(shapes), -1)
-
-
-def _weight(mass: Any, nodes: int, components: int) -> Any:
-    """Function that multiplies flat shapes (k, nodes * components) by the mass."""
+def _weighted(shapes: NDArray, mass: Any) -> NDArray:
+    """Flat shapes (k, nodes * components), multiplied by the mass."""
+    count, nodes, components = shapes.shape
     if mass is None:
-        return lambda flat: flat
+        return shapes.reshape(count, -1)
     matrix = mass if sparse.issparse(mass) else np.asarray(mass, float)
     if matrix.shape == (nodes,):
         matrix = sparse.diags_array(matrix)
@@ -148,10 +144,5 @@ def _weight(mass: Any, nodes: int, components: int) -> Any:
             f"mass: shape {matrix.shape}: give masses ({nodes},) or a matrix ({nodes}, {nodes}) "
             "of the nodes that are compared"
         )
-
-    def heavy(flat: NDArray) -> NDArray:
-        by_node = flat.reshape(-1, nodes, components)
-        product = matrix @ by_node.transpose(1, 0, 2).reshape(nodes, -1)
-        return product.reshape(nodes, -1, components).transpose(1, 0, 2).reshape(flat.shape)
-
-    return heavy
+    product = matrix @ shapes.transpose(1, 0, 2).reshape(nodes, -1)
+    return product.reshape(nodes, count, components).transpose(1, 0, 2).reshape(count, -1)

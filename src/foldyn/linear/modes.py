@@ -1,4 +1,10 @@
-"""`modes`: natural frequencies and shapes of a case about a state."""
+"""`modes`: natural frequencies and shapes of a case about a state.
+
+What a mode means for motions of the base: with shapes of the modal mass 1, the participation
+factor along an axis is phi' M r, r the unit translation of the free dofs along it, and its square
+the effective mass. Over all modes effective masses add up to r' M r, the mass that is free to move
+along the axis.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from foldyn.cases import Case, State
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.eigen import Spectrum, lowest
+from foldyn.errors import FoldynWarning
+from foldyn.linear.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.linear.linearized import Linearized, linearize
-from foldyn.linear.participation import free_mass, participation_factors
-from foldyn.linear.pencil import Pencil
-from foldyn.linear.rigid_modes import rigid_share, rigid_space, unresisted
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
+from foldyn.statics.rigid import free_rigid_motions, rigid_motions
+from foldyn.statics.stability import oriented
 from foldyn.values import whole
 
 if TYPE_CHECKING:
@@ -25,6 +31,8 @@ if TYPE_CHECKING:
 
 COPIES = 4  # of the shapes, while they are found and stored
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one
+ROUNDING = 1e3 * EPS  # of |K| |r|: what counts as no force on a rigid motion
+INDEPENDENT = 1e-6  # of a motion's size that must be left of it after those before are taken out
 
 
 def modes(
@@ -95,39 +103,39 @@ def modes(
     began = time.perf_counter()
     linear = linearize(case, state, secant, load_factor)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
-    if count > pencil.finite:
-        raise InputError(f" = {count}: the case has only {pencil.finite} free dofs", "count")
-    space = rigid_space(linear)
-    found = lowest(pencil, count, unresisted(linear, space), verify)
-    _warn(found)
+    space, along = rigid_space(linear), _unit_translations(linear)
+    spectrum = lowest(pencil, count, unresisted(linear, space), verify)
+    _warn(spectrum)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
         "free_dofs": pencil.finite,
-        "free_mass": free_mass(linear),
+        "free_mass": np.einsum("ia,ia->a", along, linear.mass @ along),
         "residual": linear.residual,
         "soft_hinges": linear.soft,
-        "complete": found.checked,
-        "shift": None if np.isnan(found.shift) else found.shift,
+        "complete": spectrum.checked,
+        "shift": None if np.isnan(spectrum.shift) else spectrum.shift,
         "solver": pencil.backend if pencil.factorizations else "dense",
         "factorizations": pencil.factorizations,
-        "largest_residual": float(pencil.residuals(found.values, found.shapes).max()),
-        "rounding": _rounding(pencil, found),
+        "largest_residual": float(pencil.residuals(spectrum.values, spectrum.shapes).max()),
+        "rounding": _rounding(pencil, spectrum),
         "wall_seconds": time.perf_counter() - began,
     }
-    return modes_dataset(case, _variables(linear, found, space), statistics)
+    return modes_dataset(case, _variables(linear, spectrum, space, along), statistics)
 
 
-def _variables(linear: Linearized, found: Spectrum, space: NDArray) -> dict[str, Any]:
-    values, shapes = found.values, _oriented(found.shapes)
+def _variables(
+    linear: Linearized, spectrum: Spectrum, space: NDArray, along: NDArray
+) -> dict[str, Any]:
+    values, shapes = spectrum.values, oriented(spectrum.shapes)
     with np.errstate(invalid="ignore"):
         omega = np.sqrt(values)
     modal = np.einsum("ik,ik->k", shapes, linear.damping @ shapes)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(omega > 0.0, modal / (2.0 * omega), np.nan)
     share = rigid_share(linear, space, shapes)
-    factors = participation_factors(linear, shapes)
+    factors = shapes.T @ (linear.mass @ along)
     full = np.zeros((len(values), linear.displacement.size))
     on_nodes = linear.free < full.shape[1]
     full[:, linear.free[on_nodes]] = shapes[on_nodes].T
@@ -144,32 +152,101 @@ def _variables(linear: Linearized, found: Spectrum, space: NDArray) -> dict[str,
     }
 
 
-def _rounding(pencil: Pencil, found: Spectrum) -> float:
+def _unit_translations(linear: Linearized) -> NDArray:
+    """Unit translations (nf, 3) of the free dofs along x, y, z."""
+    on_nodes = linear.free < linear.displacement.size
+    return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)
+
+
+def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
     """Largest bound on the rounding of the eigenvalues that are not zero, as a fraction of each."""
-    finite = found.values != 0.0
-    noise = pencil.noise(found.shapes[:, finite])
-    return float((noise / np.abs(found.values[finite])).max(initial=0.0))
+    finite = spectrum.values != 0.0
+    noise = pencil.noise(spectrum.shapes[:, finite])
+    return float((noise / np.abs(spectrum.values[finite])).max(initial=0.0))
 
 
-def _oriented(shapes: NDArray) -> NDArray:
-    """Shapes (n, k) with the entry of largest size positive; the first of equal ones counts."""
-    size = np.abs(shapes)
-    first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
-    return shapes * np.sign(shapes[first, np.arange(shapes.shape[1])])
-
-
-def _warn(found: Spectrum) -> None:
-    unstable = int((found.values < 0.0).sum())
-    messages = []
+def _warn(spectrum: Spectrum) -> None:
+    unstable = int((spectrum.values < 0.0).sum())
     if unstable:
-        messages.append(
-            f"the state is an unstable equilibrium: {unstable} of the {len(found.values)} modes "
-            "have a negative eigenvalue and no frequency (nan)"
+        warnings.warn(
+            f"the state is an unstable equilibrium: {unstable} of the {len(spectrum.values)} modes "
+            "have a negative eigenvalue and no frequency (nan)",
+            FoldynWarning,
+            stacklevel=3,
         )
-    if found.missed:
-        messages.append(
-            f"the count of eigenvalues differs by {abs(found.missed)} from the modes found: "
-            "frequencies may be missing; ask for another count of modes"
+    if spectrum.missed:
+        warnings.warn(
+            f"the count of eigenvalues differs by {abs(spectrum.missed)} from the modes found: "
+            "frequencies may be missing; ask for another count of modes",
+            FoldynWarning,
+            stacklevel=3,
         )
-    for message in messages:
-        warnings.warn(message, FoldynWarning, stacklevel=3)
+
+
+def rigid_space(linear: Linearized) -> NDArray:
+    """Rigid motions (nf, r) about the state that the supports allow, M-orthonormal.
+
+    Translations along x, y, z come first as far as they are among them, then rotations.
+    """
+    x = linear.case.structure.nodes + linear.displacement
+    allowed = free_rigid_motions(x, linear.case.fixed.ravel())
+    plain = rigid_motions(x)
+    chosen = np.linalg.lstsq(plain, allowed, rcond=None)[0]
+    basis, _ = np.linalg.qr(chosen)
+    motions = plain @ (basis @ basis.T)
+    on_nodes = linear.free[linear.free < x.size]
+    still = np.zeros((len(linear.free) - len(on_nodes), motions.shape[1]))  # turns of a shell's
+    return _orthonormal(linear, np.vstack([motions[on_nodes], still]))  # edges are relative
+
+
+def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:
+    """M-orthonormal columns that span motions (nf, k), in their order, dependent ones left out."""
+    kept: list[NDArray] = []
+    for motion in motions.T:
+        left = motion
+        for _ in range(2):  # once more for the rounding of the first time
+            for other in kept:
+                left = left - other * float(other @ (linear.mass @ left))
+        size = _size(linear, left)
+        if size > INDEPENDENT * _size(linear, motion) and size > 0.0:
+            kept.append(left / size)
+    return np.stack(kept, axis=1) if kept else np.zeros((len(linear.free), 0))
+
+
+def _size(linear: Linearized, motion: NDArray) -> float:
+    return float(np.sqrt(motion @ (linear.mass @ motion)))
+
+
+def unresisted(linear: Linearized, space: NDArray) -> NDArray:
+    """Part (nf, k) of the rigid motions (nf, r) that causes no force: modes of frequency zero.
+
+    Loads that keep their direction resist rotations, as gravity does those of a pendulum; without
+    them none is resisted in an equilibrium.
+    """
+    if not space.shape[1]:
+        return space
+    if _is_null(linear, space).all():
+        return space
+    _, turned = eigh(space.T @ (linear.stiffness @ space))
+    turned = space @ turned
+    return turned[:, _is_null(linear, turned)]
+
+
+def _is_null(linear: Linearized, motions: NDArray) -> NDArray:
+    """Whether the stiffness meets each motion (nf, k) with no more than rounding (k,).
+
+    In an equilibrium to within a force r a rotation by w turns that force: |w| r.
+    """
+    force = np.linalg.norm(linear.stiffness @ motions, axis=0)
+    rounding = ROUNDING * np.linalg.norm(abs(linear.stiffness) @ np.abs(motions), axis=0)
+    x = linear.case.structure.nodes + linear.displacement
+    radius = float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) or 1.0
+    turned = linear.unbalanced * np.abs(motions).max(axis=0) / radius
+    return force <= rounding + 2.0 * turned
+
+
+def rigid_share(linear: Linearized, space: NDArray, shapes: NDArray) -> NDArray:
+    """Share (k,) of shapes (nf, k) in the space (nf, r) of rigid motions, weighted by mass."""
+    part = space.T @ (linear.mass @ shapes)
+    whole = np.einsum("ik,ik->k", shapes, linear.mass @ shapes)
+    return (part**2).sum(axis=0) / whole

@@ -1,18 +1,18 @@
-"""Peaks of a frequency response, and the damping that they tell."""
+"""Peaks of a frequency response, and their damping."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.supports import AXES, signed
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.linear.quantity import PER_FORCE, convert, quantity_of
+from foldyn.linear.frf import PER_FORCE, convert, quantity_of
 from foldyn.signals import (
     CircleFit,
     Peaks,
@@ -34,7 +34,7 @@ SIDES = 1.5  # half-power widths on either side of a peak that a circle fit take
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of a frequency response; nan where it does not tell.
+    """A peak of a frequency response; nan where something cannot be found.
 
     Attributes
     ----------
@@ -124,26 +124,17 @@ def peaks_of(
         return ()
     kind = shown if shown in PER_FORCE else "receptance"
     rate = float(response.attrs.get("window_rate", 0.0))
-    found = resonances(f, curve, kind, prominence, count, "coherence" in response)
-    halves = [_half_power(f, curve, float(peak), kind, rate) for peak in found.frequency]
-    bands = _bands(f, np.abs(curve), found.index, [half.width for half in halves])
-    circles = _circles(f, _modal(response, f, curve, shown, AXES[column], rate), bands, kind, rate)
-    return tuple(
-        Peak(
-            frequency=float(found.frequency[k]),
-            height=float(found.height[k]),
-            half_power=half.damping_ratio,
-            textbook=half.textbook,
-            asymmetry=half.asymmetry,
-            natural_frequency=circle.natural_frequency,
-            damping_ratio=circle.damping_ratio,
-            frequency_error=circle.frequency_error,
-            damping_error=circle.damping_error,
-            misfit=circle.misfit,
-            note="; ".join(filter(None, (half.note, circle.note))),
-        )
-        for k, (half, circle) in enumerate(zip(halves, circles, strict=True))
-    )
+    curve_peaks = resonances(f, curve, kind, prominence, count, "coherence" in response)
+    if not curve_peaks.index.size:
+        return ()
+    peaks, widths = [], []
+    for frequency, height in zip(curve_peaks.frequency, curve_peaks.height, strict=True):
+        peak, width = _with_half_power(Peak(float(frequency), float(height)), f, curve, kind, rate)
+        peaks.append(peak)
+        widths.append(width)
+    bands = _bands(f, np.abs(curve), curve_peaks.index, widths)
+    circled = _modal(response, f, curve, shown, AXES[column], rate)
+    return tuple(_with_circles(peaks, f, circled, bands, kind, rate))
 
 
 def resonances(
@@ -159,36 +150,22 @@ def resonances(
     return find_peaks(f, curve, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
 
 
-class _Half(NamedTuple):
-    damping_ratio: float = math.nan
-    textbook: float = math.nan
-    asymmetry: float = math.nan
-    width: float = math.inf  # Hz
-    note: str = ""
-
-
-class _Circle(NamedTuple):
-    natural_frequency: float = math.nan
-    damping_ratio: float = math.nan
-    frequency_error: float = math.nan
-    damping_error: float = math.nan
-    misfit: float = math.nan
-    note: str = ""
-
-
-def _half_power(f: NDArray, curve: NDArray, near: float, kind: str, rate: float) -> _Half:
-    """What the half-power points of a peak tell."""
+def _with_half_power(
+    peak: Peak, f: NDArray, curve: NDArray, kind: str, rate: float
+) -> tuple[Peak, float]:
+    """The peak with its half-power damping, and the distance (Hz) of the half-power points."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)  # the asymmetry is stored
         try:
-            points = half_power(f, curve, near, kind)
+            points = half_power(f, curve, peak.frequency, kind)
         except InputError as error:
-            return _Half(note=f"half power: {error}")
+            return replace(peak, note=f"half power: {error}"), math.inf
     ratio = points.damping_ratio
     if rate > 0.0:
         ratio = float(without_window(points.natural_frequency, ratio, rate)[1])
-    width = points.upper - points.lower
-    return _Half(ratio, points.textbook_damping_ratio, points.asymmetry, width)
+    textbook, asymmetry = points.textbook_damping_ratio, points.asymmetry
+    damped = replace(peak, half_power=ratio, textbook=textbook, asymmetry=asymmetry)
+    return damped, points.upper - points.lower
 
 
 def _bands(
@@ -209,7 +186,7 @@ def _bands(
 
 def _modal(
     response: xarray.Dataset, f: NDArray, curve: NDArray, shown: str, axis: str, rate: float
-) -> NDArray[np.complex128]:
+) -> NDArray:
     """The curve as one in which a mode makes a circle.
 
     A transmissibility is 1 - (s^2 + alpha s) times the receptance of what the base accelerates,
@@ -223,28 +200,30 @@ def _modal(
         return (still - curve) / (s * (s + float(response.attrs["alpha"])))
 
 
-def _circles(
-    f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str, rate: float
-) -> list[_Circle]:
-    """What the circle fits of all peaks tell."""
+def _with_circles(
+    peaks: list[Peak], f: NDArray, curve: NDArray, bands: list[tuple[float, float]], kind: str,
+    rate: float,
+) -> list[Peak]:  # fmt: skip
+    """The peaks with their circle fits: of all together, or else of each alone."""
     try:
-        return [_told(fit, rate) for fit in circle_fits(f, curve, bands, kind)] if bands else []
+        fits = circle_fits(f, curve, bands, kind)
+        return [_with_circle(peak, fit, rate) for peak, fit in zip(peaks, fits, strict=True)]
     except (InputError, ComputationError):
-        return [_alone(f, curve, band, kind, rate) for band in bands]
+        alone = []
+    for peak, band in zip(peaks, bands, strict=True):
+        try:
+            alone.append(_with_circle(peak, circle_fit(f, curve, band, kind), rate))
+        except (InputError, ComputationError) as error:
+            alone.append(replace(peak, note="; ".join(filter(None, (peak.note, str(error))))))
+    return alone
 
 
-def _alone(
-    f: NDArray, curve: NDArray, band: tuple[float, float], kind: str, rate: float
-) -> _Circle:
-    try:
-        return _told(circle_fit(f, curve, band, kind), rate)
-    except (InputError, ComputationError) as error:
-        return _Circle(note=str(error))
-
-
-def _told(fit: CircleFit, rate: float) -> _Circle:
-    """A fit, without the damping of the window."""
+def _with_circle(peak: Peak, fit: CircleFit, rate: float) -> Peak:
+    """The peak with its circle fit, without the damping of the window."""
     natural, ratio = fit.natural_frequency, fit.damping_ratio
     if rate > 0.0:
         natural, ratio = (float(value) for value in without_window(natural, ratio, rate))
-    return _Circle(natural, ratio, fit.frequency_error, fit.damping_error, fit.misfit)
+    return replace(
+        peak, natural_frequency=natural, damping_ratio=ratio, misfit=fit.misfit,
+        frequency_error=fit.frequency_error, damping_error=fit.damping_error,
+    )  # fmt: skip

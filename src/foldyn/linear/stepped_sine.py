@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Harmonic, State
-from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.answer import Answer
-from foldyn.linear.time_domain import Integration, Rig
+from foldyn.errors import InputError
+from foldyn.linear.excitation import Answer, warn_at
+from foldyn.linear.time_domain import Integration, Rig, overall
 from foldyn.signals import stepped_sine as response_per_drive
 from foldyn.values import choice, number, whole
 
 PER_CYCLE = 32  # samples in a cycle
 SLOWEST = 0.99  # ratio of successive changes above which no decay is seen
 NEGLIGIBLE = 1e-12  # change that is rounding
-_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -73,18 +70,18 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     state: State | None = None
     done = 0.0
     for place, k in enumerate(order if options.sweep == "up" else order[::-1]):
-        run = _Run(rig, float(frequency[k]), options, state)
-        while not run.settled:
-            ahead = (len(frequency) - place) * 3 * run.block
-
-            def told(now: Progress, before: float = done + run.time, left: float = ahead) -> None:
-                done_now = before + now.time
-                report(Progress(done_now, before + left, now.steps, now.energy_error))
-
-            run.advance(told)
-        response[k], unsteady[k], spent[k] = run.response, run.unsteady, run.time * frequency[k]
-        state, done = run.state, done + run.time
-    _warn_of(frequency[unsteady > options.settled], options)
+        motion = _Motion(rig, float(frequency[k]), options, state)
+        while not motion.settled:
+            before, ahead = done + motion.time, (len(frequency) - place) * 3 * motion.block
+            motion.advance(overall(report, before, before + ahead))
+        response[k], unsteady[k] = motion.response, motion.unsteady
+        spent[k] = motion.time * frequency[k]
+        state, done = motion.state, done + motion.time
+    warn_at(
+        frequency[unsteady > options.settled],
+        f"the motion has not settled after {options.most_cycles} cycles at {{}} (see "
+        "unsteadiness); give most_cycles, or damping: without it a transient does not die away",
+    )
     facts = {
         "cycles": options.cycles,
         "cycles_in_all": round(float(spent.sum())),
@@ -94,7 +91,7 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     return Answer(response, {"unsteadiness": unsteady}, facts)
 
 
-class _Run:
+class _Motion:
     """Motion at one frequency, in blocks of cycles."""
 
     def __init__(
@@ -127,15 +124,12 @@ class _Run:
         )
         drive = self.rig.drive.value * self.history(time)
         # the last sample is the first one of the next block
-        found = response_per_drive(time[:-1], drive[:-1], motion[:-1], self.frequency)
+        response = response_per_drive(time[:-1], drive[:-1], motion[:-1], self.frequency)
         if self.blocks:
-            before, self._change = self._change, _relative(found, self.response)
-            self.unsteady = _remaining(self._change, before)
-        self.response, self.blocks = found, self.blocks + 1
-
-
-def _relative(now: NDArray, before: NDArray) -> float:
-    return float(np.abs(now - before).max() / max(np.abs(now).max(), 1e-300))
+            largest = max(np.abs(response).max(), 1e-300)
+            change = float(np.abs(response - self.response).max() / largest)
+            self.unsteady, self._change = _remaining(change, self._change), change
+        self.response, self.blocks = response, self.blocks + 1
 
 
 def _remaining(change: float, before: float) -> float:
@@ -146,17 +140,3 @@ def _remaining(change: float, before: float) -> float:
         return np.inf
     ratio = min(change / before, SLOWEST)
     return change * max(ratio / (1.0 - ratio), 1.0)
-
-
-def _warn_of(unsettled: NDArray, options: SteppedSine) -> None:
-    if not unsettled.size:
-        return
-    shown = ", ".join(f"{f:.6g}" for f in unsettled[:_NAMED])
-    more = " and others" if unsettled.size > _NAMED else ""
-    warnings.warn(
-        f"frequencies: the motion has not settled after {options.most_cycles} cycles at {shown} "
-        f"Hz{more} (see unsteadiness); give most_cycles, or damping: without it a transient does "
-        "not die away",
-        FoldynWarning,
-        stacklevel=4,
-    )

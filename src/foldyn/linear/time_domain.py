@@ -25,8 +25,8 @@ from foldyn.cases import (
 from foldyn.cases.supports import AXES, Support
 from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
-from foldyn.linear.equilibrium import Station
 from foldyn.linear.excitation import Drive
+from foldyn.linear.operating_point import operating_point
 from foldyn.values import choice, number
 
 
@@ -53,9 +53,14 @@ class Integration:
         """Check the arguments."""
         if self.integrator is not None:
             choice("integrator", self.integrator, METHODS)
-        for name in ("dt", "tolerance"):
-            if getattr(self, name) is not None:
-                number(name, getattr(self, name), above=0.0)
+        check_positive(self, "dt", "tolerance")
+
+
+def check_positive(options: Integration, *names: str) -> None:
+    """Refuse options that are given and not positive numbers."""
+    for name in names:
+        if getattr(options, name) is not None:
+            number(name, getattr(options, name), above=0.0)
 
 
 class Rig:
@@ -65,24 +70,25 @@ class Rig:
     without the drive, whatever the tolerance with which the state was found.
     """
 
-    def __init__(self, station: Station, drive: Drive, integration: Integration) -> None:
-        self.case, self.state = station.problem.case, station.displacement
+    def __init__(
+        self, case: Case, state: State | str | None, load_factor: float, drive: Drive,
+        integration: Integration,
+    ) -> None:  # fmt: skip
+        point = operating_point(case, state, load_factor)
+        self.case, self.state = case, point.displacement
         self.drive, self.integration = drive, integration
-        massless = self.case.structure.massless
+        massless = case.structure.massless
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
-        folded = [load for load in self.case.loads if isinstance(load, Actuate)]
-        history = Table([0.0, 1.0], [station.factor, station.factor])
+        folded = [load for load in case.loads if isinstance(load, Actuate)]
+        history = Table([0.0, 1.0], [point.factor, point.factor])
+        holding = point.body.internal(point.dofs)[: self.state.size]
+        holding[case.supported_dofs] = 0.0
+        holding[np.abs(holding) <= point.problem.force_rounding] = 0.0
         self._loads: list[Force | Actuate] = [
-            *(replace(load, history=history) for load in folded if station.factor != 0.0),
-            *self._holding(station),
+            *(replace(load, history=history) for load in folded if point.factor != 0.0),
+            *forces(holding.reshape(-1, 3)),
         ]
-        self._supports = [*self._held()]
-
-    def _holding(self, station: Station) -> list[Force]:
-        force = station.body.internal(station.dofs)[: self.state.size]
-        force[self.case.supported_dofs] = 0.0
-        force[np.abs(force) <= station.problem.force_rounding] = 0.0
-        return forces(force.reshape(-1, 3))
+        self._supports = self._held()
 
     def _held(self) -> list[Support]:
         """Supports that stay where the state puts them; a base of the case's own stands still."""
@@ -113,11 +119,12 @@ class Rig:
         initial: State | None = None,
     ) -> tuple[NDArray, NDArray, State]:
         """Times, response (nt, n, 3) less the state, and the state at the end of a motion."""
-        how = self.integration
-        dt = None if how.dt is None else every / math.ceil(every / how.dt * (1.0 - 1e-12))
+        dt, tolerance = self.integration.dt, self.integration.tolerance
+        if dt is not None:
+            dt = every / math.ceil(every / dt * (1.0 - 1e-12))
         time, displacement, velocity, _, _ = prepare(
             self.driven(history), duration, self.integrator, dt, every,
-            initial or State(self.state), tolerance=how.tolerance, start=start,
+            initial or State(self.state), tolerance=tolerance, start=start,
         ).samples(progress)  # fmt: skip
         return time, displacement - self.state, State(displacement[-1], velocity[-1])
 

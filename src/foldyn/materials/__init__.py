@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import foldyn.jit  # noqa: F401 - starts Numba, before anything is imported from it
 from foldyn.errors import InputError
@@ -39,23 +40,20 @@ HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
 
 def bar_law(spec: str | BarLaw) -> BarLaw:
     """Law of a bar from its name ("ogden", "linear") or a law object."""
-    if isinstance(spec, str) and spec in BAR_LAWS:
-        spec = BAR_LAWS[spec]()
-    if not isinstance(spec, BarLaw):
-        raise InputError(
-            f" = {spec!r}: choose one of {', '.join(BAR_LAWS)} or give a BarLaw object", "bar_law"
-        )
-    spec.check("bar_law")
-    return spec
+    return _law(spec, BAR_LAWS, BarLaw, "bar_law")
 
 
 def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
     """Law of a hinge from its name ("linear", "superlinear", "enhanced") or a law object."""
-    if isinstance(spec, str) and spec in HINGE_LAWS:
-        spec = HINGE_LAWS[spec]()
-    if not isinstance(spec, HingeLaw):
+    return _law(spec, HINGE_LAWS, HingeLaw, field)
+
+
+def _law(spec: Any, laws: Mapping[str, Any], base: type[BarLaw | HingeLaw], field: str) -> Any:
+    if isinstance(spec, str) and spec in laws:
+        spec = laws[spec]()
+    if not isinstance(spec, base):
         raise InputError(
-            f" = {spec!r}: choose one of {', '.join(HINGE_LAWS)} or give a HingeLaw object", field
+            f" = {spec!r}: choose one of {', '.join(laws)} or give a {base.__name__} object", field
         )
     spec.check(field)
     return spec

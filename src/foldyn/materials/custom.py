@@ -1,6 +1,6 @@
 """Laws of the user's own, given as plain scalar Python functions.
 
-Built-in laws are compiled once and kept on disk. A user's law is compiled in every process anew
+Built-in laws are compiled once and kept on disk. A user's law is compiled anew in every process
 (a fraction of a second) and called by its address; a result computed with it says that it cannot
 be run again from its file alone.
 """
@@ -20,7 +20,7 @@ from foldyn.materials.law import BarLaw, HingeLaw, Law
 
 
 class _Called(Law):
-    """A law whose first three fields are its functions, of the numbers of a state."""
+    """A law whose first three fields are its functions; each takes the numbers of a state."""
 
     @cached_property
     def _functions(self) -> list[Any]:

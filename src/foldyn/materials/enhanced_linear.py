@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.law import PARAMETERS, HingeLaw
-from foldyn.values import number
+from foldyn.values import choice, number
 
 STRESS_FREE, AS_PUBLISHED = 2, 3  # codes
 TWO_PI = 2.0 * math.pi
@@ -116,17 +116,14 @@ class EnhancedLinear(HingeLaw):
     name: str = "enhanced"
 
     def __post_init__(self) -> None:
-        for field in ("theta1", "theta2"):
-            number(f"EnhancedLinear: {field}", getattr(self, field), unit="degrees")
+        number("EnhancedLinear: theta1", self.theta1, unit="degrees")
+        number("EnhancedLinear: theta2", self.theta2, unit="degrees")
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
                 f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "
                 "0 < theta1 < theta2 < 360 (degrees)"
             )
-        if self.rest not in ("stress_free", "as_published"):
-            raise InputError(
-                f"EnhancedLinear: rest = {self.rest!r}: choose 'stress_free' or 'as_published'"
-            )
+        choice("EnhancedLinear: rest", self.rest, ("stress_free", "as_published"))
 
     @property
     def code(self) -> int:

@@ -33,7 +33,7 @@ class Law(ABC):
         return None
 
     def check(self, field: str) -> None:
-        """Refuse a built-in law that the compiled switch lacks: it gives nan for what it lacks."""
+        """Refuse a built-in law that the compiled switch lacks: it gives nan for such a law."""
         own = type(self).addresses is not Law.addresses  # asking for them would compile them
         if not own and np.isnan(self._table(*self.rest_state)).any():
             raise InputError(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foldyn.jit.bits import bits_of, float_of
 from foldyn.jit.compiled import scalar
+from foldyn.jit.intrinsics import bits_of, float_of
 from foldyn.materials.law import HingeLaw
 
 CODE = 1
@@ -32,7 +32,7 @@ def moment(theta, rest):
     by its exponent (3 % off) and two steps of order 4; exact to 3 ulp.
     """
     d = theta - rest
-    a = max(abs(d), 1e-200)  # below, y^3 would overflow and the moment is zero all the same
+    a = max(abs(d), 1e-200)  # below, y^3 would overflow and the moment is zero anyway
     third = ((bits_of(a) >> 32) * 0x55555556) >> 32
     y = float_of((0x553EF0FF - third) << 32)
     r = 1.0 - a * y * y * y

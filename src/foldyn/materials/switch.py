@@ -1,7 +1,7 @@
 """The one compiled switch from a law's integer code to its formulas.
 
 A new built-in law adds its line to each function of its kind. A user's law is called at
-`address`; what is not known, having none, gives nan (`Law.check` refuses it before). Hinge
+`address`; an unknown code, which has none, gives nan (`Law.check` refuses it earlier). Hinge
 parameters a, b, c, d are the four columns of `HingeLaw.parameters`.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.call import call1, call2
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 

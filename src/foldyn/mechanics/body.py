@@ -1,4 +1,4 @@
-"""What solvers take of a structure: energies, forces and tangents on a flat vector of dofs.
+"""What solvers need of a structure: energies, forces and tangents on a flat vector of dofs.
 
 The m dofs are 3 node + axis, then the hidden ones: those without mass that a model may have beside
 the displacements of its nodes. Compiled loops hold them in arrays with a row of three per node,
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity
 
 
@@ -124,7 +125,7 @@ class Body(ABC):
 
     @abstractmethod
     def blocks(self) -> Blocks:
-        """The same for implicit integrators; see `mechanics.blocks`."""
+        """The same for implicit integrators; see `mechanics.step_tangent`."""
 
     @abstractmethod
     def workspaces(self, threads: int) -> Sequence[Any]:
@@ -205,3 +206,55 @@ def largest_turn(largest: float, before: NDArray, after: NDArray) -> float:
     if hinges > math.pi or not np.isfinite(hinges + largest):
         return math.inf
     return max(largest, hinges)
+
+
+class Numbering(NamedTuple):
+    """The order of the nodes in memory while a motion is computed: along the sheet.
+
+    What goes in and what comes out has the structure's own numbers. Place k in memory holds node
+    order[k]; node i stands at place rank[i].
+
+    After the nodes come the rows of the dofs beside displacements, which keep their order.
+    """
+
+    order: NDArray  # (n,)
+    rank: NDArray  # (n,)
+    rows: int  # of arrays in memory, n or more
+
+    def inward(self, values: NDArray) -> NDArray:
+        """Values per node (n, ...) as they stand in memory, zero in further rows (rows, ...)."""
+        out = np.zeros((self.rows, *values.shape[1:]), values.dtype)
+        out[: len(self.order)] = values[self.order]
+        return out
+
+    def held(self, fixed: NDArray) -> NDArray:
+        """Mask of held dofs (n, 3) as it stands in memory, True in further rows (rows, 3)."""
+        out = self.inward(fixed)
+        out[len(self.order) :] = True
+        return out
+
+    def outward(self, values: NDArray) -> NDArray:
+        """Values per place (n, ...) by node."""
+        return np.ascontiguousarray(values[self.rank])
+
+    def dofs(self, dofs: NDArray) -> NDArray:
+        """Numbers 3 place + axis of dofs 3 node + axis."""
+        return (3 * self.rank[np.asarray(dofs) // 3] + np.asarray(dofs) % 3).astype(np.int64)
+
+    def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """Nodal (n, n) matrix, or one of all dofs, as it stands in memory."""
+        places, size = self.order, self.rows
+        if matrix.shape[0] > len(places):
+            places = (3 * places[:, None] + np.arange(3)).ravel()
+            places = np.concatenate([places, np.arange(len(places), matrix.shape[0])])
+            size = 3 * self.rows
+        placed = sparse.csr_array(sparse.csr_array(matrix)[places][:, places])
+        placed.resize((size, size))
+        placed.sort_indices()
+        return placed
+
+
+def renumbered(body: Body) -> tuple[Body, Numbering]:
+    """The body as it stands in memory while a motion is computed."""
+    body, order = body.renumbered()
+    return body, Numbering(order, ranks(order), body.rows)

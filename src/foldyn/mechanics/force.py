@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.jit.flat import flat
-from foldyn.jit.prefetch import prefetch_range
+from foldyn.jit.intrinsics import flat, prefetch_range
 from foldyn.jit.rows import LANES, add_rows, load_rows
 from foldyn.materials import enhanced_linear, ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE

@@ -1,4 +1,4 @@
-"""What compiled loops call of a model, whatever its kind.
+"""The functions of a model that compiled loops call, whatever its kind.
 
 Each stands for one function per model: an `overload` for the class of its arrays, beside its
 kernels. Those of bars and hinges are here; kernels on disk know the others by the sources of the
@@ -18,7 +18,7 @@ from foldyn.mechanics.model import BarsHinges
 
 
 class Whole(NamedTuple):
-    """What a thread that is alone computes, in the place of `Strips`: all of it."""
+    """The share of a thread that works alone, in place of `Strips`: everything."""
 
     own: NDArray  # (2,) first and last + 1 of the rows
 

@@ -1,6 +1,6 @@
-"""In which order the force kernel goes over a sheet: strip after strip of nodes.
+"""The order in which the force kernel passes over a sheet: strip after strip of nodes.
 
-With nodes numbered along the sheet (`renumber`) an element's nodes have numbers close to its
+With nodes numbered along the sheet (`model.renumber`) an element's nodes have numbers close to its
 lowest one. A kernel that takes the elements in the order of their lowest nodes then needs the
 nodal values of a narrow window only. They are copied to buffers that stay in the cache, used round
 and round: node i has the row i & mask. Once all elements with lowest nodes up to i are done,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.switch import bar_slope, bar_stress, hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.energy import bar_extension, hinge_dihedral
@@ -24,6 +24,12 @@ class Sparsity(NamedTuple):
     hinge_slots: NDArray  # (nh, 4, 4)
 
 
+def block_keys(indptr: NDArray, indices: NDArray) -> NDArray:
+    """Number row * n + column of each block of a pattern, in increasing order."""
+    rows = len(indptr) - 1
+    return np.repeat(np.arange(rows), np.diff(indptr)) * rows + indices.astype(np.int64)
+
+
 def sparsity(model: BarsHinges) -> Sparsity:
     """Block pattern of the tangent; every node has a diagonal block."""
     n = len(model.rest)
@@ -31,15 +37,35 @@ def sparsity(model: BarsHinges) -> Sparsity:
     for nodes in (model.bars, model.hinges):
         wide = nodes.astype(np.int64)
         keys.append((wide[:, :, None] * n + wide[:, None, :]).ravel())
-    found, inverse = np.unique(np.concatenate(keys), return_inverse=True)
+    blocks, inverse = np.unique(np.concatenate(keys), return_inverse=True)
     nb = len(model.bars)
     slots = inverse[n:]
     return Sparsity(
-        np.searchsorted(found // n, np.arange(n + 1)).astype(np.int32),
-        (found % n).astype(np.int32),
+        np.searchsorted(blocks // n, np.arange(n + 1)).astype(np.int32),
+        (blocks % n).astype(np.int32),
         np.ascontiguousarray(slots[: 4 * nb].reshape(-1, 2, 2)),
         np.ascontiguousarray(slots[4 * nb :].reshape(-1, 4, 4)),
     )
+
+
+@scalar
+def add_to_bar(data, slots, e, p, q, value):
+    """Add an entry (p, q) to the blocks of both ends of a bar, and its negative between them."""
+    data[slots[e, 0, 0], p, q] += value
+    data[slots[e, 1, 1], p, q] += value
+    data[slots[e, 0, 1], p, q] -= value
+    data[slots[e, 1, 0], p, q] -= value
+
+
+@scalar
+def add_to_hinge(data, slots, e, block, slope, turning, turned):
+    """Add `block` (4, 3, 4, 3) and slope times two gradients (4, 3) to the blocks of a hinge."""
+    for v in range(4):
+        for w in range(4):
+            slot = slots[e, v, w]
+            for a in range(3):
+                for b in range(3):
+                    data[slot, a, b] += block[v, a, w, b] + slope * turning[v, a] * turned[w, b]
 
 
 @kernel
@@ -62,10 +88,7 @@ def _add_bars(model, u, slots, data):
                     value = along * d[p] * d[q]
                     if p == q:
                         value += axial
-                    data[slots[e, 0, 0], p, q] += value
-                    data[slots[e, 1, 1], p, q] += value
-                    data[slots[e, 0, 1], p, q] -= value
-                    data[slots[e, 1, 0], p, q] -= value
+                    add_to_bar(data, slots, e, p, q, value)
 
 
 @kernel
@@ -81,10 +104,10 @@ def _add_hinges(model, u, slots, data, floor):
             for v in range(4):
                 for c in range(3):
                     points[v, c] = model.rest[model.hinges[e, v], c] + u[model.hinges[e, v], c]
-            found = hinge_dihedral(model, u, e)
+            dihedral = hinge_dihedral(model, u, e)
             for c in range(12):
-                flat[c] = found[1 + c]
-            theta, rest, k = found[0], model.hinge_rest[e], model.hinge_stiffness[e]
+                flat[c] = dihedral[1 + c]
+            theta, rest, k = dihedral[0], model.hinge_rest[e], model.hinge_stiffness[e]
             moment = k * hinge_moment(
                 code, theta, rest, p[e, 0], p[e, 1], p[e, 2], p[e, 3], moment_at
             )
@@ -92,14 +115,7 @@ def _add_hinges(model, u, slots, data, floor):
             slope = k * max(slope, floor)
             block[:] = 0.0
             add_hessian(points, gradient, moment, block)
-            for v in range(4):
-                for w in range(4):
-                    slot = slots[e, v, w]
-                    for a in range(3):
-                        for b in range(3):
-                            data[slot, a, b] += (
-                                block[v, a, w, b] + slope * gradient[v, a] * gradient[w, b]
-                            )
+            add_to_hinge(data, slots, e, block, slope, gradient, gradient)
 
 
 def tangent(

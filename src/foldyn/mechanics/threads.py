@@ -17,13 +17,11 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import config, types
-from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
+from numba import config
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.intrinsics import call0, fetch_add, look
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
 
@@ -107,48 +105,6 @@ def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tup
     return results
 
 
-def _place(context, builder, kind, array, index):
-    return builder.gep(make_array(kind)(context, builder, array).data, [index])
-
-
-@intrinsic
-def _fetch_add(typing_context, array, index, value):
-    """array[index] += value in one piece; returns what was there before."""
-
-    def codegen(context, builder, signature, arguments):
-        place = _place(context, builder, array, *arguments[:2])
-        return builder.atomic_rmw("add", place, arguments[2], "acq_rel")
-
-    return types.int64(array, types.int64, types.int64), codegen
-
-
-@intrinsic
-def _look(typing_context, array, index):
-    """array[index] as other threads have left it; what they wrote before is then seen too."""
-
-    def codegen(context, builder, signature, arguments):
-        return builder.load_atomic(_place(context, builder, array, *arguments), "acquire", 8)
-
-    return types.int64(array, types.int64), codegen
-
-
-@intrinsic
-def _call(typing_context, address):
-    """Call the function int32() at `address`."""
-
-    def codegen(context, builder, signature, arguments):
-        kind = ir.FunctionType(ir.IntType(32), [])
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [])
-
-    return types.int32(types.int64), codegen
-
-
-# called with one argument less than written: Numba adds the typing context
-fetch_add: Any = _fetch_add
-look: Any = _look
-call: Any = _call
-
-
 @kernel
 def _wait(team):
     """Count the round's arrivals; the last one starts the next round."""
@@ -161,7 +117,7 @@ def _wait(team):
     while look(team.state, ROUND) == now and look(team.state, BROKEN) == 0:
         spins += 1
         if spins > SPINS:
-            call(team.pause)
+            call0(team.pause)
 
 
 @scalar

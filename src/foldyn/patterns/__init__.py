@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from foldyn.patterns.eggbox import eggbox
-from foldyn.patterns.kresling import kresling
-from foldyn.patterns.miura import miura
+from foldyn.patterns.generators import eggbox, kresling, miura, simple_fold
 from foldyn.patterns.pattern import Pattern
-from foldyn.patterns.simple_fold import simple_fold
 
 GENERATORS: dict[str, Callable[..., Pattern]] = {
-    "simple_fold": simple_fold,
-    "miura": miura,
-    "eggbox": eggbox,
-    "kresling": kresling,
+    generator.__name__: generator for generator in (simple_fold, miura, eggbox, kresling)
 }
 """Generators by the name that case files use (`[pattern] kind`)."""
 

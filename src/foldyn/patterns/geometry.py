@@ -1,4 +1,11 @@
-"""Geometry of faces: areas, normals, planarity and dihedrals."""
+"""Geometry of faces: areas, normals and planarity, dihedrals, and seams between faces.
+
+A seam is two boundary edges in one place that are not joined, where a crease was probably meant. A
+crease is an edge of two panels, named by the same two vertices; two vertices in the same place are
+still two, so panels that meet there only look joined. A cut is such a place on purpose, marked by
+a letter. Panels that lie upon each other at the edges, as in a flat-folded state, are layers and
+no seam.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from foldyn.errors import InputError
-from foldyn.patterns.topology import Faces
+from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
 
 # Area over squared diameter (and edge length over diameter) below which a face has collapsed:
 # far above rounding (1e-16), far below any panel that can be made.
 _DEGENERATE = 1e-10
+SAME_PLACE = 1e-9  # of the pattern's size
+LAYERS = 1e-6  # rad: panels that leave their edges at less than that lie upon each other
 
 
 class FaceGeometry(NamedTuple):
@@ -20,20 +32,20 @@ class FaceGeometry(NamedTuple):
 
     Attributes
     ----------
-    areas : ndarray, shape (m,)
+    face_areas : ndarray, shape (m,)
         Area (m2): of a face that is not flat, of its projection along the normal.
-    normals : ndarray, shape (m, 3)
+    face_normals : ndarray, shape (m, 3)
         Unit normals towards the front (Newell's, so any polygon has one).
-    planarity : ndarray, shape (m,)
+    face_planarity : ndarray, shape (m,)
         Largest distance of a corner from the mean plane, over the face's diameter.
     """
 
-    areas: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    planarity: NDArray[np.float64]
+    face_areas: NDArray[np.float64]
+    face_normals: NDArray[np.float64]
+    face_planarity: NDArray[np.float64]
 
 
-def face_geometry(vertices: NDArray[np.float64], faces: Faces) -> FaceGeometry:
+def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
     """Areas, normals and planarity of faces.
 
     Parameters
@@ -76,44 +88,38 @@ def face_geometry(vertices: NDArray[np.float64], faces: Faces) -> FaceGeometry:
         height = np.einsum("fvc,fc->fv", corners, normals[which])
         planarity[which] = np.abs(height).max(axis=1)
         crossed[which] = _crosses_itself(corners, normals[which], diameter[which])
-    bad = np.flatnonzero(~(shortest > _DEGENERATE * diameter))
-    if len(bad):
-        f = int(bad[0])
-        raise InputError(
-            f"faces[{f}] = {list(faces[f])}: two of its corners lie in the same place "
-            f"({shortest[f]:.3g} m apart in a face of {diameter[f]:.3g} m); merge them into one "
-            "vertex or move one."
-        )
-    bad = np.flatnonzero(~(areas > _DEGENERATE * diameter**2))
-    if len(bad):
-        f = int(bad[0])
-        raise InputError(
-            f"faces[{f}] = {list(faces[f])}: has no area ({areas[f]:.3g} m2 in a face of "
-            f"{diameter[f]:.3g} m): its corners lie on a line or are not listed in order around "
-            "it; reorder them or leave the face out."
-        )
-    bad = np.flatnonzero(crossed)
-    if len(bad):
-        f = int(bad[0])
-        raise InputError(
-            f"faces[{f}] = {list(faces[f])}: its outline crosses itself; list its corners in order "
-            "around it."
-        )
+    for bad, text in (
+        (
+            ~(shortest > _DEGENERATE * diameter),
+            lambda f: (
+                f"two of its corners lie in the same place ({shortest[f]:.3g} m apart in a "
+                f"face of {diameter[f]:.3g} m); merge them into one vertex or move one."
+            ),
+        ),
+        (
+            ~(areas > _DEGENERATE * diameter**2),
+            lambda f: (
+                f"has no area ({areas[f]:.3g} m2 in a face of {diameter[f]:.3g} m): its "
+                "corners lie on a line or are not listed in order around it; reorder them or leave "
+                "the face out."
+            ),
+        ),
+        (crossed, lambda f: "its outline crosses itself; list its corners in order around it."),
+    ):
+        if bad.any():
+            f = int(bad.argmax())
+            raise InputError(f"faces[{f}] = {list(faces[f])}: {text(f)}")
     return FaceGeometry(areas, normals, planarity / diameter)
 
 
-def _crosses_itself(
-    corners: NDArray[np.float64], normals: NDArray[np.float64], diameter: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> NDArray:
     """Whether two edges of a face, seen along its normal, cross (touching does not count)."""
     size = corners.shape[1]
     after = np.roll(corners, -1, axis=1)
     least = _DEGENERATE * diameter[:, None] ** 2
     result = np.zeros(len(corners), dtype=bool)
 
-    def side(
-        a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-    ) -> NDArray[np.int8]:
+    def side(a: NDArray, b: NDArray, c: NDArray) -> NDArray:
         turn = np.einsum("fvc,fc->fv", np.cross(b - a, c - a), normals)
         return np.where(np.abs(turn) > least, np.sign(turn), 0).astype(np.int8)
 
@@ -126,11 +132,8 @@ def _crosses_itself(
 
 
 def crease_dihedrals(
-    vertices: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    creases: NDArray[np.int64],
-    crease_faces: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    vertices: NDArray, normals: NDArray, creases: NDArray, crease_faces: NDArray
+) -> tuple[NDArray, NDArray]:
     """Dihedral of each crease, by `atan2` of the two normals about the crease.
 
     Parameters
@@ -161,3 +164,62 @@ def crease_dihedrals(
     closed = (np.abs(sine) < 1e-12 * np.abs(cosine)) & (cosine < 0)
     dihedral = np.where(closed, 0.0, np.pi + np.arctan2(sine, cosine))
     return dihedral, closed
+
+
+def seams(
+    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray
+) -> list[tuple[Edge, Edge]]:
+    """Pairs of boundary edges whose ends lie in the same places and whose panels do not.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m).
+    faces : tuple of tuple of int
+        Consistently wound.
+    normals : ndarray, shape (m, 3)
+        Unit normals of the faces.
+    boundary : ndarray of int, shape (nb, 2)
+        Edges of one face.
+    """
+    place = _places(vertices, boundary)
+    ends = np.sort(place[boundary], axis=1)
+    _, group, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    doubled = np.flatnonzero(count[group.ravel()] > 1)
+    if not len(doubled):
+        return []
+    inward = _inward(vertices, faces, normals, boundary, doubled)
+    pairs: list[tuple[Edge, Edge]] = []
+    first: dict[int, int] = {}
+    for k in doubled.tolist():
+        other = first.setdefault(int(group.ravel()[k]), k)
+        if np.linalg.norm(inward[k] - inward[other]) > LAYERS:
+            pairs.append((edge_of(*boundary[other].tolist()), edge_of(*boundary[k].tolist())))
+    return pairs
+
+
+def _places(vertices: NDArray, boundary: NDArray) -> NDArray:
+    """Number of the place of each vertex (n,), the same for those of the boundary that coincide."""
+    rim = np.unique(boundary)
+    points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    pairs = cKDTree(points).query_pairs(SAME_PLACE * size, output_type="ndarray")
+    near = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
+    places = np.arange(len(vertices)) + len(points)
+    places[rim] = connected_components(near, directed=False)[1][where.ravel()]
+    return places
+
+
+def _inward(
+    vertices: NDArray, faces: Faces, normals: NDArray, boundary: NDArray, chosen: NDArray
+) -> dict[int, NDArray]:
+    """Unit vectors from the chosen boundary edges into their panels, across the edge."""
+    row = edge_lookup(boundary[chosen])
+    unit = {}
+    for number, face in enumerate(faces):
+        for a, b in around(face):
+            k = row.get(edge_of(a, b))
+            if k is not None:
+                inward = np.cross(normals[number], vertices[b] - vertices[a])
+                unit[int(chosen[k])] = inward / np.linalg.norm(inward)
+    return unit

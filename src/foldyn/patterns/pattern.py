@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.patterns.geometry import crease_dihedrals, face_geometry
-from foldyn.patterns.seams import Edge, seams
-from foldyn.patterns.topology import build_topology, checked_faces, edge_lookup
+from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
+from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup, edge_of
 from foldyn.values import LONGEST, SHORTEST
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
@@ -110,29 +109,21 @@ class Pattern:
         points = _checked_vertices(vertices)
         topology = build_topology(checked_faces(faces, len(points)), len(points))
         geometry = face_geometry(points, topology.faces)
+        normals = geometry.face_normals
         dihedrals, closed = crease_dihedrals(
-            points, geometry.normals, topology.creases, topology.crease_faces
+            points, normals, topology.creases, topology.crease_faces
         )
         given, open_edges = _given_letters(assignments, topology.creases, topology.boundary)
         dihedrals[closed & (given == "M")] = 2 * np.pi
         _warn_of_contradictions(given, topology.creases, dihedrals)
-        _warn_of_seams(
-            seams(points, topology.faces, geometry.normals, topology.boundary), open_edges
-        )
+        _warn_of_seams(seams(points, topology.faces, normals, topology.boundary), open_edges)
         values: dict[str, Any] = {
+            **topology._asdict(),
+            **geometry._asdict(),
             "vertices": points,
-            "faces": topology.faces,
             "assignments": tuple(np.where(given == "", _letters(dihedrals), given).tolist()),
             "name": name,
-            "flipped": topology.flipped,
-            "edges": topology.edges,
-            "creases": topology.creases,
-            "boundary": topology.boundary,
-            "crease_faces": topology.crease_faces,
             "dihedrals": dihedrals,
-            "face_areas": geometry.areas,
-            "face_normals": geometry.normals,
-            "face_planarity": geometry.planarity,
             "size": float(np.linalg.norm(np.ptp(points, axis=0))),
         }
         for key, value in values.items():
@@ -164,17 +155,13 @@ def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
             f"vertices has shape {points.shape}: give at least 3 rows of 3 coordinates each "
             "(or 2, for z = 0)."
         )
-    if not np.isfinite(points).all():
-        v = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError(
-            f"vertices[{v}] = {points[v].tolist()}: coordinates must be finite numbers."
-        )
-    far = np.abs(points.astype(np.float64)).max(axis=1)
-    if far.max() > LONGEST:
-        v = int(far.argmax())
-        raise InputError(
-            f"vertices[{v}] = {points[v].tolist()}: coordinates must be at most {LONGEST:g} m."
-        )
+    for usable, what in (
+        (np.isfinite(points), "finite numbers"),
+        (np.abs(points.astype(np.float64)) <= LONGEST, f"at most {LONGEST:g} m"),
+    ):
+        if not usable.all():
+            v = int(np.flatnonzero(~usable.all(axis=1))[0])
+            raise InputError(f"vertices[{v}] = {points[v].tolist()}: coordinates must be {what}.")
     result = np.zeros((len(points), 3))
     result[:, : points.shape[1]] = points
     size = float(np.ptp(result, axis=0).max())
@@ -200,7 +187,7 @@ def _given_letters(
         return given, boundary_edges
     if isinstance(assignments, Mapping):
         row, rim = edge_lookup(creases), edge_lookup(boundary)
-        before: dict[tuple[int, int], Any] = {}
+        before: dict[Edge, Any] = {}
         for key, letter in assignments.items():
             pair = _vertex_pair(key)
             if before.setdefault(pair, letter) != letter:
@@ -238,7 +225,7 @@ def _given_letters(
     return given, boundary_edges
 
 
-def _vertex_pair(key: Any) -> tuple[int, int]:
+def _vertex_pair(key: Any) -> Edge:
     try:
         if isinstance(key, str):
             raise TypeError
@@ -247,10 +234,10 @@ def _vertex_pair(key: Any) -> tuple[int, int]:
         raise InputError(
             f"assignments: key {key!r} is not a pair of vertex numbers; write {{(0, 1): 'M'}}."
         ) from None
-    return (a, b) if a < b else (b, a)
+    return edge_of(a, b)
 
 
-def _checked_letter(letter: Any, pair: tuple[int, int]) -> str:
+def _checked_letter(letter: Any, pair: Edge) -> str:
     if letter in _LETTERS:
         return str(letter)
     remedy = 'give "M", "V", "F" or "U"'
@@ -267,9 +254,7 @@ def _checked_letter(letter: Any, pair: tuple[int, int]) -> str:
     raise InputError(f"assignments: edge {pair} is {letter!r}; {remedy}.")
 
 
-def _warn_of_contradictions(
-    given: NDArray[np.str_], creases: NDArray[np.int64], dihedrals: NDArray[np.float64]
-) -> None:
+def _warn_of_contradictions(given: NDArray, creases: NDArray, dihedrals: NDArray) -> None:
     wrong = np.flatnonzero(
         ((given == "M") & (dihedrals < np.pi - _CONTRADICTION))
         | ((given == "V") & (dihedrals > np.pi + _CONTRADICTION))
@@ -287,15 +272,15 @@ def _warn_of_contradictions(
         )
 
 
-def _warn_of_seams(found: list[tuple[Edge, Edge]], open_edges: set[Edge]) -> None:
-    doubtful = [pair for pair in found if not open_edges.intersection(pair)]
+def _warn_of_seams(pairs: list[tuple[Edge, Edge]], open_edges: set[Edge]) -> None:
+    doubtful = [pair for pair in pairs if not open_edges.intersection(pair)]
     if doubtful:
         one, other = doubtful[0]
         more = f" (and {len(doubtful) - 1} more such pairs)" if len(doubtful) > 1 else ""
         warnings.warn(
             f"vertices: the boundary edges {one} and {other}{more} lie in the same place but are "
             "not joined, so that the panels part there: for a crease give both panels the same "
-            f'vertices; a cut is told by assignments = {{{one}: "B"}}, or "C" in a FOLD file.',
+            f'vertices; for a cut give assignments = {{{one}: "B"}}, or "C" in a FOLD file.',
             FoldynWarning,
             stacklevel=3,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 
 Faces = tuple[tuple[int, ...], ...]
+Edge = tuple[int, int]
 
 
 class Topology(NamedTuple):
-    """How the faces of a pattern hang together.
+    """How the faces of a pattern are connected.
 
     Attributes
     ----------
@@ -80,9 +81,8 @@ def checked_faces(faces: Any, n_vertices: int) -> Faces:
 def _checked_face(f: int, face: Any, n_vertices: int) -> tuple[int, ...]:
     if isinstance(face, (str, bytes)) or not isinstance(face, Iterable):
         raise InputError(f"faces[{f}] = {face!r}: give a sequence of vertex numbers.")
-    corners = list(face)
     numbers: list[int] = []
-    for v in corners:
+    for v in face:
         try:
             if isinstance(v, (bool, np.bool_)):
                 raise TypeError
@@ -170,12 +170,7 @@ def build_topology(faces: Faces, n_vertices: int) -> Topology:
     return Topology(wound, flipped, edges, creases, edges[count == 1], crease_faces)
 
 
-def _reversals(
-    n_faces: int,
-    pairs: NDArray[np.int64],
-    clash: NDArray[np.bool_],
-    creases: NDArray[np.int64],
-) -> NDArray[np.bool_]:
+def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -> NDArray:
     """Which faces to reverse so that no two run along a crease in the same direction."""
     reverse = np.zeros(n_faces, dtype=bool)
     if not clash.any():
@@ -208,6 +203,16 @@ def _reversals(
     return reverse
 
 
-def edge_lookup(edges: Sequence[Sequence[int]] | NDArray[np.int64]) -> dict[tuple[int, int], int]:
+def edge_lookup(edges: NDArray) -> dict[Edge, int]:
     """Row number of each (low, high) vertex pair."""
-    return {(int(a), int(b)): k for k, (a, b) in enumerate(edges)}
+    return {(a, b): k for k, (a, b) in enumerate(edges.tolist())}
+
+
+def edge_of(a: int, b: int) -> Edge:
+    """Vertex pair (low, high) of an edge."""
+    return (a, b) if a < b else (b, a)
+
+
+def around(face: Sequence[int]) -> Iterator[Edge]:
+    """Pairs of neighboring corners around a face, in its order."""
+    return zip(face, (*face[1:], face[0]), strict=True)

@@ -1,28 +1,30 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
-from foldyn.plots.animation import animate as animate
-from foldyn.plots.energies import plot_energies as plot_energies
+from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
+from foldyn.plots.energies import (
+    energy_shares as energy_shares,
+    plot_energies as plot_energies,
+    plot_path_energies as plot_path_energies,
+)
 from foldyn.plots.frf import plot_frf as plot_frf
 from foldyn.plots.history import plot_history as plot_history
 from foldyn.plots.laws import plot_laws as plot_laws
 from foldyn.plots.loads import plot_load_history as plot_load_history
-from foldyn.plots.mac import plot_mac as plot_mac
-from foldyn.plots.mode_film import animate_modes as animate_modes
-from foldyn.plots.modes import draw_modes as draw_modes
+from foldyn.plots.modes import draw_modes as draw_modes, plot_mac as plot_mac
 from foldyn.plots.nyquist import plot_nyquist as plot_nyquist
-from foldyn.plots.overlay import draw_overlay as draw_overlay
 from foldyn.plots.path import (
+    chosen_points as chosen_points,
+    draw_shapes as draw_shapes,
     moved_supports as moved_supports,
     plot_load_displacement as plot_load_displacement,
     plot_reaction as plot_reaction,
     total_reaction as total_reaction,
 )
-from foldyn.plots.path_energies import (
-    energy_shares as energy_shares,
-    plot_path_energies as plot_path_energies,
-)
-from foldyn.plots.shapes import chosen_points as chosen_points, draw_shapes as draw_shapes
 from foldyn.plots.structure import draw_structure as draw_structure
-from foldyn.plots.tracks import plot_steps as plot_steps, plot_tracks as plot_tracks
+from foldyn.plots.tracks import (
+    draw_overlay as draw_overlay,
+    plot_steps as plot_steps,
+    plot_tracks as plot_tracks,
+)
 
 ANIMATIONS: tuple[str, ...]

@@ -1,8 +1,8 @@
-"""What figures read from a path: how far it has come, where it is stable, what nodes do."""
+"""What figures read from results: nodes and their directions, and the course of a path."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,25 +12,66 @@ from numpy.typing import NDArray
 
 from foldyn.cases.supports import signed
 from foldyn.errors import InputError
-from foldyn.plots.chosen import AXES, check_nodes_of
+from foldyn.values import choice
 
-CRITICAL = ("limit", "bifurcation")
-"""Kinds of points that figures mark."""
+AXES = ("x", "y", "z")
+CRITICAL = {"limit": "limit point", "bifurcation": "bifurcation"}
+"""Kinds of points that figures mark, and their names."""
 
 
-class Run(NamedTuple):
-    """Points from `start` to `stop` (inclusive) of a path that are alike in stability."""
+def check_nodes_of(results: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> list[int]:
+    """The nodes as a list, refused where a result does not have one."""
+    numbers = [int(node) for node in nodes]
+    if not numbers:
+        raise InputError("nodes: empty; name at least one node to show")
+    for label, result in results.items():
+        stored = result["node"].values
+        for node in numbers:
+            if node not in stored:
+                raise InputError(
+                    f"nodes: {node} is not in {label!r}, whose nodes are "
+                    f"{stored.min()}..{stored.max()}"
+                )
+    return numbers
 
-    start: int
-    stop: int
-    stable: bool
+
+def directions(
+    axes: str | Sequence[str] | None,
+    count: int,
+    moved: Iterable[NDArray],
+    known: Sequence[str] = AXES,
+) -> list[str]:
+    """One direction for each node, by default the one in which it moves most.
+
+    Parameters
+    ----------
+    axes : str, sequence of str, or None
+        As the user gives them.
+    count : int
+        Number of nodes.
+    moved : iterable of ndarray, shape (samples, count, 3)
+        What is shown of each result; looked at only where no axes are given.
+    """
+    if axes is None:
+        largest = np.max([np.abs(values).max(axis=0) for values in moved], axis=0)
+        return [AXES[k] for k in largest.argmax(axis=1)]
+    chosen = [axes] if isinstance(axes, str) else list(axes)
+    for direction in chosen:
+        choice("axes", direction, known)
+    if len(chosen) == 1:
+        return chosen * count
+    if len(chosen) != count:
+        raise InputError(
+            f"axes: {len(chosen)} directions for {count} nodes; give one, or one per node"
+        )
+    return chosen
 
 
 def check_path(path: xr.Dataset, name: str) -> None:
     """Refuse what is not a path, or one with NaN."""
     missing = [key for key in ("displacement", "load_factor", "point") if key not in path]
     if missing or "step" not in path.sizes:
-        raise InputError(f"{name}: is no path (it has no {missing or ['step']}); give one of trace")
+        raise InputError(f"{name}: is not a path of fd.trace; it has no {missing or ['step']}")
     if not np.isfinite(path["displacement"].values).all():
         raise InputError(f"{name}: its displacement contains NaN or infinity")
 
@@ -43,9 +84,14 @@ def check_paths(paths: Mapping[str, xr.Dataset]) -> None:
         check_path(path, f"paths[{label!r}]")
 
 
+def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.float64]:
+    """Displacements (m) of all nodes at each point or time, shape (m, n, 3)."""
+    return result["displacement"].transpose(dimension, "node", "axis").values
+
+
 def way(path: xr.Dataset) -> NDArray[np.float64]:
     """How far the nodes have moved along the path, on average, at each point (m), never falling."""
-    motion = np.diff(path["displacement"].transpose("step", "node", "axis").values, axis=0)
+    motion = np.diff(displacements(path), axis=0)
     steps = np.sqrt((motion**2).sum(axis=2).mean(axis=1))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -57,7 +103,15 @@ def evenly(path: xr.Dataset, count: int) -> list[int]:
     return np.unique(np.abs(length[:, None] - wanted).argmin(axis=0)).tolist()
 
 
-def runs(path: xr.Dataset) -> list[Run]:
+class Stretch(NamedTuple):
+    """Points from `start` to `stop` (inclusive) of a path, all stable or all unstable."""
+
+    start: int
+    stop: int
+    stable: bool
+
+
+def stretches(path: xr.Dataset) -> list[Stretch]:
     """Stretches of the path that are stable or not.
 
     A stretch between two points is unstable where the tangent has a negative eigenvalue at either
@@ -68,7 +122,9 @@ def runs(path: xr.Dataset) -> list[Run]:
     stable = np.maximum(negative[:-1], negative[1:]) <= 0
     bounds = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), len(stable)]
     return [
-        Run(start, stop, bool(stable[start])) for start, stop in pairwise(bounds) if start < stop
+        Stretch(start, stop, bool(stable[start]))
+        for start, stop in pairwise(bounds)
+        if start < stop
     ]
 
 
@@ -79,21 +135,29 @@ def along(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.
     return sign * moved.mean("node").values + 0.0  # no -0
 
 
+def farthest(moved: NDArray[np.float64]) -> tuple[float, str]:
+    """The largest component of displacements (..., 3), and its direction."""
+    place = np.unravel_index(np.abs(moved).argmax(), moved.shape)
+    extreme = float(moved[place])
+    return extreme, ("-" if extreme < 0.0 else "") + AXES[place[-1]]
+
+
 def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str:
     """The direction in which nodes move farthest."""
-    best, found = -1.0, "x"
-    for path in paths.values():
-        moved = path["displacement"].sel(node=list(nodes)).transpose("step", "node", "axis").values
-        _, _, axis = np.unravel_index(np.abs(moved).argmax(), moved.shape)
-        extreme = moved[..., axis].ravel()[np.abs(moved[..., axis]).argmax()]
-        if abs(extreme) > best:
-            best, found = abs(extreme), ("-" if extreme < 0.0 else "") + AXES[axis]
-    return found
+    moved = [displacements(path[["displacement"]].sel(node=list(nodes))) for path in paths.values()]
+    return farthest(np.concatenate(moved))[1]
 
 
 def asked(
     paths: Mapping[str, xr.Dataset], nodes: Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
-    """Nodes that all paths have, and the direction, by default that in which they move farthest."""
+    """Nodes that all paths have, and the direction, by default that in which they move farthest.
+
+    Raises
+    ------
+    InputError
+        Not a mapping of label to path, no node, or one that a path does not have.
+    """
+    check_paths(paths)
     numbers = check_nodes_of(paths, nodes)
     return numbers, main_direction(paths, numbers) if direction is None else direction

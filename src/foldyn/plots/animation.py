@@ -1,30 +1,29 @@
-"""Animation of a motion or a path, as a GIF or an MP4."""
+"""Animations of motions, paths and modes, as a GIF or an MP4."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
-from foldyn.plots.along import check_path, runs, way
-from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys
-from foldyn.plots.writers import WRITERS, filmed, find_ffmpeg
+from foldyn.plots.along import check_path, displacements, stretches, way
+from foldyn.plots.modes import ShownModes
+from foldyn.plots.scene import Points, Sheet3D, View
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
+from foldyn.plots.writers import checked_file, filmed
 from foldyn.structures import Structure
 
-DPI = {".gif": 100, ".mp4": 200}
-"""Dots per inch of an animation by the end of the file's name."""
-_FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs of shorter frames
 _TRAVELS = 0.25  # path of the center of mass, in sizes of the sheet, that is worth a line
+_WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot be scrolled on a phone
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
 
@@ -41,9 +40,9 @@ def animate(
     """Write a GIF or an MP4 of the moving sheet, the sheet at rest behind it in gray.
 
     The frame stands still and holds the whole motion, at equal scale along all axes; where a free
-    body travels, a line shows the path of its center of mass. Every picture of a motion tells the
-    simulated time and how much slower or faster than in reality it passes, every picture of an
-    equilibrium path its load factor and whether it is unstable there.
+    body travels, a line shows the path of its center of mass. Pictures of a motion show the
+    simulated time and how much slower or faster than reality it runs; those of an equilibrium
+    path show its load factor and whether it is unstable there.
 
     Parameters
     ----------
@@ -80,38 +79,29 @@ def animate(
     ComputationError
         ffmpeg could not write the file.
     """
-    path = Path(path)
-    kind = checked_kind(path, frames, fps)
+    path = checked_file(path, frames, fps)
     sheet = Sheet3D.of(case_or_structure)
     places, displacement = frame_displacements(sheet, result, frames)
     moving = sheet.nodes + scale * displacement
 
     sight = View(*view)
     extent = np.vstack([sheet.nodes, moving.reshape(-1, 3)])
-    keys = edge_keys(sheet, actuated=sheet.glows)
+    keys = edge_keys(sheet, actuated=sheet.highlights)
     traveled = _center_path(sheet, moving)
     if traveled is not None:
-        keys.append(Line2D([], [], **_PATH, marker="o", markersize=4.0, label="center of mass"))
-    figure, axes = scene.view_figure(
-        extent, sight, title or " ", legend_rows=-(-len(keys) // 3), width=6.0
-    )
+        keys.append(style.key("center of mass", **_PATH, marker="o", markersize=4.0))
+    legend_rows = -(-len(keys) // 3)
+    figure, axes = scene.view_figure(extent, sight, title or " ", legend_rows, _WIDTH)
     add_undeformed(axes, sheet)
-    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.glows)
+    drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.highlights)
     dots = [] if traveled is None else [(_draw_path(axes, traveled), traveled)]
-    style.legend_below(figure, keys)
-    clock = figure.text(
-        0.02,
-        1.0 - (0.34 if title else 0.12) / figure.get_figheight(),
-        "",
-        fontsize=style.LABEL,
-        color=style.BLACK,
-        va="top",
-    )
-    style.finish(figure)
-    writer = WRITERS[kind](fps=fps)
-    moments = _times(places, writer.rate) if "time" in result.sizes else _factors(places, result)
+    top = 1.0 - (0.34 if title else 0.12) / figure.get_figheight()
+    clock = figure.text(0.02, top, "", va="top", **style.TEXT)
+    style.finish(figure, keys)
     note = f", displacement times {scale:g}" if scale != 1.0 else ""
-    with filmed(writer, figure, path, DPI[kind]):
+    with filmed(figure, path, fps) as writer:
+        moving_in_time = "time" in result.sizes
+        moments = _times(places, writer.rate) if moving_in_time else _factors(places, result)
         for index, (moment, points) in enumerate(zip(moments, moving, strict=True)):
             drawn.move(points)
             for dot, course in dots:
@@ -121,33 +111,17 @@ def animate(
     return path
 
 
-def checked_kind(path: Path, frames: int, fps: int) -> str:
-    """Return the end of the file's name, when all that an animation needs is there."""
-    kind = path.suffix.lower()
-    if kind not in WRITERS:
-        raise InputError(f"path: {path.name!r}; an animation is written as {' or '.join(WRITERS)}")
-    if not path.parent.is_dir():
-        raise InputError(f"path: there is no directory {path.parent}; make it first")
-    if not 1 <= fps <= _FASTEST[kind]:
-        raise InputError(f"fps: {fps!r}; give 1 to {_FASTEST[kind]} pictures per second")
-    if frames < 2:
-        raise InputError(f"frames: {frames!r}; an animation has at least two pictures")
-    if kind == ".mp4":
-        find_ffmpeg()
-    return kind
-
-
 def _times(times: NDArray[np.float64], rate: float) -> list[str]:
-    """Return what pictures of a motion tell: the time, and how fast it passes."""
+    """Texts for pictures of a motion: the time, and how fast it runs."""
     digits, shown = _digits(times), pace(rate * float(times[1] - times[0]))
     return [f"t = {time:.{digits}f} s, {shown}" for time in times]
 
 
 def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
-    """Return what pictures of a path tell: the load factor, and whether it is unstable there."""
+    """Texts for pictures of a path: the load factor, and whether it is unstable there."""
     length = way(path)
     factors = np.interp(places, length, path["load_factor"].values)
-    unstable = [(length[run.start], length[run.stop]) for run in runs(path) if not run.stable]
+    unstable = [(length[a], length[b]) for a, b, stable in stretches(path) if not stable]
     digits = _digits(factors)
     return [
         f"load factor {factor:.{digits}f}"
@@ -157,20 +131,20 @@ def _factors(places: NDArray[np.float64], path: xr.Dataset) -> list[str]:
 
 
 def _digits(values: NDArray[np.float64]) -> int:
-    """As many digits as tell two pictures apart: equal pictures would be stored as one."""
+    """Digits with which texts differ from each other: equal pictures would be stored as one."""
     step = float(np.ptp(values)) / (len(values) - 1)
     return max(0, int(np.ceil(-np.log10(step)))) if step > 0.0 else 3
 
 
 def pace(seconds: float) -> str:
-    """Say how fast an animation plays that shows so many seconds of the motion in a second."""
+    """Say how fast an animation plays that shows this many seconds of motion in a second."""
     times = float(f"{max(seconds, 1.0 / seconds):.2g}")
     if times == 1.0:
         return "shown at real speed"
     return f"shown {times:g} times {'faster' if seconds > 1.0 else 'slower'}"
 
 
-def _center_path(sheet: Sheet3D, moving: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _center_path(sheet: Sheet3D, moving: Points) -> Points | None:
     """Return the positions (frames, 3) of a free body's center of mass, None where it stays."""
     if sheet.case is None or np.asarray(sheet.case.fixed).any():
         return None
@@ -179,7 +153,7 @@ def _center_path(sheet: Sheet3D, moving: NDArray[np.float64]) -> NDArray[np.floa
     return path if np.linalg.norm(np.ptp(path, axis=0)) > _TRAVELS * sheet.size else None
 
 
-def _draw_path(axes: Axes3D, path: NDArray[np.float64]) -> Any:
+def _draw_path(axes: Axes3D, path: Points) -> Any:
     """Draw the path of the center of mass, and return the dot that moves on it."""
     axes.plot(*path.T, **_PATH, zorder=0.7)
     (dot,) = axes.plot(*path[:1].T, "o", color=style.GREEN, markersize=4.0, zorder=9.0)
@@ -188,7 +162,7 @@ def _draw_path(axes: Axes3D, path: NDArray[np.float64]) -> Any:
 
 def frame_displacements(
     sheet: Sheet3D, result: xr.Dataset, frames: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], Points]:
     """Return evenly spaced times, or places on the way of a path, and displacements (frames, n, 3).
 
     The way of a path is that of `plots.along`, so that shapes change evenly from picture to
@@ -199,12 +173,12 @@ def frame_displacements(
     elif "time" not in result.sizes:
         raise InputError("result: has neither times nor steps; give a motion or a path")
     dimension = "time" if "time" in result.sizes else "step"
-    motion = result["displacement"].transpose(dimension, "node", "axis").values
+    motion = displacements(result, dimension)
     sheet.check_nodes("result: it has", motion)
     if len(motion) < 2:
-        raise InputError("result: a single sample does not move; store more of them")
+        raise InputError("result: a single sample has no motion; store more of them")
     if not np.isfinite(motion).all():
-        raise InputError("result: its displacement contains NaN or infinity; cut it before")
+        raise InputError("result: its displacement contains NaN or infinity; cut that off")
     stored = result["time"].values.astype(np.float64) if dimension == "time" else way(result)
     places = np.linspace(stored[0], stored[-1], frames)
     after = np.clip(np.searchsorted(stored, places), 1, len(stored) - 1)
@@ -212,3 +186,65 @@ def frame_displacements(
     part = (places - stored[after - 1]) / np.where(gap > 0.0, gap, 1.0)
     part = part[:, None, None]
     return places, (1.0 - part) * motion[after - 1] + part * motion[after]
+
+
+def animate_modes(
+    case_or_structure: Case | Structure,
+    modes: xr.Dataset,
+    path: str | PathLike[str],
+    which: Sequence[int] | None = None,
+    amplitude: float | None = None,
+    names: Mapping[int, str] | xr.Dataset | None = None,
+    frames: int = 40,
+    fps: int = 20,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Path:
+    """Write a GIF or an MP4 of modes that swing, one or several side by side.
+
+    One period that repeats without a seam; all modes swing at the same pace, whatever their
+    frequencies, which stand below them.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What vibrates.
+    modes : xarray.Dataset
+        Modes of `foldyn.modes`.
+    path : path-like
+        File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
+        package imageio-ffmpeg.
+    which, amplitude, names, view, title
+        As in `draw_modes`.
+    frames : int
+        Number of pictures in a period.
+    fps : int
+        Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        Modes of another structure, no such mode, fewer than two frames, a rate out of range, a
+        path that is no GIF or MP4 in an existing directory, or an MP4 without ffmpeg.
+    ComputationError
+        ffmpeg could not write the file.
+    """
+    path = checked_file(path, frames, fps)
+    shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
+    rest, swings = shown.sheet.nodes, shown.swings
+    extent = np.concatenate([rest + swings, rest - swings]).reshape(-1, 3)
+    figure, sheets = side_by_side(
+        shown.sheet, rest + swings, shown.captions, View(*view), shown.notes, title, extent,
+        width=_WIDTH, most_columns=_COLUMNS,
+    )  # fmt: skip
+    with filmed(figure, path, fps) as writer:
+        for phase in 2.0 * np.pi * np.arange(frames) / frames:
+            for drawn, swing in zip(sheets, swings, strict=True):
+                drawn.move(rest + np.cos(phase) * swing)
+            writer.grab_frame()
+    return path

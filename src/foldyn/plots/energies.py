@@ -1,18 +1,39 @@
-"""Energies of a motion over time, with the audit of their balance."""
+"""Energies of a motion with the audit of their balance, and strain energies along a path."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+from numpy.typing import NDArray
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.strain import PARTS, parts_of
+from foldyn.plots.along import along, asked, check_path, way
+from foldyn.shells.body import GROUPS as OF_SHELLS
+from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
+
+PARTS: Mapping[str, tuple[str, str]] = {
+    "strain_bars": ("bars", style.VERMILLION),
+    "strain_membrane": ("membrane", style.VERMILLION),
+    "strain_bends": ("bends", style.PURPLE),
+    "strain_bending": ("bending", style.PURPLE),
+    "strain_folds": ("folds", style.GREEN),
+}
+"""Names and colors of strain energies, stacked in this order from the bottom up: folds on top."""
+_NONE = 1e-9  # of the largest energy: below it there is nothing to share
 
 
-def energy_error(trajectory: xr.Dataset) -> np.ndarray:
+def parts_of(result: xr.Dataset) -> tuple[str, ...]:
+    """Parts of the strain energy of a result, in the order of its structure."""
+    return tuple(OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES)
+
+
+def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
     """Return kinetic + strain + dissipated - work, less its value at the start.
 
     Parameters
@@ -50,20 +71,19 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     InputError
         Where an energy is missing from the trajectory.
     """
-    names = _names(trajectory)
+    strain = {part: f"strain, {PARTS[part][0]}" for part in parts_of(trajectory)}
+    others = {"dissipated": "dissipated", "work": "work of the loads"}
+    names = {"kinetic": "kinetic", **strain, **others}
     missing = [name for name in names if name not in trajectory]
     if missing:
         raise InputError(f"trajectory: no {', '.join(missing)}; give a dataset of foldyn.simulate")
     time = trajectory["time"].values
-    figure = style.new_figure(7.5, 5.0, title)
-    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1.0]})
-    style.frame(upper, "", "energy (J)")
-    style.frame(lower, "time (s)", "balance error (J)")
+    labels = ["energy (J)", "balance error (J)"]
+    figure, (upper, lower) = style.rows((7.5, 5.0), title, "time (s)", labels, heights=[2.6, 1.0])
     handles = []
     for index, (name, label) in enumerate(names.items()):
         values = trajectory[name].values
-        (line,) = upper.plot(time, values, label=label, **style.line_style(index))
-        handles.append(line)
+        handles += upper.plot(time, values, label=label, **style.line_style(index))
     error = energy_error(trajectory)
     worst = float(np.nanmax(np.abs(error)))
     largest = audit.energy_scale(_table(trajectory))
@@ -72,23 +92,113 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     note = f"kinetic + strain + dissipated - work, less its start: at most {worst:.2g} J"
     if largest > 0.0:
         note += f", {worst / largest:.2g} of the energy at play"
-    lower.set_title(note, fontsize=style.NOTE, color=style.BLACK, loc="right", y=1.0, pad=4.0)
+    lower.set_title(note, **style.FINE, loc="right", y=1.0, pad=4.0)
     upper.margins(x=0.0)
     style.exponents(upper)
     style.exponents(lower, ticks=4)
-    style.legend_below(figure, handles, columns=3)
-    figure.align_ylabels()
-    return style.finish(figure)
+    return style.finish(figure, handles)
 
 
-def _names(trajectory: xr.Dataset) -> dict[str, str]:
-    """What the energies are called, in the order in which they are drawn."""
-    strain = {part: f"strain, {PARTS[part][0]}" for part in parts_of(trajectory)}
-    others = {"dissipated": "dissipated", "work": "work of the loads"}
-    return {"kinetic": "kinetic", **strain, **others}
-
-
-def _table(trajectory: xr.Dataset) -> np.ndarray:
+def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
     """Return the energies (J) as the audit has them, a column each."""
     names = audit.audited(parts_of(trajectory))
     return np.column_stack([trajectory[name].values for name in names])
+
+
+def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Shares of the parts of the strain energy at each point; NaN where there is none.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (steps,)
+        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", each from 0
+        to 1.
+    """
+    check_path(path, "path")
+    energies = _stacked(path)
+    total = np.asarray(sum(energies.values()))
+    total = np.where(total > _NONE * max(float(total.max(initial=0.0)), 0.0), total, np.nan)
+    return {PARTS[part][0]: energy / total for part, energy in energies.items()}
+
+
+def plot_path_energies(
+    path: xr.Dataset,
+    nodes: Sequence[int] | None = None,
+    direction: str | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw the parts of the strain energy along a path, stacked: see `energy_shares`.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+    nodes : sequence of int, optional
+        Nodes whose mean displacement is the horizontal axis, if it only grows along the path.
+        Without them it is the load factor or, where this turns, the mean distance that the nodes
+        have traveled.
+    direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Direction of that displacement; by default that in which the nodes move farthest.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two axes: the energies (J) and, as a line, the work done on the structure; the shares of
+        the energies.
+
+    Raises
+    ------
+    InputError
+        Not a path, a node that it does not have, another direction.
+    """
+    check_path(path, "path")
+    x, name = _abscissa(path, nodes, direction)
+    labels = ["strain energy (J)", "share"]
+    figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
+    energies = _stacked(path)
+    names, colors = zip(*(PARTS[part] for part in energies), strict=True)
+    handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
+    work = float(sum(layer[0] for layer in energies.values())) + path["work"].values
+    (line,) = upper.plot(
+        x, work, color=style.BLACK, linewidth=1.2, linestyle=style.DASHES[1],
+        label="at the start + work done",
+    )  # fmt: skip
+    lower.stackplot(x, *energy_shares(path).values(), colors=colors, alpha=0.75)
+    lower.set_ylim(0.0, 1.0)
+    lower.yaxis.set_major_formatter(PercentFormatter(1.0))
+    for axes in (upper, lower):
+        axes.margins(x=0.0)
+        axes.set_axisbelow(False)  # the grid must show through the areas
+    style.exponents(upper)
+    return style.finish(figure, [*reversed(handles), line], columns=4)
+
+
+def _stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Return the parts of the strain energy (J) in the order of a stack."""
+    return {part: path[part].values for part in PARTS if part in parts_of(path)}
+
+
+def _abscissa(
+    path: xr.Dataset, nodes: Sequence[int] | None, direction: str | None
+) -> tuple[NDArray[np.float64], str]:
+    """Return a quantity that only grows along the path, and its name."""
+    if nodes is not None:
+        numbers, direction = asked({"path": path}, nodes, direction)
+        moved = along(path, numbers, direction)
+        if not (np.diff(moved) > 0.0).all():
+            raise InputError(
+                f"nodes: their displacement along {direction} does not grow all along the path; "
+                "leave them out"
+            )
+        return moved, f"displacement along {direction} (m)"
+    factor = path["load_factor"].values
+    if (np.diff(factor) > 0.0).all():
+        return factor, "load factor"
+    return way(path), "mean distance traveled by the nodes (m)"

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from foldyn.cases.supports import DIRECTIONS, signed
 from foldyn.errors import InputError
+from foldyn.linear import convert
+from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
+from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.modes import hertz
-from foldyn.plots.responses import Curve, curves_of, unit_of
+from foldyn.results.quantities import RESPONSES
+from foldyn.values import number
 
 _APART = 0.07  # of the frequency axis: peaks nearer than that share one label
 _FEW = 60  # frequencies that are drawn as dots, too
@@ -62,52 +67,101 @@ def plot_frf(
         No response or node, a node, direction or quantity that a response does not have.
     """
     curves, shown = curves_of(responses, nodes, axes, quantity)
-    if prominence is not None and not 0.0 <= prominence < 1.0:
-        raise InputError(f"prominence: {prominence!r}; give a part of the maximum, 0 to below 1")
+    if prominence is not None:
+        number("prominence", prominence, least=0.0, below=1.0)
     coherent = any(curve.coherence is not None for curve in curves)
     heights = [2.6, 1.3, 1.0][: 3 if coherent else 2]
-    figure = style.new_figure(8.0, 1.2 + sum(heights), title)
-    rows = figure.subplots(
-        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
-    )[:, 0]
     along = {curve.axis for curve in curves}
     of = f" along {curves[0].axis}" if len(along) == 1 else ""
-    frames = [f"{shown}{of}{unit_of(shown)}", "phase (degrees)", "coherence"]
-    for row, ylabel in zip(rows, frames, strict=False):
-        style.frame(row, "frequency (Hz)" if row is rows[-1] else "", ylabel)
+    ylabels = [f"{shown}{of}{unit_of(shown)}", "phase (degrees)", "coherence"][: len(heights)]
+    size = 8.0, 1.2 + sum(heights)
+    figure, rows = style.rows(size, title, "frequency (Hz)", ylabels, heights=heights)
     several = len(responses) > 1, len({curve.node for curve in curves}) > 1, len(along) > 1
-    handles, found = [], []
+    keys, peaks = [], []
     for index, curve in enumerate(curves):
         look = style.line_style(index) | {"label": _label(curve, *several)}
         dots = {"marker": ".", "markersize": 4.0} if len(curve.frequency) <= _FEW else {}
-        size = np.where(curve.values == 0.0, np.nan, np.abs(curve.values))
-        (line,) = rows[0].plot(curve.frequency, size, **look, **dots)
+        height = np.where(curve.values == 0.0, np.nan, np.abs(curve.values))
+        keys += rows[0].plot(curve.frequency, height, **look, **dots)
         rows[1].plot(*phase_line(curve.frequency, curve.values), **look, **dots)
         if curve.coherence is not None:
             rows[2].plot(curve.frequency, curve.coherence, **look, **dots)
-        handles.append(line)
-        peaks = _peaks(curve, shown, prominence)
-        rows[0].plot(
-            *peaks.T,
-            linestyle="none",
-            marker="o",
-            markersize=4.5,
-            markerfacecolor="white",
-            markeredgecolor=look["color"],
-            label=f"_peaks of {look['label']}",
-            zorder=4.0,
-        )
-        found.append(peaks)
+        peaks.append(_peaks(curve, shown, prominence))
+        ring = style.ring(look["color"]) | {"label": f"_peaks of {look['label']}", "zorder": 4.0}
+        rows[0].plot(*peaks[-1].T, **ring)
     _set_axes(rows, curves)
-    _label_peaks(rows[0], np.concatenate(found))
-    keys = handles if any(several) else []
-    if keys and any(len(peaks) for peaks in found):
-        look = {"marker": "o", "markersize": 4.5, "markerfacecolor": "white"}
-        keys = [*keys, Line2D([], [], color=style.GRAY, linestyle="none", label="peak", **look)]
-    if keys:
-        style.legend_below(figure, keys, 5, width=7.6)
-    figure.align_ylabels(list(rows))
-    return style.finish(figure)
+    _label_peaks(rows[0], np.concatenate(peaks))
+    if any(map(len, peaks)):
+        keys.append(style.key("peak", color=style.GRAY, **style.ring(style.GRAY)))
+    return style.finish(figure, keys if any(several) else [], 5, width=7.6)
+
+
+class Curve(NamedTuple):
+    """The response of one node of one model at its frequencies (Hz), all of shape (m,)."""
+
+    label: str
+    node: int
+    axis: str
+    frequency: NDArray[np.float64]
+    values: NDArray[np.complex128]
+    coherence: NDArray[np.float64] | None
+
+
+def curves_of(
+    responses: Mapping[str, xr.Dataset],
+    nodes: Sequence[int],
+    axes: str | Sequence[str] | None,
+    quantity: str | None,
+) -> tuple[list[Curve], str]:
+    """Responses of nodes, models first, and the quantity that they show.
+
+    Raises
+    ------
+    InputError
+        No response or node, a node, direction or quantity that a response does not have.
+    """
+    if not isinstance(responses, Mapping) or not responses:
+        raise InputError("responses: give a mapping {label: response}, with at least one of them")
+    held = {quantity_of(response) for response in responses.values()}
+    if len(held) > 1:
+        raise InputError("responses: forces drive some of them, a base others; draw them apart")
+    shown = held.pop()
+    if quantity is not None:
+        if quantity not in PER_FORCE or shown not in PER_FORCE:
+            known = ", ".join(PER_FORCE) if shown in PER_FORCE else shown
+            raise InputError(f"quantity: {quantity!r}; the response has {known}")
+        shown = quantity
+        responses = {label: convert(response, shown) for label, response in responses.items()}
+    numbers = check_nodes_of(responses, nodes)
+    seen = (r[shown].sel(node=numbers, axis=list(AXES)).values for r in responses.values())
+    if axes is None:
+        along = along_drive(next(iter(responses.values())))
+        most = directions(None, len(numbers), map(np.nan_to_num, seen))
+        axes = [along[AXES.index(axis)] for axis in most]
+    chosen = directions(axes, len(numbers), (), DIRECTIONS)
+    curves = []
+    for label, response in responses.items():
+        frequency = response["frequency"].values.astype(np.float64)
+        for node, axis in zip(numbers, chosen, strict=True):
+            column, sign = signed("axes", axis)
+            here = response.sel(node=node, axis=AXES[column])
+            values = sign * here[shown].values.astype(np.complex128)
+            coherence = here["coherence"].values if "coherence" in response else None
+            curves.append(Curve(label, node, axis, frequency, values, coherence))
+    return curves, shown
+
+
+def along_drive(response: xr.Dataset) -> list[str]:
+    """Each axis in the direction in which forces drive along it; as it is where none does."""
+    forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
+    backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
+    return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]
+
+
+def unit_of(quantity: str) -> str:
+    """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
+    unit = RESPONSES[quantity].units.replace("s2", "s²")
+    return "" if unit == "1" else f" ({unit})"
 
 
 def phase_line(
@@ -169,13 +223,6 @@ def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:
             continue
         written.append(frequency)
         part = (frequency - low) / (high - low)
-        axes.annotate(
-            f"{hertz(frequency)} Hz",
-            (frequency, height),
-            xytext=(0.0, 5.0),
-            textcoords="offset points",
-            ha="left" if part < 0.04 else "right" if part > 0.96 else "center",
-            fontsize=style.NOTE,
-            color=style.BLACK,
-            zorder=5.0,
-        )
+        side = "left" if part < 0.04 else "right" if part > 0.96 else "center"
+        look = style.FINE | {"xytext": (0.0, 5.0), "textcoords": "offset points", "ha": side}
+        axes.annotate(f"{hertz(frequency)} Hz", (frequency, height), zorder=5.0, **look)

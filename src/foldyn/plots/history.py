@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.chosen import AXES, check_nodes_of, directions
+from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.signals import sampling_interval, spectrum
+from foldyn.values import number
 
 VISIBLE = 0.02
 """Part of a curve's height that can be seen."""
@@ -69,17 +70,16 @@ def plot_history(
         for label, one in trajectories.items()
     }
     chosen = directions(axes, len(numbers), moved.values())
-    intervals = {
-        label: sampling_interval(dataset["time"].values) for label, dataset in trajectories.items()
-    }
-    if max_frequency is not None and not (np.isfinite(max_frequency) and max_frequency > 0.0):
-        raise InputError(f"max_frequency: {max_frequency!r}; give a positive number of Hz")
+    times = {label: dataset["time"].values for label, dataset in trajectories.items()}
+    intervals = {label: sampling_interval(time) for label, time in times.items()}
+    if max_frequency is not None:
+        number("max_frequency", max_frequency, above=0.0, unit="Hz")
     contents = {
         (label, row): spectrum(
             moved[label][:, row, AXES.index(direction)], intervals[label], window=window,
             detrend=detrend,
         )
-        for label in trajectories
+        for label in times
         for row, direction in enumerate(chosen)
     }  # fmt: skip
     nyquist = 0.5 / max(intervals.values())
@@ -93,33 +93,27 @@ def plot_history(
     handles = []
     for row, (node, direction) in enumerate(zip(numbers, chosen, strict=True)):
         left, right = grid[row]
-        last = row == rows - 1
-        style.frame(
-            left,
-            "time (s)" if last else "",
-            f"{direction} displacement (m)",
-            f"node {node}",
+        time_label, frequency_label = (
+            ("time (s)", "frequency (Hz)") if row == rows - 1 else ("", "")
         )
-        style.frame(right, "frequency (Hz)" if last else "", "amplitude (m)", f"node {node}")
-        for index, (label, dataset) in enumerate(trajectories.items()):
-            time = dataset["time"].values
+        style.frame(left, time_label, f"{direction} displacement (m)", f"node {node}")
+        style.frame(right, frequency_label, "amplitude (m)", f"node {node}")
+        for index, (label, time) in enumerate(times.items()):
             motion = moved[label][:, row, AXES.index(direction)]
             frequencies, amplitude = contents[label, row]
             shown = frequencies <= highest * (1.0 + 1e-9)
             look = style.line_style(index) | {"label": label}
-            (line,) = left.plot(time, motion, **look)
+            lines = left.plot(time, motion, **look)
             right.plot(frequencies[shown], amplitude[shown], **look)
-            if row == 0:
-                handles.append(line)
+            handles += lines if row == 0 else []
         left.margins(x=0.0)
         right.set_xlim(0.0, highest)
         right.set_ylim(bottom=0.0)
         for frame in (left, right):
             style.exponents(frame, ticks=5)
-    style.legend_below(figure, handles, columns=5)
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
-    return style.finish(figure)
+    return style.finish(figure, handles, columns=5)
 
 
 def _reach(content: tuple[NDArray[np.float64], NDArray[np.float64]]) -> float:

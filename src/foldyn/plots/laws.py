@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -80,13 +81,12 @@ def _draw_hinges(
         j, m = hinges[first][:2]
         label = f"{kind} {j}-{m}"
         label += f" and {count - 1} more" if count > 1 else ""
-        label += f": k {k:.4g} N m/rad, rest {np.degrees(theta0):.4g}°"
+        angle = float(np.degrees(theta0))
+        label += f": k {k:.4g} N m/rad, rest {angle:.4g}°"
         axes.plot(degrees, moment, label=label, **look)
         at_rest = k * float(law.moment(theta0, theta0))
-        axes.plot([np.degrees(theta0)], [at_rest], "o", color=look["color"], markersize=5, zorder=4)
-        axes.axvline(
-            np.degrees(theta0), color=look["color"], linewidth=0.8, linestyle=":", zorder=1
-        )
+        axes.plot([angle], [at_rest], "o", color=look["color"], markersize=5, zorder=4)
+        axes.axvline(angle, color=look["color"], linewidth=0.8, linestyle=":", zorder=1)
         reach = max(reach, float(np.abs(moment[framed]).max()))
     axes.set_xlim(0.0, 360.0)
     axes.set_xticks(np.arange(0, 361, 60))
@@ -113,7 +113,7 @@ def _draw_bar(axes: Axes, law: Any, modulus: float, low: float, high: float) -> 
 
 
 def _legend_below(axes: Axes, note: str) -> None:
-    legend = axes.legend(
+    axes.legend(
         loc="upper left",
         bbox_to_anchor=(-0.2, -0.19),
         borderaxespad=0.0,
@@ -125,13 +125,9 @@ def _legend_below(axes: Axes, note: str) -> None:
         title=note or None,
         title_fontsize=style.NOTE,
     )
-    legend.set_in_layout(True)
 
 
 def _distinct(stiffness: np.ndarray, rest: np.ndarray) -> list[tuple[int, int]]:
     """Return (first index, count) of hinges with equal stiffness and rest, most frequent first."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for index, (k, theta0) in enumerate(zip(stiffness, rest, strict=True)):
-        groups.setdefault((f"{k:.6e}", f"{theta0:.6f}"), []).append(index)
-    found = [(members[0], len(members)) for members in groups.values()]
-    return sorted(found, key=lambda pair: -pair[1])
+    looks = [f"{k:.6e} {theta0:.6f}" for k, theta0 in zip(stiffness, rest, strict=True)]
+    return [(looks.index(look), count) for look, count in Counter(looks).most_common()]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from foldyn.cases import Actuate, Case, Impose, resolve_nodes
-from foldyn.cases.actuation import resolve_creases
-from foldyn.errors import InputError
+from foldyn.cases.selection import resolve_creases
 from foldyn.plots import style
+from foldyn.values import number
 
 _SAMPLES = 2001
 _LISTED = 3
@@ -20,8 +20,7 @@ _MOST_CURVES = 4
 """Curves of one history at most; imposed displacements and rest angles may differ at each place."""
 
 
-@dataclass(frozen=True)
-class _Curve:
+class _Curve(NamedTuple):
     """A quantity over time: offset + amplitude * factor."""
 
     amplitude: float
@@ -64,130 +63,110 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     InputError
         Where the duration is not positive.
     """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise InputError(f"duration: {duration!r}; give a positive number of seconds")
+    number("duration", duration, above=0.0, unit="s")
+    forces = [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
+    gravity = [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
     panels = [
-        (
-            "force at a node (N)",
-            [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms],
-        ),
-        (
-            "gravity (m/s2)",
-            [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms],
-        ),
-        (
-            "imposed displacement (m)",
-            [curve for u, h in case.imposed_terms for curve in _imposed_curves(case, u, h)],
-        ),
-        ("base displacement (m)", [c for u, h in case.base_terms for c in _base_curves(u, h)]),
-        (
-            "rest angle (degrees)",
-            [curve for d, h in case.actuation_terms for curve in _angle_curves(case, d, h)],
-        ),
+        ("force at a node (N)", forces),
+        ("gravity (m/s2)", gravity),
+        ("imposed displacement (m)", _imposed_curves(case)),
+        ("base displacement (m)", _base_curves(case)),
+        ("rest angle (degrees)", _angle_curves(case)),
     ]
     panels = [panel for panel in panels if panel[1]] or panels[:1]
     entries = sum(len(curves) for _, curves in panels)
     height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
-    figure = style.new_figure(6.5, height, title)
-    rows = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    ylabels = [ylabel for ylabel, _ in panels]
+    figure, rows = style.rows((6.5, height), title, "time (s)", ylabels)
     time = np.linspace(start, start + duration, _SAMPLES)
     handles = []
-    for axes, (ylabel, curves) in zip(rows, panels, strict=True):
-        style.frame(axes, "time (s)" if axes is rows[-1] else "", ylabel)
+    for axes, (_, curves) in zip(rows, panels, strict=True):
         for curve in curves:
             factor = np.broadcast_to(np.asarray(curve.history(time), dtype=np.float64), time.shape)
-            (line,) = axes.plot(
-                time,
-                curve.offset + curve.amplitude * factor,
-                label=f"{curve.text}: {history_name(curve.history)}",
-                **style.line_style(len(handles)),
-            )
-            line.set_linewidth(1.6)
-            handles.append(line)
+            values = curve.offset + curve.amplitude * factor
+            look = style.line_style(len(handles)) | {"linewidth": 1.6}
+            label = f"{curve.text}: {history_name(curve.history)}"
+            handles += axes.plot(time, values, label=label, **look)
         if not any(curve.offset for curve in curves):
             axes.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
         style.exponents(axes)
     rows[-1].set_xlim(time[0], time[-1])
-    figure.align_ylabels(rows)
-    if handles:
-        style.legend_below(figure, handles, columns=1)
-    else:
-        rows[0].text(
-            0.5,
-            0.6,
-            "no loads",
-            transform=rows[0].transAxes,
-            ha="center",
-            fontsize=style.LABEL,
-            color=style.BLACK,
-        )
-    return style.finish(figure)
+    if not handles:
+        place = {"transform": rows[0].transAxes, "ha": "center"}
+        rows[0].text(0.5, 0.6, "no loads", **place, **style.TEXT)
+    return style.finish(figure, handles, columns=1)
 
 
 def _peak(vectors: np.ndarray) -> float:
     return float(np.linalg.norm(vectors, axis=-1).max())
 
 
-def _imposed_curves(case: Case, vectors: np.ndarray, history: Any) -> list[_Curve]:
-    """Curves of displacements (n, 3), one for each value and axis."""
-    groups: dict[tuple[int, float], list[int]] = {}
-    for support in case.supports:
-        if isinstance(support, Impose) and support.history == history:
-            axis = "xyz".index(support.axis)
-            for node in resolve_nodes(case.structure, support.nodes).tolist():
-                groups.setdefault((axis, float(vectors[node, axis])), []).append(node)
-    curves = [
-        _Curve(
-            value,
-            f"moved {value:.4g} m along {'xyz'[axis]} on {_listed('node', nodes)}",
-            history,
+def _imposed_curves(case: Case) -> list[_Curve]:
+    """Curves of imposed displacements, one for each history, value and axis."""
+    curves = []
+    for vectors, history in case.imposed_terms:
+        groups: dict[tuple[int, float], list[int]] = {}
+        for support in case.supports:
+            if isinstance(support, Impose) and support.history == history:
+                axis = "xyz".index(support.axis)
+                for node in resolve_nodes(case.structure, support.nodes).tolist():
+                    groups.setdefault((axis, float(vectors[node, axis])), []).append(node)
+        curves += _some(
+            [
+                _Curve(
+                    value,
+                    f"moved {value:.4g} m along {'xyz'[axis]} on {_listed('node', nodes)}",
+                    history,
+                )
+                for (axis, value), nodes in groups.items()
+            ]
         )
-        for (axis, value), nodes in groups.items()
-    ]
-    return _some(curves)
+    return curves
 
 
-def _base_curves(vectors: np.ndarray, history: Any) -> list[_Curve]:
-    """Curves of a base that moves by (n, 3), one for each axis."""
+def _base_curves(case: Case) -> list[_Curve]:
+    """Curves of a base that moves, one for each history and axis."""
     return [
         _Curve(value, f"base moved {value:.4g} m along {axis}", history)
+        for vectors, history in case.base_terms
         for axis, value in zip("xyz", signed_peak(vectors).tolist(), strict=True)
         if value
     ]
 
 
-def _angle_curves(case: Case, change: np.ndarray, history: Any) -> list[_Curve]:
-    """Curves of rest angles (degrees), one for each pair of first and last angle."""
+def _angle_curves(case: Case) -> list[_Curve]:
+    """Curves of rest angles (degrees), one for each history and pair of first and last angle."""
+    curves = []
     first = np.degrees(case.structure.fold_rest)
-    last = first + np.degrees(change)
-    groups: dict[tuple[float, float], list[int]] = {}
-    for load in case.loads:
-        if isinstance(load, Actuate) and load.history == history:
-            for crease in resolve_creases(case.structure, load.creases).tolist():
-                pair = round(float(first[crease]), 6), round(float(last[crease]), 6)
-                groups.setdefault(pair, []).append(crease)
-    curves = [
-        _Curve(
-            end - start,
-            f"rest angle {start:.4g} to {end:.4g} degrees on {_listed('crease', creases)}",
-            history,
-            start,
+    for change, history in case.actuation_terms:
+        last = first + np.degrees(change)
+        groups: dict[tuple[float, float], list[int]] = {}
+        for load in case.loads:
+            if isinstance(load, Actuate) and load.history == history:
+                for crease in resolve_creases(case.structure, load.creases).tolist():
+                    pair = round(float(first[crease]), 6), round(float(last[crease]), 6)
+                    groups.setdefault(pair, []).append(crease)
+        curves += _some(
+            [
+                _Curve(
+                    end - start,
+                    f"rest angle {start:.4g} to {end:.4g} degrees on {_listed('crease', creases)}",
+                    history,
+                    start,
+                )
+                for (start, end), creases in groups.items()
+            ]
         )
-        for (start, end), creases in groups.items()
-    ]
-    return _some(curves)
+    return curves
 
 
 def _some(curves: list[_Curve]) -> list[_Curve]:
-    """The first curves; the last of them tells how many are left out."""
+    """The first curves; the last of them says how many are left out."""
     hidden = len(curves) - _MOST_CURVES
     if hidden <= 0:
         return curves
-    last = curves[_MOST_CURVES - 1]
-    return [
-        *curves[: _MOST_CURVES - 1],
-        replace(last, text=f"{last.text} (and {hidden} more, not drawn)"),
-    ]
+    *kept, last = curves[:_MOST_CURVES]
+    return [*kept, last._replace(text=f"{last.text} (and {hidden} more, not drawn)")]
 
 
 def signed_peak(vectors: np.ndarray) -> np.ndarray:
@@ -207,8 +186,18 @@ def describe_imposed(vectors: np.ndarray) -> str:
 
 def describe_base(vector: np.ndarray) -> str:
     """Say in words how far the base moves (3,) and where to."""
+    return _toward("base moved", vector, "m")
+
+
+def describe_gravity(acceleration: np.ndarray) -> str:
+    """Say in words how large an acceleration of gravity (3,) is and where it points."""
+    return _toward("gravity", acceleration, "m/s2")
+
+
+def _toward(text: str, vector: np.ndarray, unit: str) -> str:
     size = float(np.linalg.norm(vector))
-    return f"base moved {size:.4g} m along {_direction(vector / size)}" if size else "base at rest"
+    text = f"{text} {size:.4g} {unit}"
+    return f"{text} along {_direction(vector / size)}" if size else text
 
 
 def _describe(vectors: np.ndarray, unit_name: str) -> str:
@@ -229,13 +218,6 @@ def _listed(what: str, numbers: list[int]) -> str:
     if len(numbers) > _LISTED:
         listed += f" and {len(numbers) - _LISTED} more"
     return f"{what} {listed}" if len(numbers) == 1 else f"{what}s {listed}"
-
-
-def describe_gravity(acceleration: np.ndarray) -> str:
-    """Say in words how large an acceleration of gravity (3,) is and where it points."""
-    size = float(np.linalg.norm(acceleration))
-    text = f"gravity {size:.4g} m/s2"
-    return f"{text} along {_direction(acceleration / size)}" if size else text
 
 
 def _direction(unit: np.ndarray) -> str:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
-from foldyn.plots.scene import View
+from foldyn.plots.scene import Points, View
 
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 
-def _billboard(
-    tip: NDArray[np.float64], along: NDArray[np.float64], length: float, half: float, view: View
-) -> NDArray[np.float64]:
+def _billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
     """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
     across = np.cross(view.basis[2], along)
     size = np.linalg.norm(across)
@@ -28,12 +24,8 @@ def _billboard(
 
 
 def support_triangles(
-    points: NDArray[np.float64],
-    fixed: NDArray[np.bool_],
-    size: float,
-    view: View,
-    moves: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], list[tuple[int, str]]]:
+    points: Points, fixed: NDArray[np.bool_], size: float, view: View, moves: Points
+) -> tuple[Points, list[tuple[int, str]]]:
     """Return one triangle per held direction, its tip at the node, and each node's axes.
 
     Parameters
@@ -67,12 +59,8 @@ def support_triangles(
 
 
 def load_arrows(
-    points: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    longest: float,
-    length: float,
-    view: View,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    points: Points, vectors: Points, longest: float, length: float, view: View
+) -> tuple[Points, Points]:
     """Return shafts and heads of arrows that start at the loaded nodes.
 
     Parameters
@@ -101,9 +89,7 @@ def load_arrows(
     return np.array(shafts).reshape(-1, 2, 3), np.array(heads).reshape(-1, 3, 3)
 
 
-def add_triangles(
-    axes: Axes3D, triangles: NDArray[np.float64], color: str, zorder: float
-) -> Poly3DCollection:
+def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) -> Poly3DCollection:
     """Fill mark triangles (count, 3, 3) in one color."""
     marks = Poly3DCollection(
         triangles, facecolors=color, edgecolors="white", linewidths=0.4, zorder=zorder
@@ -125,13 +111,11 @@ class Labels:
         Points to keep away from: samples of lines and marks.
     """
 
-    def __init__(
-        self, axes: Axes3D, view: View, distance: float, obstacles: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, axes: Axes3D, view: View, distance: float, obstacles: Points) -> None:
         self._axes, self._view, self._distance = axes, view, distance
         self._taken = view.flat(obstacles.reshape(-1, 3))
 
-    def add(self, point: NDArray[np.float64], text: str, color: str, size: float) -> None:
+    def add(self, point: Points, text: str, color: str, size: float) -> None:
         """Write a text beside a point (3,)."""
         anchor = self._view.flat(point)
         # A wide text needs more room to the left and right than above and below.
@@ -147,16 +131,9 @@ class Labels:
         best = int(np.argmax(np.round(gaps / self._distance, 1)))
         shift = spots[best] - anchor
         place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]
-        written = self._axes.text(
-            *place,
-            text,
-            fontsize=size,
-            color=color,
-            ha="center",
-            va="center",
-            zorder=20,
-            path_effects=[withStroke(linewidth=2.0, foreground="white")],
-        )
+        look = {"fontsize": size, "color": color, "ha": "center", "va": "center", "zorder": 20}
+        written = self._axes.text(*place, text, **look)
+        written.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
         written.set_gid(f"label {text}")
         around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
         self._taken = np.vstack(
@@ -164,15 +141,13 @@ class Labels:
         )
 
 
-def along_lines(segments: NDArray[np.float64], samples: int = 9) -> NDArray[np.float64]:
+def along_lines(segments: Points, samples: int = 9) -> Points:
     """Return points along segments (k, 2, 3), shape (k * samples, 3)."""
     t = np.linspace(0.0, 1.0, samples)[None, :, None]
     return (segments[:, None, 0] * (1.0 - t) + segments[:, None, 1] * t).reshape(-1, 3)
 
 
-def outline(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+def outline(triangles: Points) -> Points:
     """Return points along the outlines of triangles (k, 3, 3)."""
-    sides: Sequence[tuple[int, int]] = ((0, 1), (1, 2), (2, 0))
-    return np.concatenate(
-        [along_lines(triangles[:, list(side)], 4) for side in sides] or [np.zeros((0, 3))]
-    )
+    sides = [0, 1], [1, 2], [2, 0]
+    return np.concatenate([along_lines(triangles[:, side], 4) for side in sides])

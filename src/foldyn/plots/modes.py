@@ -1,4 +1,4 @@
-"""Mode shapes side by side, over the state about which the structure vibrates."""
+"""Mode shapes side by side, over the state about which the structure vibrates, and their MAC."""
 
 from __future__ import annotations
 
@@ -8,21 +8,26 @@ from typing import cast
 
 import numpy as np
 import xarray as xr
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.plots.scene import Sheet3D, View
-from foldyn.plots.sheet import rest_keys
-from foldyn.plots.side_by_side import side_by_side
+from foldyn.plots import style
+from foldyn.plots.scene import Points, Sheet3D, View
+from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
+from foldyn.values import length
 
 MOST_MODES = 12
 """Modes that one figure shows at most."""
 _AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
 _STRETCH = 0.4  # largest displacement of a bar's ends against each other, as a part of its length
+_SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])
+_MOST_NUMBERS = 16  # rows or columns with which the numbers can be read
+_CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
 _NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
 
 
@@ -69,11 +74,9 @@ def draw_modes(
     InputError
         Modes of another structure, or no such mode.
     """
-    drawn = ShownModes.of(case_or_structure, modes, which, amplitude, names)
-    positions = drawn.sheet.nodes + drawn.swings
-    return side_by_side(
-        drawn.sheet, positions, drawn.captions, View(*view), drawn.notes, title
-    ).figure
+    shown = ShownModes.of(case_or_structure, modes, which, amplitude, names)
+    positions = shown.sheet.nodes + shown.swings
+    return side_by_side(shown.sheet, positions, shown.captions, View(*view), shown.notes, title)[0]
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class ShownModes:
     """
 
     sheet: Sheet3D
-    swings: NDArray[np.float64]
+    swings: Points
     captions: list[str]
     notes: list[Line2D]
 
@@ -108,8 +111,8 @@ class ShownModes:
         """Choose modes and scale them."""
         sheet = Sheet3D.of(case_or_structure)
         numbers = chosen_modes(modes, which)
-        if amplitude is not None and not (np.isfinite(amplitude) and amplitude > 0.0):
-            raise InputError(f"amplitude: {amplitude!r}; give a positive length in m")
+        if amplitude is not None:
+            length("amplitude", amplitude)
         moved = modes["displacement"].transpose("node", "axis").values
         sheet.check_nodes("modes: they have", moved)
         state = "undeformed" if not moved.any() else "equilibrium"
@@ -125,7 +128,7 @@ def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
     """Numbers of the modes to show: those asked for, else the first that are not rigid."""
     missing = [key for key in _NEEDED if key not in modes]
     if missing:
-        raise InputError(f"modes: are no modes (they have no {missing[0]}); give those of fd.modes")
+        raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
     stored = modes["mode"].values.tolist()
     if which is None:
         rigid = modes["rigid"].values.astype(bool)
@@ -156,14 +159,9 @@ def mode_names(
     if not hasattr(names, "data_vars"):
         return cast("Mapping[int, str]", names)
     words = cast("xr.Dataset", names)
-    told = zip(
-        modes["mode"].values.tolist(),
-        words["name"].values.tolist(),
-        words["share"].max("kind").values.tolist(),
-        modes["rigid"].values.tolist(),
-        strict=True,
-    )
-    return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in told if not rigid}
+    columns = modes["mode"], words["name"], words["share"].max("kind"), modes["rigid"]
+    rows = zip(*(column.values.tolist() for column in columns), strict=True)
+    return {k: f"{name} ({100.0 * share:.0f} %)" for k, name, share, rigid in rows if not rigid}
 
 
 def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:
@@ -171,17 +169,17 @@ def describe_mode(modes: xr.Dataset, number: int, name: str = "") -> str:
     mode = modes.sel(mode=number)
     eigenvalue = float(mode["eigenvalue"])
     if bool(mode["rigid"]):
-        said = "rigid motion"
+        text = "rigid motion"
     elif eigenvalue < 0.0:
-        said = f"unstable, grows e-fold in {1.0 / np.sqrt(-eigenvalue):.3g} s"
+        text = f"unstable, grows e-fold in {1.0 / np.sqrt(-eigenvalue):.3g} s"
     elif eigenvalue == 0.0:
-        said = "0 Hz, nothing resists it"
+        text = "0 Hz, nothing resists it"
     else:
-        said = f"{hertz(float(mode['frequency']))} Hz"
+        text = f"{hertz(float(mode['frequency']))} Hz"
         ratio = float(mode["damping_ratio"]) if "damping_ratio" in mode else 0.0
         if np.isfinite(ratio) and ratio > 0.0:
-            said += f", damping {100.0 * ratio:.3g} %"
-    return f"mode {number}: {said}" + (f"\n{name}" if name else "")
+            text += f", damping {100.0 * ratio:.3g} %"
+    return f"mode {number}: {text}" + (f"\n{name}" if name else "")
 
 
 def hertz(frequency: float) -> str:
@@ -191,9 +189,7 @@ def hertz(frequency: float) -> str:
     return f"{frequency:#.4g}".rstrip(".") if frequency else "0"
 
 
-def _readable(
-    sheet: Sheet3D, shape: NDArray[np.float64], amplitude: float | None
-) -> NDArray[np.float64]:
+def _readable(sheet: Sheet3D, shape: Points, amplitude: float | None) -> Points:
     """Scale a shape to an amplitude (m), or to one at which it can be read."""
     largest = float(np.linalg.norm(shape, axis=1).max())
     if largest == 0.0:
@@ -205,3 +201,71 @@ def _readable(
     parting = np.linalg.norm(shape[second] - shape[first], axis=1)
     limit = float((_STRETCH * length / np.maximum(parting, 1e-30)).min())
     return shape * min(_AMPLITUDE * sheet.size / largest, limit)
+
+
+def plot_mac(
+    mac: ArrayLike,
+    rows: Sequence[str] | None = None,
+    columns: Sequence[str] | None = None,
+    row_title: str = "mode",
+    column_title: str = "mode",
+    title: str = "",
+) -> Figure:
+    """Draw a matrix of modal assurance criteria: 1 (dark) for equal shapes, 0 (white) for others.
+
+    Parameters
+    ----------
+    mac : array_like, shape (a, b)
+        Values from 0 to 1 of `foldyn.mac`: the rows are the modes of the first set.
+    rows, columns : sequence of str, optional
+        What is written at the rows and the columns; by default the numbers from 1 on.
+    row_title, column_title : str
+        Names of the two sets.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The matrix, first mode at the top left, and the scale of its colors. Up to 16 rows and
+        columns have the values in their cells.
+
+    Raises
+    ------
+    InputError
+        No matrix, values out of range, or labels that do not fit it.
+    """
+    values = np.asarray(mac, dtype=np.float64)
+    if values.ndim != 2 or not values.size:
+        raise InputError(f"mac: shape {values.shape}; give a matrix, one row per mode")
+    if not (np.isfinite(values).all() and values.min() >= -1e-9 and values.max() <= 1.0 + 1e-9):
+        raise InputError("mac: has values that are not between 0 and 1")
+    labels = []
+    for name, given, count in (("rows", rows, len(values)), ("columns", columns, values.shape[1])):
+        labels.append([str(k + 1) for k in range(count)] if given is None else list(given))
+        if len(labels[-1]) != count:
+            raise InputError(f"{name}: {len(labels[-1])} labels for {count} modes; give one each")
+    down, across = values.shape
+    cell = min(_CELL, 6.0 / max(down, across))
+    long = 0.07 * max(len(label) for label in labels[1]) > cell  # labels that would touch
+    width, height = max(_MARGIN + _BAR + cell * across, 3.2), max(_MARGIN + cell * down, 2.2)
+    figure = style.new_figure(width, height, title)
+    axes = figure.subplots()
+    image = axes.imshow(values, cmap=_SHADES, vmin=0.0, vmax=1.0, interpolation="nearest")
+    style.frame(axes, column_title, row_title)
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_visible(True)
+    axes.set_xticks(range(across), labels[1], rotation=90 if long else 0)
+    axes.set_yticks(range(down), labels[0])
+    axes.tick_params(length=0.0)
+    if max(down, across) <= _MOST_NUMBERS:
+        for (row, column), value in np.ndenumerate(values):
+            text = f"{value:.2f}" if value >= 0.005 else "0"
+            ink = "white" if value > 0.5 else style.BLACK
+            axes.text(column, row, text, ha="center", va="center", fontsize=style.NOTE, color=ink)
+    bar = figure.colorbar(image, ax=axes, fraction=0.08, shrink=0.9)
+    bar.set_label("MAC", **style.TEXT)
+    bar.ax.tick_params(labelsize=style.TICK, labelcolor=style.BLACK, color=style.GRAY)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    return style.finish(figure)

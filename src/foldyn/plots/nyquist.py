@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.linear import Peak, peaks_of
+from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import SIDES
-from foldyn.linear.quantity import PER_FORCE, quantity_of
 from foldyn.plots import style
+from foldyn.plots.frf import Curve, curves_of, unit_of
 from foldyn.plots.modes import hertz
-from foldyn.plots.responses import Curve, curves_of, unit_of
 
 MOST_CIRCLES = 6
 _COLUMNS = 3
+_POINTS = {"color": style.BLUE, "marker": ".", "markersize": 5.0, "linestyle": "none"}
+_RESONANT = style.ring(style.BLACK, 6.0)
 
 
 class Circle(NamedTuple):
@@ -99,25 +100,20 @@ def plot_nyquist(
     circles = circles_of(f, Y, fitted[:MOST_CIRCLES], rate)
     figure, frames = _frames(max(len(circles), 1), curve, title)
     if not circles:
-        frames[0].plot(Y.real, Y.imag, **_points() | {"linestyle": "solid", "linewidth": 0.8})
-        frames[0].set_title("no circle fits", fontsize=style.LABEL, y=1.0, pad=4.0)
-    for frame, circle in zip(frames, circles, strict=bool(circles)):
-        _draw(frame, Y, circle)
-        mode = circle.peak
-        told = f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"
-        frame.set_title(told, fontsize=style.LABEL, y=1.0, pad=4.0, color=style.BLACK)
-    for frame in frames:
+        frames[0].plot(Y.real, Y.imag, **_POINTS | {"linestyle": "solid", "linewidth": 0.8})
+    for frame, circle in zip_longest(frames, circles):
+        heading = "no circle fits" if circle is None else _draw(frame, Y, circle)
+        frame.set_title(heading, **style.TEXT, y=1.0, pad=4.0)
         frame.set_aspect("equal", adjustable="datalim")
         frame.ticklabel_format(axis="both", scilimits=(-3, 4), useMathText=True)
         for offset in (frame.xaxis.get_offset_text(), frame.yaxis.get_offset_text()):
             offset.set(fontsize=style.TICK, color=style.BLACK)
         frame.locator_params(nbins=5)
-    keys = [Line2D([], [], **_points(), label="response")]
+    keys = [style.key("response", **_POINTS)]
     if circles:
-        keys.append(Line2D([], [], color=style.VERMILLION, linewidth=1.2, label="fitted circle"))
-        keys.append(Line2D([], [], **_resonant(), label="natural frequency"))
-    style.legend_below(figure, keys)
-    return style.finish(figure)
+        keys.append(style.key("fitted circle", color=style.VERMILLION, linewidth=1.2))
+        keys.append(style.key("natural frequency", **_RESONANT))
+    return style.finish(figure, keys)
 
 
 def circles_of(
@@ -164,8 +160,7 @@ def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     columns = min(count, _COLUMNS)
     rows = -(-count // columns)
     figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows, title)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    frames = [grid[divmod(k, columns)] for k in range(rows * columns)]
+    frames = list(figure.subplots(rows, columns, squeeze=False).flat)
     for spare in frames[count:]:
         spare.remove()
     for k, frame in enumerate(frames[:count]):
@@ -180,25 +175,14 @@ def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
     return figure, frames[:count]
 
 
-def _draw(frame: Axes, Y: NDArray, circle: Circle) -> None:
+def _draw(frame: Axes, Y: NDArray, circle: Circle) -> str:
+    """Draw a circle and the points near it, and return its title."""
     outline = circle.outline()
     frame.plot(outline.real, outline.imag, color=style.VERMILLION, linewidth=1.2, zorder=2.0,
                label="fitted circle")  # fmt: skip
     near = Y[circle.band]
-    frame.plot(np.real(near), np.imag(near), **_points(), zorder=3.0, label="response")
+    frame.plot(np.real(near), np.imag(near), **_POINTS, zorder=3.0, label="response")
     top = circle(np.array([circle.natural]))
-    frame.plot(top.real, top.imag, **_resonant(), zorder=4.0, label="natural frequency")
-
-
-def _points() -> dict:
-    return {"color": style.BLUE, "marker": ".", "markersize": 5.0, "linestyle": "none"}
-
-
-def _resonant() -> dict:
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 6.0,
-        "markerfacecolor": "white",
-        "markeredgecolor": style.BLACK,
-    }
+    frame.plot(top.real, top.imag, **_RESONANT, zorder=4.0, label="natural frequency")
+    mode = circle.peak
+    return f"{hertz(mode.natural_frequency)} Hz, damping {100.0 * mode.damping_ratio:.3g} %"

@@ -1,30 +1,39 @@
-"""Load against displacement along paths, with their stability."""
+"""Paths: load against displacement with its stability, and the deformed shapes along them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.supports import signed
 from foldyn.errors import InputError
 from foldyn.plots import style
-from foldyn.plots.along import CRITICAL, along, asked, check_paths, runs
-from foldyn.plots.chosen import AXES
+from foldyn.plots.along import (
+    CRITICAL,
+    along,
+    asked,
+    check_path,
+    displacements,
+    evenly,
+    farthest,
+    stretches,
+)
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import rest_keys, side_by_side
+from foldyn.structures import Structure
 
 _UNSTABLE = (0, (4, 2))
 _MARKS: Mapping[str, dict[str, Any]] = {
     "limit": {"marker": "o", "markersize": 5.0},
     "bifurcation": {"marker": "D", "markersize": 5.0, "markerfacecolor": "white"},
 }
-_NAMES = {"limit": "limit point", "bifurcation": "bifurcation"}
 
 
 def plot_load_displacement(
@@ -60,21 +69,16 @@ def plot_load_displacement(
     InputError
         No path or node, a node that a path does not have, another direction.
     """
-    check_paths(paths)
     numbers, direction = asked(paths, nodes, direction)
-    of = f" of node {numbers[0]}" if len(numbers) == 1 else ""
-    figure, axes = _figure(title, f"displacement{of} along {direction} (m)", "load factor")
     curves = []
     for label, path in paths.items():
         for node in numbers:
             parts = [label] if len(paths) > 1 else []
             parts += [f"node {node}"] if len(numbers) > 1 else []
-            curves.append((", ".join(parts), along(path, [node], direction), path))
-    handles = [
-        _draw(axes, x, path["load_factor"].values, path, index, label)
-        for index, (label, x, path) in enumerate(curves)
-    ]
-    return _finish(figure, axes, handles, paths)
+            x, factor = along(path, [node], direction), path["load_factor"].values
+            curves.append(_Curve(", ".join(parts), x, factor, path))
+    of = f" of node {numbers[0]}" if len(numbers) == 1 else ""
+    return _draw(curves, title, f"displacement{of} along {direction} (m)", "load factor")
 
 
 def plot_reaction(
@@ -111,17 +115,18 @@ def plot_reaction(
         No path or node, a node that a path does not have or does not support along the direction,
         another direction.
     """
-    check_paths(paths)
     numbers, direction = asked(paths, nodes, direction)
-    figure, axes = _figure(
-        title, f"imposed displacement along {direction} (m)", f"force along {direction} (N)"
-    )
-    handles = []
-    for index, (label, path) in enumerate(paths.items()):
-        force = total_reaction(path, numbers, direction)
-        name = label if len(paths) > 1 else ""
-        handles.append(_draw(axes, along(path, numbers, direction), force, path, index, name))
-    return _finish(figure, axes, handles, paths)
+    curves = [
+        _Curve(
+            label if len(paths) > 1 else "",
+            along(path, numbers, direction),
+            total_reaction(path, numbers, direction),
+            path,
+        )
+        for label, path in paths.items()
+    ]
+    xlabel = f"imposed displacement along {direction} (m)"
+    return _draw(curves, title, xlabel, f"force along {direction} (N)")
 
 
 def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:
@@ -144,68 +149,68 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
     InputError
         A node is not supported along the direction.
     """
-    axis, sign = signed("direction", direction)
-    chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == AXES[axis])
+    _, sign = signed("direction", direction)
+    axis = direction[-1]
+    chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
     held = path["support_node"].values[chosen.values]
     loose = sorted(set(nodes) - set(held.tolist()))
     if loose:
-        raise InputError(f"nodes: no support holds node {loose[0]} along {AXES[axis]}")
+        raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
     return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # no -0
 
 
-def _figure(title: str, xlabel: str, ylabel: str) -> tuple[Figure, Axes]:
+class _Curve(NamedTuple):
+    """What is drawn of a path, and its name."""
+
+    label: str
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    path: xr.Dataset
+
+
+def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
+    """Draw curves, with a legend of what occurs in them."""
     figure = style.new_figure(6.5, 4.4, title)
     axes = figure.subplots()
     style.frame(axes, xlabel, ylabel)
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    return figure, axes
-
-
-def _draw(axes: Axes, x: NDArray, y: NDArray, path: xr.Dataset, index: int, label: str) -> Line2D:
-    """Draw a curve, and return its legend entry."""
-    color = style.CYCLE[index % len(style.CYCLE)]
-    for number, run in enumerate(runs(path)):
-        part = slice(run.start, run.stop + 1)
-        axes.plot(
-            x[part],
-            y[part],
-            color=color,
-            linewidth=1.4,
-            linestyle="solid" if run.stable else _UNSTABLE,
-            label=label if number == 0 and label else f"_{label}{number}",
-            zorder=2.0 + 0.01 * index,
-        )
-    if len(x) == 1:  # a single point has no line
-        axes.plot(x, y, marker=".", color=color, label=label)
-    for kind in CRITICAL:
-        at = path["point"].values == kind
-        if at.any():
-            axes.plot(
-                x[at], y[at], linestyle="none", color=color, zorder=3.0, label=f"_{kind}",
-                **_MARKS[kind],
-            )  # fmt: skip
-    return Line2D([], [], color=color, linewidth=1.4, label=label)
-
-
-def _finish(
-    figure: Figure, axes: Axes, handles: list[Line2D], paths: Mapping[str, xr.Dataset]
-) -> Figure:
-    """Add the legend, whose entries are those that occur."""
-    keys = [handle for handle in handles if handle.get_label()]
+    colors = [style.CYCLE[index % len(style.CYCLE)] for index in range(len(curves))]
+    for index, curve in enumerate(curves):
+        _draw_curve(axes, curve, colors[index], 2.0 + 0.01 * index)
+    keys = [
+        style.key(curve.label, color=color, linewidth=1.4)
+        for curve, color in zip(curves, colors, strict=True)
+        if curve.label
+    ]
     gray: dict[str, Any] = {"color": style.GRAY, "linewidth": 1.4}
-    if any(not run.stable for path in paths.values() for run in runs(path)):
-        keys.append(Line2D([], [], **gray, label="stable"))
-        keys.append(Line2D([], [], **gray, linestyle=_UNSTABLE, label="unstable"))
-    for kind in CRITICAL:
-        if any((path["point"].values == kind).any() for path in paths.values()):
-            look = {"color": style.GRAY, "linestyle": "none", **_MARKS[kind]}
-            keys.append(Line2D([], [], **look, label=_NAMES[kind]))
-    if keys:
-        style.legend_below(figure, keys, 4, figure.get_figwidth())
+    if any(not stretch.stable for curve in curves for stretch in stretches(curve.path)):
+        keys.append(style.key("stable", **gray))
+        keys.append(style.key("unstable", **gray, linestyle=_UNSTABLE))
+    for kind, name in CRITICAL.items():
+        if any((curve.path["point"].values == kind).any() for curve in curves):
+            keys.append(style.key(name, color=style.GRAY, linestyle="none", **_MARKS[kind]))
     style.exponents(axes)
     axes.ticklabel_format(axis="x", scilimits=(-4, 4), useMathText=True)
     axes.xaxis.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
-    return style.finish(figure)
+    return style.finish(figure, keys, 4, figure.get_figwidth())
+
+
+def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
+    """Draw the stretches of a curve and its critical points."""
+    label, x, y, path = curve
+    for number, (start, stop, stable) in enumerate(stretches(path)):
+        part = slice(start, stop + 1)
+        look: dict[str, Any] = {"color": color, "linewidth": 1.4, "zorder": zorder}
+        dashes = "solid" if stable else _UNSTABLE
+        name = label if number == 0 and label else f"_{label}{number}"
+        axes.plot(x[part], y[part], linestyle=dashes, label=name, **look)
+    if len(x) == 1:  # a single point has no line
+        axes.plot(x, y, marker=".", color=color, label=label)
+    for kind, mark in _MARKS.items():
+        at = path["point"].values == kind
+        if at.any():
+            look = {"linestyle": "none", "color": color, "zorder": 3.0, **mark}
+            axes.plot(x[at], y[at], label=f"_{kind}", **look)
 
 
 def moved_supports(case: Case) -> tuple[list[int], str] | None:
@@ -213,7 +218,82 @@ def moved_supports(case: Case) -> tuple[list[int], str] | None:
     motion = sum((vector for vector, _ in case.imposed_terms), np.zeros(case.imposed.shape))
     if not motion.any():
         return None
-    _, axis = np.unravel_index(np.abs(motion).argmax(), motion.shape)
-    largest = motion[np.abs(motion[:, axis]).argmax(), axis]
-    together = np.isclose(motion[:, axis], largest, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(together).tolist(), ("-" if largest < 0.0 else "") + AXES[axis]
+    largest, direction = farthest(motion)
+    moved = motion[:, signed("direction", direction)[0]]
+    together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
+    return np.flatnonzero(together).tolist(), direction
+
+
+def draw_shapes(
+    case_or_structure: Case | Structure,
+    path: xr.Dataset,
+    points: int | Sequence[int] = 4,
+    scale: float = 1.0,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw the deformed sheet at points of a path, over the undeformed one in gray.
+
+    All shapes are drawn at the same scale.
+
+    Parameters
+    ----------
+    case_or_structure : Case or Structure
+        What moves.
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+    points : int or sequence of int
+        How many points, spread evenly over the way of the nodes with the first and the last among
+        them; or their numbers, negative ones from the end.
+    scale : float
+        Factor on the displacement in the picture.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One orthographic view for each point; below it the number of the point, its load factor
+        and what kind of point it is.
+
+    Raises
+    ------
+    InputError
+        A path of another structure, or no such point.
+    """
+    check_path(path, "path")
+    sheet = Sheet3D.of(case_or_structure)
+    numbers = chosen_points(path, points)
+    moved = displacements(path)[numbers]
+    sheet.check_nodes("path: it has", moved, "traced")
+    captions = [describe_point(path, number) for number in numbers]
+    notes = rest_keys(scale)
+    return side_by_side(sheet, sheet.nodes + scale * moved, captions, View(*view), notes, title)[0]
+
+
+def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
+    """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
+    count = path.sizes["step"]
+    if isinstance(points, int | np.integer):
+        if points < 1:
+            raise InputError(f"points: {points}; give at least one")
+        return evenly(path, int(points))
+    for number in points:
+        if not -count <= number < count:
+            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
+    if not len(points):
+        raise InputError("points: empty; give at least one")
+    return [int(number) % count for number in points]
+
+
+def describe_point(path: xr.Dataset, number: int) -> str:
+    """Text for a point: its number, load factor, and what is special about it."""
+    point = path.isel(step=number)
+    kind = str(point["point"].values)
+    remark = CRITICAL.get(kind, "")
+    if not remark and int(point["negative_eigenvalues"]) > 0:
+        remark = "unstable"
+    text = f"point {number}: load factor {float(point['load_factor']):.4g}"
+    return f"{text}, {remark}" if remark else text

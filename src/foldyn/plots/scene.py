@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,10 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.plots import style
 
+Points = NDArray[np.float64]
+"""Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""
+Indices = NDArray[np.int64]
+"""Numbers of nodes: an edge or a triangle in each row."""
 PAPER = "#F2DFB8"
 WIDTH = 7.0
 """Width of a figure, in inches."""
@@ -48,29 +52,21 @@ class Sheet3D:
     pattern: Any
     structure: Any
     case: Any
-    nodes: NDArray[np.float64]
-    triangles: NDArray[np.int64]
+    nodes: Points
+    triangles: Indices
 
     @classmethod
     def of(cls, thing: Any) -> Sheet3D:
         """Take a case, a structure or a pattern apart."""
         case = thing if hasattr(thing, "structure") else None
-        structure = case.structure if case is not None else thing
-        if not hasattr(structure, "pattern"):
-            pattern = structure
-            fans = [
-                (face[0], face[k], face[k + 1])
-                for face in pattern.faces
-                for k in range(1, len(face) - 1)
-            ]
-            return cls(pattern, None, None, pattern.vertices, np.array(fans))
-        return cls(
-            structure.pattern,
-            structure,
-            case,
-            np.asarray(structure.nodes, dtype=np.float64),
-            np.asarray(structure.triangles, dtype=np.int64),
-        )
+        structure = thing if case is None else case.structure
+        if hasattr(structure, "pattern"):
+            pattern, nodes, triangles = structure.pattern, structure.nodes, structure.triangles
+        else:
+            pattern, structure, nodes = structure, None, structure.vertices
+            triangles = [(face[0], *side) for face in pattern.faces for side in pairwise(face[1:])]
+        nodes = np.asarray(nodes, dtype=np.float64)
+        return cls(pattern, structure, case, nodes, np.asarray(triangles, dtype=np.int64))
 
     @cached_property
     def size(self) -> float:
@@ -78,7 +74,7 @@ class Sheet3D:
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     @cached_property
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> Indices:
         """Nodes along each edge of the pattern, creases first, shape (ne, p).
 
         p is 2, or for a shell the number of nodes along an edge, which bends.
@@ -89,17 +85,17 @@ class Sheet3D:
         return np.concatenate(both).astype(np.int64)
 
     @cached_property
-    def boundary(self) -> NDArray[np.int64]:
+    def boundary(self) -> Indices:
         """Edges of one panel only, shape (nb, p)."""
         return self.edges[len(self._creases) :]
 
     @cached_property
-    def pieces(self) -> NDArray[np.int64]:
+    def pieces(self) -> Indices:
         """Neighbors along all edges of the pattern, shape (ne (p - 1), 2)."""
         return np.stack([self.edges[:, :-1], self.edges[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
-    def inner_bars(self) -> NDArray[np.int64]:
+    def inner_bars(self) -> Indices:
         """Bars, or sides of a shell's triangles, that are on no edge of the pattern, (k, 2)."""
         if self.structure is None:
             return np.zeros((0, 2), dtype=np.int64)
@@ -109,18 +105,18 @@ class Sheet3D:
         return np.array(inner, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
-    def actuated(self) -> NDArray[np.int64]:
+    def actuated(self) -> Indices:
         """Creases that the case actuates, shape (k, p)."""
         if self.case is None:
             return np.zeros((0, 2), dtype=np.int64)
         return self.edges[self.case.actuated_creases]
 
     @property
-    def glows(self) -> bool:
-        """Whether actuated creases are marked: a glow of all would tell nothing and hide panels."""
+    def highlights(self) -> bool:
+        """Whether to highlight actuated creases: all of them would say nothing and hide panels."""
         return len(self.actuated) < len(self.pattern.creases)
 
-    def check_nodes(self, result: str, moved: NDArray[np.float64], done: str = "computed") -> None:
+    def check_nodes(self, result: str, moved: Points, done: str = "computed") -> None:
         """Refuse displacements (..., n, 3) of another number of nodes."""
         if moved.shape[-2:] != self.nodes.shape:
             raise InputError(
@@ -128,18 +124,14 @@ class Sheet3D:
                 f"that was {done}"
             )
 
-    def creases(self) -> dict[str, NDArray[np.int64]]:
+    def creases(self) -> dict[str, Indices]:
         """Return the creases (k, p) of each assignment that occurs."""
         creases = self.edges[: len(self._creases)]
         kinds = np.array(self.pattern.assignments, dtype=str)
-        return {
-            kind: creases[kinds == kind]
-            for kind in style.CREASES
-            if np.count_nonzero(kinds == kind)
-        }
+        return {kind: creases[kinds == kind] for kind in style.CREASES if (kinds == kind).any()}
 
     @property
-    def _creases(self) -> NDArray[np.int64]:
+    def _creases(self) -> Indices:
         return np.asarray(self.pattern.creases, dtype=np.int64).reshape(-1, 2)
 
 
@@ -151,14 +143,14 @@ class View:
     azimuth: float = -60.0
 
     @cached_property
-    def basis(self) -> NDArray[np.float64]:
+    def basis(self) -> Points:
         """Unit vectors to the right, up and towards the viewer, shape (3, 3)."""
         e, a = np.radians([self.elevation, self.azimuth])
         toward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
         right = np.array([-np.sin(a), np.cos(a), 0.0])
         return np.array([right, np.cross(toward, right), toward])
 
-    def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flat(self, points: Points) -> Points:
         """Return the points as seen on the screen, shape (..., 2)."""
         return points @ self.basis[:2].T
 
@@ -167,13 +159,13 @@ class Seen(NamedTuple):
     """The box around all that a view shows, and its size on the screen."""
 
     view: View
-    middle: NDArray[np.float64]
-    box: NDArray[np.float64]
-    corners: NDArray[np.float64]
-    size: NDArray[np.float64]
+    middle: Points
+    box: Points
+    corners: Points
+    size: Points
 
     @classmethod
-    def of(cls, points: NDArray[np.float64], view: View) -> Seen:
+    def of(cls, points: Points, view: View) -> Seen:
         """Take the box of all points (p, 3)."""
         low, high = points.min(axis=0), points.max(axis=0)
         # A flat sheet still gets a box of some height, or its ticks would fall on each other.
@@ -184,11 +176,7 @@ class Seen(NamedTuple):
 
 
 def view_figure(
-    points: NDArray[np.float64],
-    view: View,
-    title: str = "",
-    legend_rows: int = 0,
-    width: float = WIDTH,
+    points: Points, view: View, title: str = "", legend_rows: int = 0, width: float = WIDTH
 ) -> tuple[Figure, Axes3D]:
     """Return a figure with orthographic axes of equal scale that hold all the points (p, 3).
 
@@ -212,19 +200,14 @@ def add_view(figure: Figure, seen: Seen, center: tuple[float, float], scale: flo
     """Put axes for what is seen into a figure: the center in inches, the scale in inches per m."""
     width, height = figure.get_size_inches()
     side = 1.1 * seen.size.max() * scale  # of the square axes, which clip what they draw
-    corner = center[0] - 0.5 * side, center[1] - 0.5 * side
-    axes = Axes3D(
-        figure,
-        (corner[0] / width, corner[1] / height, side / width, side / height),
-        proj_type="ortho",
-        computed_zorder=False,
-    )
+    left, bottom = center[0] - 0.5 * side, center[1] - 0.5 * side
+    place = left / width, bottom / height, side / width, side / height
+    axes = Axes3D(figure, place, proj_type="ortho", computed_zorder=False)
     figure.add_axes(axes)
     axes.view_init(elev=seen.view.elevation, azim=seen.view.azimuth)
+    low, high = seen.middle - 0.5 * seen.box, seen.middle + 0.5 * seen.box
     for axis, name in enumerate("xyz"):
-        reach = 0.5 * seen.box[axis]
-        limits = seen.middle[axis] - reach, seen.middle[axis] + reach
-        getattr(axes, f"set_{name}lim")(*limits, view_margin=0)
+        getattr(axes, f"set_{name}lim")(low[axis], high[axis], view_margin=0)
     # copies: matplotlib scales what it is given
     axes.set_box_aspect(seen.box.copy(), zoom=1.0)
     flat = np.array(proj_transform(*seen.corners.T, axes.get_proj())[:2])
@@ -240,12 +223,7 @@ def _span(axes: Axes3D) -> float:
     return pixels / (axes.transData.transform((1.0, 0.0)) - axes.transData.transform((0.0, 0.0)))[0]
 
 
-def _frame(
-    axes: Axes3D,
-    middle: NDArray[np.float64],
-    box: NDArray[np.float64],
-    basis: NDArray[np.float64],
-) -> None:
+def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
     """Set ticks, grid, panes and labels; the basis is that of the view, in inches per meter."""
     ticks = _ticks(middle, box, basis)
     for axis, places in zip((axes.xaxis, axes.yaxis, axes.zaxis), ticks, strict=True):
@@ -258,12 +236,10 @@ def _frame(
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
     for name, pad in zip("xyz", _LABEL_PADS, strict=True):
         label = getattr(axes, f"set_{name}label")
-        label(f"{name} (m)", fontsize=style.LABEL, color=style.BLACK, labelpad=pad)
+        label(f"{name} (m)", **style.TEXT, labelpad=pad)
 
 
-def _ticks(
-    middle: NDArray[np.float64], box: NDArray[np.float64], basis: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
+def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
     """Return the ticks of each axis, those of x and y apart where the two axes meet."""
     ticks = []
     for center, length in zip(middle, box, strict=True):
@@ -283,9 +259,7 @@ def _ticks(
     return ticks
 
 
-def shades(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int64], color: str = PAPER
-) -> NDArray[np.float64]:
+def shades(vertices: Points, triangles: Indices, color: str = PAPER) -> NDArray[np.float64]:
     """Return a color per triangle, darker where it faces away from the light, shape (nt, 3)."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -296,7 +270,7 @@ def shades(
     return np.clip(bright[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
 
 
-def pieces(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+def pieces(vertices: Points, triangles: Indices) -> Points:
     """Cut triangles into smaller ones (np, 3, 3), as many of each."""
     count = _divisions(len(triangles))
     corners = []
@@ -310,9 +284,7 @@ def pieces(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArr
     return np.einsum("pcw,twd->tpcd", weights, vertices[triangles]).reshape(-1, 3, 3)
 
 
-def piece_colors(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int64], color: str = PAPER
-) -> NDArray[np.float64]:
+def piece_colors(vertices: Points, triangles: Indices, color: str = PAPER) -> NDArray[np.float64]:
     """Return the `shades` of the `pieces` of all triangles, shape (np, 3)."""
     each = _divisions(len(triangles)) ** 2
     return np.repeat(shades(vertices, triangles, color), each, axis=0)
@@ -325,7 +297,7 @@ def _divisions(count: int) -> int:
 
 def add_panels(
     axes: Axes3D,
-    corners: NDArray[np.float64],
+    corners: Points,
     colors: NDArray[np.float64],
     alpha: float = 1.0,
     zorder: float = 1.0,
@@ -350,7 +322,7 @@ def add_panels(
 
 def add_segments(
     axes: Axes3D,
-    segments: NDArray[np.float64],
+    segments: Points,
     color: str,
     width: float,
     linestyle: Any = "solid",

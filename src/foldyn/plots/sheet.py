@@ -1,20 +1,24 @@
-"""The drawn sheet: panels and edges that can be moved without drawing them anew."""
+"""Drawn sheets, alone or side by side: panels and edges that can move without being redrawn."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
 from foldyn.plots import scene, style
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Indices, Points, Sheet3D, View
 from foldyn.plots.visibility import hidden_points, split_edges
 
 _HIDDEN = 0.3  # opacity of what lies behind a panel
+_MARGIN = 0.15  # inches
+_CAPTION, _LINE = 0.42, 0.16  # inches; the caption stands below its sheet, more lines take more
+_TALLEST = 3.2  # inches
 
 
 def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
@@ -26,18 +30,17 @@ def add_undeformed(axes: Axes3D, sheet: Sheet3D) -> None:
 
 def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
     """Legend entries of the sheet at rest, and of the factor on displacements if it is not 1."""
-    keys = [Line2D([], [], color=style.LIGHT, linewidth=1.2, label=state)]
+    keys = [style.key(state, color=style.LIGHT, linewidth=1.2)]
     if scale != 1.0:
-        keys.append(Line2D([], [], linestyle="none", label=f"displacement times {scale:g}"))
+        keys.append(style.key(f"displacement times {scale:g}", linestyle="none"))
     return keys
 
 
-@dataclass(frozen=True)
-class EdgeKind:
+class EdgeKind(NamedTuple):
     """Edges that look alike: the nodes along them (k, p), look and name."""
 
     name: str
-    edges: NDArray[np.int64]
+    edges: Indices
     color: str
     width: float
     dashes: Any
@@ -46,7 +49,7 @@ class EdgeKind:
 def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[EdgeKind]:
     """Return the kinds of edges that a sheet has, from the lowest to the topmost.
 
-    Its inner bars, or the sides of a shell's triangles, are among them where `elements`, the glow
+    Its inner bars, or the sides of a shell's triangles, are among them where `elements`, highlights
     of actuated creases where `actuated`.
     """
     kinds = []
@@ -66,8 +69,8 @@ def edge_kinds(sheet: Sheet3D, elements: bool, actuated: bool = True) -> list[Ed
 def edge_keys(sheet: Sheet3D, elements: bool = False, actuated: bool = True) -> list[Line2D]:
     """Return legend entries of a sheet's edges."""
     return [
-        Line2D([], [], color=k.color, linewidth=k.width, linestyle=k.dashes, label=k.name)
-        for k in edge_kinds(sheet, elements, actuated)
+        style.key(kind.name, color=kind.color, linewidth=kind.width, linestyle=kind.dashes)
+        for kind in edge_kinds(sheet, elements, actuated)
     ]
 
 
@@ -95,7 +98,7 @@ class DrawnSheet:
         self,
         axes: Axes3D,
         sheet: Sheet3D,
-        points: NDArray[np.float64],
+        points: Points,
         view: View,
         elements: bool = False,
         actuated: bool = True,
@@ -104,7 +107,7 @@ class DrawnSheet:
         hidden, visible = self._pieces(points)
         self._behind = scene.add_panels(axes, *hidden, zorder=0.9)
         self._panels = scene.add_panels(axes, *visible)
-        self._lines: list[tuple[Any, Any, NDArray[np.int64]]] = []
+        self._lines: list[tuple[Any, Any, Indices]] = []
         for kind in edge_kinds(sheet, elements, actuated):
             visible, hidden = self._split(kind.edges, points)
             look = kind.color, 0.7 * kind.width, kind.dashes
@@ -113,7 +116,7 @@ class DrawnSheet:
             front.set_label(kind.name)
             self._lines.append((front, behind, kind.edges))
 
-    def move(self, points: NDArray[np.float64]) -> None:
+    def move(self, points: Points) -> None:
         """Put the nodes in other positions (n, 3)."""
         for panels, (corners, colors) in zip(
             (self._behind, self._panels), self._pieces(points), strict=True
@@ -125,7 +128,7 @@ class DrawnSheet:
             front.set_segments(visible)
             behind.set_segments(hidden)
 
-    def _pieces(self, points: NDArray[np.float64]) -> list[tuple[NDArray, NDArray]]:
+    def _pieces(self, points: Points) -> list[tuple[NDArray, NDArray]]:
         """Return corners and colors of the hidden pieces of panels, and of the others."""
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
@@ -135,7 +138,81 @@ class DrawnSheet:
         )
         return [(corners[chosen], colors[chosen]) for chosen in (hidden, ~hidden)]
 
-    def _split(
-        self, edges: NDArray[np.int64], points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _split(self, edges: Indices, points: Points) -> tuple[Points, Points]:
         return split_edges(edges, points, self._sheet.triangles, self._view, self._sheet.size)
+
+
+def side_by_side(
+    sheet: Sheet3D,
+    shapes: Points,
+    captions: Sequence[str],
+    view: View,
+    notes: Sequence[Line2D] = (),
+    title: str = "",
+    extent: Points | None = None,
+    width: float = 9.0,
+    most_columns: int = 3,
+) -> tuple[Figure, list[DrawnSheet]]:
+    """Draw a sheet in several positions, over where its nodes are in gray.
+
+    Parameters
+    ----------
+    sheet : Sheet3D
+        The sheet; its `nodes` are the gray ones.
+    shapes : ndarray, shape (k, n, 3)
+        Positions of its nodes (m).
+    captions : sequence of str
+        What stands below each shape, all of as many lines as the longest.
+    view : View
+    notes : sequence of Line2D
+        Legend entries that come before those of the edges.
+    title : str
+        Title of the figure.
+    extent : ndarray, shape (p, 3), optional
+        Points (m) that every view has room for, beside the gray nodes; by default the shapes.
+    width : float
+        Width of the figure (inches).
+    most_columns : int
+        Shapes in a row at most.
+
+    Returns
+    -------
+    figure : Figure
+        One orthographic view for each sheet, in the order of the shapes.
+    sheets : list of DrawnSheet
+        They can be moved within the extent that the figure was made for.
+    """
+    count = len(shapes)
+    room = np.vstack([sheet.nodes, shapes.reshape(-1, 3) if extent is None else extent])
+    seen = scene.Seen.of(room, view)
+    keys = [*notes, *edge_keys(sheet, actuated=sheet.highlights)]
+
+    columns = min(count, most_columns)
+    columns = -(-count // -(-count // columns))  # rows as full as can be
+    rows = -(-count // columns)
+    cell = width / columns
+    flat = view.flat(room)
+    low, size = flat.min(axis=0), np.ptp(flat, axis=0)
+    inches = min((cell - 2 * _MARGIN) / size[0], _TALLEST / size[1])  # per meter
+    aside = inches * (view.flat(seen.middle) - low - 0.5 * size)  # of the box from its contents
+    below = _CAPTION + _LINE * max(caption.count("\n") for caption in captions)
+    top = 0.42 if title else 0.1
+    entries = style.columns_that_fit(keys, width, 4)
+    bottom = 0.12 + 0.19 * -(-len(keys) // entries)
+    step = size[1] * inches + below
+    figure = style.new_figure(width, top + rows * step + bottom, title, constrained=False)
+    height = figure.get_figheight()
+    sheets = []
+    for place, (caption, shape) in enumerate(zip(captions, shapes, strict=True)):
+        row, column = divmod(place, columns)
+        here = min(columns, count - row * columns)  # the last row stands in the middle
+        middle = width / 2 + (column - 0.5 * (here - 1)) * cell
+        floor = height - top - (row + 1) * step + below
+        center = middle + aside[0], floor + 0.5 * size[1] * inches + aside[1]
+        axes = scene.add_view(figure, seen, center, inches)
+        axes.set_axis_off()
+        add_undeformed(axes, sheet)
+        sheets.append(DrawnSheet(axes, sheet, shape, view, actuated=sheet.highlights))
+        spot = middle / width, (floor - 0.08) / height
+        figure.text(*spot, caption, ha="center", va="top", **style.TEXT)
+    return style.finish(figure, keys, entries), sheets

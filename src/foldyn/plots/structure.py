@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import loads as histories
 from foldyn.plots import marks, scene, style
-from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure
 
@@ -117,11 +116,10 @@ def draw_structure(
         scene.add_segments(axes, group.shafts, group.color, 1.8, zorder=7.0)
         marks.add_triangles(axes, group.heads, group.color, 7.5)
     _write_labels(axes, sheet, points, numbers, groups, (triangles, shafts, heads), sight)
-    style.legend_below(figure, keys, columns)
-    return style.finish(figure)
+    return style.finish(figure, keys, columns)
 
 
-def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDArray[np.float64]:
+def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> Points:
     """Return displacements of all nodes (n, 3), zero for None."""
     if displacement is None:
         return np.zeros_like(sheet.nodes)
@@ -136,30 +134,26 @@ def checked_displacement(sheet: Sheet3D, displacement: ArrayLike | None) -> NDAr
     return u
 
 
-@dataclass(frozen=True)
-class _Supports:
+class _Supports(NamedTuple):
     """Marks of one kind of support: triangles (k, 3, 3), and the axes of each node."""
 
-    triangles: NDArray[np.float64]
+    triangles: Points
     axes: list[tuple[int, str]]
     color: str
     ink: str  # of the axes' names
     text: str
 
 
-@dataclass(frozen=True)
-class _Arrows:
+class _Arrows(NamedTuple):
     """Arrows of one color, and their legend entries."""
 
-    shafts: NDArray[np.float64]
-    heads: NDArray[np.float64]
+    shafts: Points
+    heads: Points
     color: str
     keys: list[Line2D]
 
 
-def _supports(
-    sheet: Sheet3D, points: NDArray[np.float64], size: float, sight: View
-) -> list[_Supports]:
+def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Supports]:
     """Return the marks of the nodes that are held, and of those that are moved."""
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
     moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
@@ -174,83 +168,58 @@ def _supports(
     ]
 
 
-def _motions(
-    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
-) -> list[_Arrows]:
+def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    base = [vectors for vectors, _ in sheet.case.base_terms]
-    middle = [points[np.any(vectors != 0.0, axis=1)].mean(axis=0) for vectors in base]
-    moves = np.array([histories.signed_peak(vectors) for vectors in base])
-    imposed = [vectors for vectors, _ in sheet.case.imposed_terms]
+    imposed = [(points, vectors) for vectors, _ in sheet.case.imposed_terms]
+    base = [
+        (points[vectors.any(axis=1)].mean(axis=0)[None], histories.signed_peak(vectors)[None])
+        for vectors, _ in sheet.case.base_terms
+    ]
     return [
-        *_nodal(points, imposed, length, sight, style.IMPOSED, histories.describe_imposed),
-        *_single(np.array(middle), moves, length, sight, style.BASE, histories.describe_base),
+        *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),
+        *_arrows(base, length, sight, style.BASE, histories.describe_base),
     ]
 
 
-def _loads(
-    sheet: Sheet3D, points: NDArray[np.float64], length: float, sight: View
-) -> list[_Arrows]:
+def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of forces, and of gravity at the center of mass."""
-    forces = [vectors for vectors, _ in sheet.case.force_terms]
-    gravity = np.array([vector for vector, _ in sheet.case.gravity_terms])
-    middle = [_center_of_mass(sheet, points)] * len(gravity) if len(gravity) else []
+    forces = [(points, vectors) for vectors, _ in sheet.case.force_terms]
+    gravity = [
+        (_center_of_mass(sheet, points)[None], vector[None])
+        for vector, _ in sheet.case.gravity_terms
+    ]
     return [
-        *_nodal(points, forces, length, sight, style.LOAD, histories.describe_load),
-        *_single(
-            np.array(middle),
-            gravity,
-            1.5 * length,
-            sight,
-            style.GRAVITY,
-            histories.describe_gravity,
-        ),
+        *_arrows(forces, length, sight, style.LOAD, histories.describe_load),
+        *_arrows(gravity, 1.5 * length, sight, style.GRAVITY, histories.describe_gravity),
     ]
 
 
-def _nodal(
-    points: NDArray[np.float64],
-    terms: list[NDArray[np.float64]],
+def _arrows(
+    terms: list[tuple[Points, Points]],
     length: float,
     sight: View,
     color: str,
-    describe: Callable[[NDArray[np.float64]], str],
+    describe: Callable[[Points], str],
 ) -> list[_Arrows]:
-    """Return arrows from nodes along the vectors (n, 3) of several terms, one legend entry each."""
-    terms = [vectors for vectors in terms if vectors.any()]
+    """Return arrows from points along vectors, both (k, 3) in each term, one key for each term."""
+    terms = [(points, vectors) for points, vectors in terms if vectors.any()]
     if not terms:
         return []
-    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for vectors in terms)
-    drawn = [marks.load_arrows(points, vectors, longest, length, sight) for vectors in terms]
-    keys = [_arrow_key(color, describe(vectors)) for vectors in terms[:_MOST_LOADS_LISTED]]
+    longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors in terms)
+    drawn = [marks.load_arrows(*term, longest, length, sight) for term in terms]
+    look = {"color": color, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
+    keys = [
+        style.key(describe(vectors if len(vectors) > 1 else vectors[0]), **look)
+        for _, vectors in terms[:_MOST_LOADS_LISTED]
+    ]
     hidden = len(terms) - _MOST_LOADS_LISTED
     if hidden > 0:
-        keys.append(Line2D([], [], linestyle="none", label=f"and {hidden} more loads"))
+        keys.append(style.key(f"and {hidden} more loads", linestyle="none"))
     shafts, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     return [_Arrows(shafts, heads, color, keys)]
 
 
-def _single(
-    starts: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    length: float,
-    sight: View,
-    color: str,
-    describe: Callable[[NDArray[np.float64]], str],
-) -> list[_Arrows]:
-    """Return one arrow from each start (k, 3) along its vector (k, 3)."""
-    if not vectors.any():
-        return []
-    longest = float(np.linalg.norm(vectors, axis=1).max())
-    keys = [_arrow_key(color, describe(vector)) for vector in vectors]
-    return [_Arrows(*marks.load_arrows(starts, vectors, longest, length, sight), color, keys)]
-
-
-def _arrow_key(color: str, text: str) -> Line2D:
-    return Line2D([], [], color=color, marker=">", markersize=6.0, linewidth=1.8, label=text)
-
-
-def _center_of_mass(sheet: Sheet3D, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
     """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
     mass = np.asarray(sheet.structure.mass.sum(axis=0)).ravel()
     return mass @ points / mass.sum()
@@ -259,10 +228,10 @@ def _center_of_mass(sheet: Sheet3D, points: NDArray[np.float64]) -> NDArray[np.f
 def _write_labels(
     axes: Axes3D,
     sheet: Sheet3D,
-    points: NDArray[np.float64],
+    points: Points,
     numbers: bool | str,
     groups: list[_Supports],
-    drawn: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    drawn: tuple[Points, Points, Points],
     sight: View,
 ) -> None:
     """Write node numbers and the directions of supports where they hide least."""

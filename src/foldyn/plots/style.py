@@ -7,13 +7,15 @@ fonts, colors and widths are set one by one, so the caller's usual settings do n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from numpy.typing import NDArray
 
 # Okabe and Ito's palette: told apart with every common kind of color blindness.
 BLUE = "#0072B2"
@@ -45,6 +47,9 @@ GRAVITY = BLACK
 DPI = 150
 FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere
 TITLE, LABEL, TICK, NOTE = 10.5, 9.0, 8.0, 7.5
+TEXT: dict[str, Any] = {"fontsize": LABEL, "color": BLACK}
+FINE: dict[str, Any] = {"fontsize": NOTE, "color": BLACK}
+"""Look of labels, and of notes inside a frame."""
 
 
 def new_figure(width: float, height: float, title: str = "", constrained: bool = True) -> Figure:
@@ -75,11 +80,11 @@ def new_figure(width: float, height: float, title: str = "", constrained: bool =
 
 def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> None:
     """Give axes their labels, grid and colors."""
-    axes.set_xlabel(xlabel, fontsize=LABEL, color=BLACK)
-    axes.set_ylabel(ylabel, fontsize=LABEL, color=BLACK)
+    axes.set_xlabel(xlabel, **TEXT)
+    axes.set_ylabel(ylabel, **TEXT)
     if title:
         # A fixed height: left to itself, a title moves above the exponent of the axis.
-        axes.set_title(title, fontsize=LABEL, y=1.0, pad=4.0, color=BLACK)
+        axes.set_title(title, **TEXT, y=1.0, pad=4.0)
     axes.set_facecolor("white")
     axes.grid(True, color="#E4E4E4", linewidth=0.6, linestyle="solid")
     axes.set_axisbelow(True)
@@ -90,6 +95,37 @@ def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> No
         spine.set_linewidth(0.8)
 
 
+def rows(
+    size: tuple[float, float],
+    title: str,
+    xlabel: str,
+    ylabels: Sequence[str],
+    titles: Sequence[str] = (),
+    heights: Sequence[float] | None = None,
+) -> tuple[Figure, NDArray]:
+    """Return a figure of axes in rows that share the horizontal axis, named below the last one.
+
+    Parameters
+    ----------
+    size : tuple of float
+        Width and height of the figure (inches).
+    title, xlabel : str
+    ylabels : sequence of str
+        One for each row.
+    titles : sequence of str, optional
+        Titles of the rows.
+    heights : sequence of float, optional
+        Heights of the rows relative to each other.
+    """
+    figure = new_figure(*size, title)
+    grid = {"height_ratios": heights}
+    axes = figure.subplots(len(ylabels), 1, squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
+    for k, row in enumerate(axes):
+        frame(row, xlabel if row is axes[-1] else "", ylabels[k], titles[k] if titles else "")
+    figure.align_ylabels(list(axes))
+    return figure, axes
+
+
 def line_style(index: int) -> dict:
     """Return color, dashes and width of the curve number `index`."""
     return {
@@ -97,6 +133,22 @@ def line_style(index: int) -> dict:
         "linestyle": DASHES[(index + index // len(CYCLE)) % len(DASHES)],
         "linewidth": 1.1,
     }
+
+
+def ring(color: str, size: float = 4.5) -> dict[str, Any]:
+    """Return the look of a white dot with an outline of a color."""
+    return {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": size,
+        "markerfacecolor": "white",
+        "markeredgecolor": color,
+    }
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Return a legend entry."""
+    return Line2D([], [], label=label, **look)
 
 
 def exponents(axes: Axes, ticks: int = 6) -> None:
@@ -132,14 +184,14 @@ def _constrained(figure: Figure) -> bool:
 
 def legend_below(
     figure: Figure, handles: Sequence, columns: int = 3, width: float | None = None
-) -> Legend:
+) -> None:
     """Put one legend for the whole figure below its axes, where it hides no data.
 
     With a width (inches) it has as many columns, at most so many, as `columns_that_fit`.
     """
     if width is not None:
         columns = columns_that_fit(handles, width, columns)
-    return figure.legend(
+    figure.legend(
         handles=list(handles),
         # "outside" makes room, which only the layout engine can do.
         loc="outside lower center" if _constrained(figure) else "lower center",
@@ -152,8 +204,12 @@ def legend_below(
     )
 
 
-def finish(figure: Figure) -> Figure:
-    """Set family and weight of every text in the figure, and return it."""
+def finish(
+    figure: Figure, handles: Sequence = (), columns: int = 3, width: float | None = None
+) -> Figure:
+    """Add the legend, if it has entries, as `legend_below`; set all fonts; return the figure."""
+    if handles:
+        legend_below(figure, handles, columns, width)
     for text in figure.findobj(Text):
         text.set(fontfamily=FAMILY, fontweight="normal")
     for axes in figure.axes:

@@ -1,4 +1,4 @@
-"""Histories of tracked nodes or points, with how well each was measured."""
+"""Tracked nodes: their histories, and the model over the picture in which it was recognized."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.along import AXES, check_nodes_of
+from foldyn.values import choice
 
+_MARGIN = 0.08  # of the model's size, around it in an overlay
+_WIDTH = 8.0  # inches
 _LABELS = {"time": "time (s)", "photo": "photo", "load": "load (N)"}
 
 
@@ -46,46 +51,45 @@ def plot_tracks(
     """
     if "displacement" not in tracks:
         raise InputError("tracks: without a model there are pixels only; track with a model")
-    if not len(nodes):
-        raise InputError("nodes: empty; name at least one node to show")
-    wrong = [node for node in nodes if node not in tracks["node"].values]
-    if wrong:
-        raise InputError(f"nodes: {wrong[0]} is none of the {tracks.sizes['node']} tracked nodes")
+    nodes = check_nodes_of({"tracks": tracks}, nodes)
     moved = tracks["displacement"]
     if axis is None:
-        size = np.nan_to_num(moved.sel(node=list(nodes)).values)
-        axis = "xyz"[int(np.ptp(size.reshape(-1, 3), axis=0).argmax())]
-    if axis not in ("x", "y", "z"):
-        raise InputError(f'axis: {axis!r} is no direction; use "x", "y" or "z"')
-    along = "photo" if "photo" in tracks.dims else "time"
+        size = np.nan_to_num(moved.sel(node=nodes).values)
+        axis = AXES[int(np.ptp(size.reshape(-1, 3), axis=0).argmax())]
+    choice("axis", axis, AXES)
+    along = _dimension(tracks)
     shown = "load" if along == "photo" and "load" in tracks.coords else along
-    across, label = tracks[shown].values, _LABELS[shown]
-    figure = style.new_figure(8.0, 1.1 + 1.6 * len(nodes), title)
-    grid = figure.subplots(len(nodes), 1, squeeze=False, sharex="col")[:, 0]
+    across = tracks[shown].values
+    names = [_name(tracks, node) for node in nodes]
+    size = _WIDTH, 1.1 + 1.6 * len(nodes)
+    ylabels = [f"{axis} displacement (m)"] * len(nodes)
+    figure, rows = style.rows(size, title, _LABELS[shown], ylabels, names)
+    mark = {"marker": "o", "markersize": 4} if along == "photo" else {}
     keys = []
-    for row, (node, axes) in enumerate(zip(nodes, grid, strict=True)):
-        last = row == len(nodes) - 1
-        share = float(tracks["tracked"].sel(node=node))
-        name = f"node {node}: measured in {share:.1%}"
-        if "error" in tracks and np.isfinite(tracks["error"].sel(node=node)):
-            name += f", standard error {1e6 * float(tracks['error'].sel(node=node)):.2g} µm"
-        style.frame(axes, label if last else "", f"{axis} displacement (m)", name)
+    for row, (node, axes) in enumerate(zip(nodes, rows, strict=True)):
+        lines = []
         if truth is not None and node in truth:
-            (key,) = axes.plot(
-                across, np.asarray(truth[node]), **style.line_style(1) | {"label": "true motion"}
-            )
-            keys += [key] if row == 0 else []
-        look = style.line_style(0) | {"label": "tracked"}
-        if along == "photo":
-            look |= {"marker": "o", "markersize": 4}
-        (key,) = axes.plot(across, moved.sel(node=node, axis=axis).values, **look)
-        keys += [key] if row == 0 else []
+            look = style.line_style(1) | {"label": "true motion"}
+            lines += axes.plot(across, np.asarray(truth[node]), **look)
+        look = style.line_style(0) | {"label": "tracked"} | mark
+        lines += axes.plot(across, moved.sel(node=node, axis=axis).values, **look)
+        keys += lines if row == 0 else []
         axes.margins(x=0.02 if along == "photo" else 0.0)
         style.exponents(axes, ticks=5)
-    if len(keys) > 1:
-        style.legend_below(figure, keys)
-    figure.align_ylabels(grid)
-    return style.finish(figure)
+    return style.finish(figure, keys if len(keys) > 1 else [])
+
+
+def _dimension(tracks: xr.Dataset) -> str:
+    """Dimension along which pictures were taken."""
+    return "photo" if "photo" in tracks.dims else "time"
+
+
+def _name(tracks: xr.Dataset, node: int) -> str:
+    """Title of a node's history: how well it was measured."""
+    name = f"node {node}: measured in {float(tracks['tracked'].sel(node=node)):.1%}"
+    if "error" in tracks and np.isfinite(tracks["error"].sel(node=node)):
+        name += f", standard error {1e6 * float(tracks['error'].sel(node=node)):.2g} µm"
+    return name
 
 
 def plot_steps(
@@ -111,17 +115,98 @@ def plot_steps(
     """
     if not steps:
         raise InputError("steps: empty; give at least the record as measured")
-    figure = style.new_figure(7.5, 0.8 + 1.35 * len(steps), title)
-    grid = figure.subplots(len(steps), 1, squeeze=False, sharex="col")[:, 0]
-    for row, (name, (time, values)) in enumerate(steps.items()):
+    size = 7.5, 0.8 + 1.35 * len(steps)
+    figure, rows = style.rows(size, title, "time (s)", [f"({unit})"] * len(steps), list(steps))
+    for axes, (name, (time, values)) in zip(rows, steps.items(), strict=True):
         t: NDArray = np.asarray(time, dtype=np.float64)
         x: NDArray = np.asarray(values, dtype=np.float64)
         if t.shape != x.shape:
             raise InputError(f"steps: {name!r} has {t.shape} times and {x.shape} values")
-        last = row == len(steps) - 1
-        style.frame(grid[row], "time (s)" if last else "", f"({unit})", name)
-        grid[row].plot(t, x, **style.line_style(0))
-        style.exponents(grid[row], ticks=4)
-        grid[row].margins(x=0.0)
-    figure.align_ylabels(grid)
+        axes.plot(t, x, **style.line_style(0))
+        style.exponents(axes, ticks=4)
+        axes.margins(x=0.0)
     return style.finish(figure)
+
+
+def draw_overlay(
+    picture: NDArray[np.uint8], tracks: xr.Dataset, at: int | None = None, title: str = ""
+) -> Figure:
+    """Draw the projected model, the tracked nodes and their numbers over a picture.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, shape (height, width)
+        The frame or photograph, whole.
+    tracks : xarray.Dataset
+        Of `foldyn.experiment`; with a model, whose edges are then drawn as it was recognized.
+    at : int or None
+        Index of the frame or photograph; None: the frame in which the model was recognized.
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        There is no such frame.
+    """
+    along = _dimension(tracks)
+    index = int(tracks.attrs.get("match_frame", 0)) if at is None else int(at)
+    if not 0 <= index < tracks.sizes[along]:
+        raise InputError(f"at: {index}; there are {tracks.sizes[along]} along {along}")
+    seen = tracks["position_px"].values[index]
+    nodes = tracks["node_of_point"].values
+    projected = tracks.get("projected_px")
+    model = np.zeros((0, 2))
+    if projected is not None:
+        model = projected.values[index] if along in projected.dims else projected.values
+    low, high = _extent(np.concatenate([seen, model]), picture.shape)
+    span = high - low
+    # a line above for the title, two below for the legend
+    height = 0.9 + _WIDTH * float(np.clip(span[1] / span[0], 0.3, 1.6))
+    figure = style.new_figure(_WIDTH, height, title)
+    axes = figure.add_subplot()
+    axes.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+    keys = []
+    if len(model):
+        for a, b in tracks["edges"].values:
+            axes.plot(*model[[a, b]].T, color=style.SKY, linewidth=0.7, linestyle="solid")
+        keys.append(style.key("model, projected", color=style.SKY, linewidth=0.9))
+    known = np.isfinite(seen[:, 0])
+    named, others = known & (nodes >= 0), known & (nodes < 0)
+    missing = np.setdiff1d(np.arange(len(model)), nodes[named])
+    look = {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 1.1}
+    for points, marker, size, color, label in (
+        (seen[named], "o", 6, style.VERMILLION, "tracked node"),
+        (seen[others], "s", 6, style.ORANGE, "other tracked corner"),
+        (model[missing], "x", 5, style.YELLOW, "node not found"),
+    ):
+        if len(points):
+            look |= {"marker": marker, "markersize": size, "markeredgecolor": color}
+            keys += axes.plot(*points.T, label=label, **look)
+    for point in np.flatnonzero(named):
+        axes.annotate(
+            str(nodes[point]), seen[point], xytext=(4, 4), textcoords="offset points",
+            fontsize=style.NOTE, color=style.YELLOW,
+            path_effects=[withStroke(linewidth=1.6, foreground=style.BLACK)],
+        )  # fmt: skip
+    style.frame(axes, "u (pixels)", "v (pixels)")
+    axes.grid(False)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(high[1], low[1])
+    return style.finish(figure, keys, columns=4)
+
+
+def _extent(
+    points: NDArray[np.float64], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Part of the picture around all points."""
+    whole = np.array([shape[1], shape[0]], dtype=np.float64) - 0.5
+    known = points[np.isfinite(points[:, 0])]
+    if not len(known):
+        return np.full(2, -0.5), whole
+    low, high = known.min(axis=0), known.max(axis=0)
+    margin = _MARGIN * float((high - low).max()) + 4.0
+    return np.maximum(low - margin, -0.5), np.minimum(high + margin, whole)

@@ -8,18 +8,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.plots.scene import View
+from foldyn.plots.scene import Indices, Points, View
 
 SAMPLES = 24  # pieces per edge: the ends of a hidden part are found to 1/24 of the edge, about
 _CHUNK = 1_000_000  # point-triangle pairs tested at a time (about 100 MB)
 
 
 def hidden_points(
-    points: NDArray[np.float64],
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    view: View,
-    size: float,
+    points: Points, vertices: Points, triangles: Indices, view: View, size: float
 ) -> NDArray[np.bool_]:
     """Tell which points (p, 3) lie behind a triangle as seen along the view.
 
@@ -45,9 +41,7 @@ def hidden_points(
     return hidden
 
 
-def _near_pairs(
-    points: NDArray[np.float64], corners: NDArray[np.float64]
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+def _near_pairs(points: Points, corners: Points) -> Iterator[tuple[Indices, Indices]]:
     """Give all pairs of points (p, 2) and triangles (3, t, 2) that may overlap, some at a time.
 
     The screen is cut into about as many cells as there are triangles: only a triangle whose
@@ -61,7 +55,7 @@ def _near_pairs(
     cells = max(1, round(np.sqrt(count)))
     scale = cells / np.where(across > 0.0, across, 1.0)
 
-    def cell(places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def cell(places: Points) -> Indices:
         return np.clip(np.floor((places - corner) * scale), 0, cells - 1).astype(np.int64)
 
     first, last = cell(low), cell(high)
@@ -87,18 +81,14 @@ def _near_pairs(
         start = stop
 
 
-def _ranks(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _ranks(counts: Indices) -> Indices:
     """Return 0, 1, ..., count - 1 for each count, in a row."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def split_edges(
-    edges: NDArray[np.int64],
-    vertices: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    view: View,
-    size: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    edges: Indices, vertices: Points, triangles: Indices, view: View, size: float
+) -> tuple[Points, Points]:
     """Cut edges (k, p), each straight from node to node, into parts in sight and hidden ones.
 
     Returns
@@ -125,13 +115,13 @@ def split_edges(
     return visible, hidden
 
 
-def _point(line: NDArray[np.float64], place: float) -> NDArray[np.float64]:
+def _point(line: Points, place: float) -> Points:
     """Point at a place from 0 to p - 1 of a line (p, 3)."""
     k = min(int(place), len(line) - 2)
     return line[k] + (line[k + 1] - line[k]) * (place - k)
 
 
-def _together(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _together(parts: list[Points]) -> Points:
     """Lines of different numbers of points in one array."""
     longest = max((len(part) for part in parts), default=2)
     same = [np.concatenate([part, part[-1:].repeat(longest - len(part), 0)]) for part in parts]

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from os import PathLike
 from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
@@ -17,14 +18,19 @@ from PIL import Image
 
 from foldyn.errors import ComputationError, InputError
 from foldyn.plots import ANIMATIONS
+from foldyn.values import number
+from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
+DPI = {".gif": 100, ".mp4": 200}
+"""Dots per inch of an animation by the end of the file's name."""
+_FASTEST = {".gif": 50, ".mp4": 60}  # viewers slow down GIFs of shorter frames
 _COLORS = 128  # of a GIF, for all its pictures: 256 for each would take three times the space
 _SAMPLES = 8  # pictures from which these colors are taken
 
 
 class GifWriter(PillowWriter):
-    """A GIF that plays for ever, all its pictures in the same few colors.
+    """A GIF that loops forever, all its pictures in the same few colors.
 
     Attributes
     ----------
@@ -54,13 +60,8 @@ class GifWriter(PillowWriter):
             picture.quantize(palette=palette, dither=Image.Dither.NONE)
             for picture in self._pictures
         )
-        first.save(
-            self.outfile,
-            save_all=True,
-            append_images=others,
-            duration=round(1000 / self.rate),
-            loop=0,
-        )
+        duration = round(1000 / self.rate)
+        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0)
 
 
 def _common_palette(pictures: list[Image.Image]) -> Image.Image:
@@ -103,8 +104,23 @@ WRITERS = dict(zip((f".{kind}" for kind in ANIMATIONS), (GifWriter, Mp4Writer), 
 """Writers of an animation by the end of the file's name."""
 
 
+def checked_file(path: str | PathLike[str], frames: int, fps: int) -> Path:
+    """Return the file to write when all that an animation needs is there."""
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in WRITERS:
+        raise InputError(f"path: {path.name!r}; an animation is written as {' or '.join(WRITERS)}")
+    if not path.parent.is_dir():
+        raise InputError(f"path: there is no directory {path.parent}; make it first")
+    number("fps", fps, least=1, most=_FASTEST[kind], unit="pictures per second")
+    whole_number("frames", frames, least=2, what="pictures")
+    if kind == ".mp4":
+        find_ffmpeg()
+    return path
+
+
 @contextmanager
-def filmed(writer: GifWriter | Mp4Writer, figure: Figure, path: Path, dpi: float) -> Iterator[None]:
+def filmed(figure: Figure, path: Path, fps: int) -> Iterator[GifWriter | Mp4Writer]:
     """Make a file of the pictures that the writer grabs meanwhile; it appears when complete.
 
     Raises
@@ -112,14 +128,16 @@ def filmed(writer: GifWriter | Mp4Writer, figure: Figure, path: Path, dpi: float
     ComputationError
         ffmpeg could not write it.
     """
+    kind = path.suffix.lower()
+    writer = WRITERS[kind](fps=fps)
     try:
-        with whole(path) as part, writer.saving(figure, str(part), dpi):
-            yield
+        with whole(path) as part, writer.saving(figure, str(part), DPI[kind]):
+            yield writer
     except CalledProcessError as error:
-        said = (error.stderr or "").strip().splitlines()
+        lines = (error.stderr or "").strip().splitlines()
         raise ComputationError(
-            f"{path}: ffmpeg could not write it ({said[-1] if said else error}); "
-            "write .gif, or an ffmpeg with H.264: pip install imageio-ffmpeg"
+            f"{path}: ffmpeg could not write it ({lines[-1] if lines else error}); "
+            "write a GIF, or install an ffmpeg with H.264: pip install imageio-ffmpeg"
         ) from None
 
 
@@ -131,9 +149,9 @@ def find_ffmpeg() -> str:
     InputError
         There is neither.
     """
-    found = shutil.which("ffmpeg")
-    if found is not None:
-        return found
+    program = shutil.which("ffmpeg")
+    if program is not None:
+        return program
     try:
         from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingImports]
 

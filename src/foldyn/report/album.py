@@ -1,22 +1,22 @@
-"""What the pages of motions and paths share: figures in a folder, the part on the structure."""
+"""What the pages of analyses share: figures in a folder, the structure, tables of computations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 
 from foldyn import plots
 from foldyn.cases import Case
-from foldyn.report.sections import Heading, Picture, Section, Text
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
 
-if TYPE_CHECKING:
-    import xarray
-
+ByRule = Mapping[str, xarray.Dataset]
+"""Results by mass rule."""
 DPI = 150
 MOST_NODES = 12
 """Nodes that one figure shows at most."""
@@ -58,30 +58,52 @@ class Album:
 
 
 def described_shell(shell: Shell) -> str:
-    """What a reader has to know of a shell."""
+    """Notes on a shell."""
     return (
         "A shell: panels that stretch and bend as thin sheets, in "
         f"{len(shell.triangles)} triangles ({shell.options.divisions} divisions of every edge), "
         "turning against each other along exact creases. The sides of the triangles are not drawn. "
-        "With half the divisions one sees how far the numbers depend on the mesh: the difference "
-        "is about three times the error that is left."
+        "A run with half the divisions shows how far the numbers depend on the mesh: the "
+        "difference is about three times the remaining error."
     )
 
 
 def shown_nodes(chosen: list[int], most: int = MOST_NODES) -> tuple[list[int], str]:
-    """Nodes that a figure shows, and what to say where there were more."""
+    """Nodes that a figure shows, and a remark where there are more."""
     nodes = chosen[:most]
     return nodes, f" (the first {len(nodes)} of {len(chosen)})" if len(chosen) > len(nodes) else ""
 
 
-def visible_scale(case: Case, result: xarray.Dataset) -> float:
-    """Enlargement with which a small motion can be seen: 1, 2, 5, 10, ... at most 1000."""
+def visible_scale(case: Case, result: xarray.Dataset) -> tuple[float, str]:
+    """Enlargement that makes a small motion visible, at most 1000, and a remark on it."""
     largest = float(np.abs(result["displacement"].to_numpy()).max())
     wanted = 0.1 * case.structure.pattern.size / max(largest, 1e-30)
     steps = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
-    return max((s for s in steps if s <= wanted), default=1.0)
+    scale = max((s for s in steps if s <= wanted), default=1.0)
+    return scale, "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
 
 
-def enlarged(scale: float) -> str:
-    """What a caption says of an enlargement."""
-    return "" if scale == 1.0 else f", displacements enlarged {scale:g} times"
+def listed(noun: str, numbers: Iterable[Any]) -> str:
+    """Write numbers with their noun: "node 1", "nodes 1, 2"."""
+    words = [str(number) for number in numbers]
+    return f"{noun}{'' if len(words) == 1 else 's'} {', '.join(words)}"
+
+
+def rules(results: ByRule) -> str:
+    """The mass rules of results, for a caption."""
+    return "all mass rules" if len(results) > 1 else f"mass rule {next(iter(results))}"
+
+
+def by_mass_rule(
+    results: ByRule,
+    columns: Mapping[str, str | Callable[[xarray.Dataset], Any]],
+    caption: str,
+) -> Table:
+    """Table with a row for each mass rule; columns are attributes or functions of its result."""
+    rows = []
+    for rule, result in results.items():
+        cells = (
+            result.attrs.get(of) if isinstance(of, str) else of(result) for of in columns.values()
+        )
+        rows.append([rule, *cells])
+    return Table(["mass rule", *columns], rows, caption, digits=3)

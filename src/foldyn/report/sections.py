@@ -23,7 +23,7 @@ _SIGNATURES = (
     (0, b"\xff\xd8\xff", "image/jpeg"),
     (4, b"ftyp", "video/mp4"),
 )
-"""Where in a file which bytes tell its kind."""
+"""Places and bytes by which a file's kind is known."""
 _WIDE = 1200  # pixels; wider pictures are scrolled on a phone, as they would be too small to read
 
 
@@ -158,7 +158,7 @@ class Picture:
     caption : str
         Written below the picture.
     alt : str
-        What the picture shows, for who cannot see it; the caption where empty.
+        What the picture shows, for readers who cannot see it; the caption where empty.
     """
 
     source: Any
@@ -210,7 +210,7 @@ Section = Heading | Text | Table | Listing | Picture
 
 
 def _pixels(content: bytes) -> tuple[int, int]:
-    """Return width and height of a PNG or GIF; (0, 0) for what does not say so at its start."""
+    """Return width and height of a PNG or GIF; (0, 0) where the content does not say."""
     if content.startswith(b"\x89PNG") and len(content) >= 24:
         return int.from_bytes(content[16:20], "big"), int.from_bytes(content[20:24], "big")
     if content.startswith(b"GIF") and len(content) >= 10:

@@ -1,12 +1,9 @@
 """Results: datasets that carry their own case, in memory and in files."""
 
-from foldyn.results.dataset import trajectory_dataset
-from foldyn.results.frf import frf_dataset
-from foldyn.results.modes import modes_dataset
-from foldyn.results.origin import case_of, check_result
-from foldyn.results.path import path_dataset
+from foldyn.results.contents import case_of, check_result
+from foldyn.results.dataset import frf_dataset, modes_dataset, path_dataset, trajectory_dataset
+from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
-from foldyn.results.store import load, save
 
 __all__ = [
     "Quantity",

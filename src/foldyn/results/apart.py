@@ -1,4 +1,4 @@
-"""A call in a process of its own: where a library crashes on damaged bytes, only that one ends."""
+"""A call in a process of its own: if a library crashes on damaged bytes, only that process ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foldyn.errors import FoldynError
 
 T = TypeVar("T")
 IDLE = 4
-"""How much longer than it computes a call may take: the machine has other work."""
+"""How many times its computing time a call may take: the machine has other work."""
 
 
 def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
@@ -65,7 +65,7 @@ def apart(make: Callable[[], T], seconds: int, memory: int) -> T:
 
 
 def _answer(make: Callable[[], Any], seconds: int, memory: int, writing: int) -> None:
-    """Say what a function makes, and end this process, whatever happens."""
+    """Send what a function returns, and end this process, whatever happens."""
     try:
         for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from foldyn.cases import Case
+from foldyn.cases.document import from_document
 from foldyn.errors import InputError
+from foldyn.input_files import from_toml
 
 NUMBERS, WHOLES, TEXTS = "iuf", "iu", "UOST"
 """Kinds of data types."""
@@ -41,3 +44,48 @@ def whole_attribute(ds: xr.Dataset, name: str) -> int:
     if not isinstance(value, int | np.integer):
         raise InputError(f"its attribute {name} must be a whole number: the result is damaged")
     return int(value)
+
+
+def case_of(ds: xr.Dataset) -> Case:
+    """Rebuild the case from a result.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result, computed or loaded.
+
+    Returns
+    -------
+    Case
+        With exactly the numbers of the original. Functions of time have become tables.
+
+    Raises
+    ------
+    InputError
+        Not a result, or one that cannot be run again from itself (user's laws).
+    """
+    check_result(ds)
+    if not whole_attribute(ds, "rerunnable"):
+        reason = ds.attrs.get("not_rerunnable_because", "the result says so")
+        raise InputError(
+            f"this result cannot be run again from itself: {reason}; make its case anew in Python"
+        )
+    try:
+        sections = from_toml(str(ds["case"].values[()]))
+    except InputError as error:
+        raise InputError(f"the stored case is damaged: it {error}") from None
+    names = [name for name in ds.variables if name != "case"]
+    return from_document(sections, {str(name): ds[name].values for name in names})
+
+
+def check_result(ds: xr.Dataset, place: str = "") -> None:
+    """Refuse a dataset that is not one of our results."""
+    if not isinstance(ds, xr.Dataset) or "case" not in ds or "foldyn_result" not in ds.attrs:
+        raise InputError(
+            f"{place}is not a Foldyn result: it lacks the variable `case` or the attribute "
+            "`foldyn_result` (arithmetic on a dataset drops attributes: keep them)"
+        )
+    if not isinstance(ds.attrs["foldyn_result"], str) or ds["case"].ndim:
+        raise InputError(
+            f"{place}is damaged: its attribute `foldyn_result` or its variable `case` is no text"
+        )

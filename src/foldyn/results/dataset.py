@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from numbers import Integral, Real
 from typing import Any
 
@@ -12,10 +11,22 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn import __version__
 from foldyn.cases import HISTORIES, Case, Fix
 from foldyn.cases.document import Document, to_document
-from foldyn.results.missing import with_reason
-from foldyn.results.quantities import MOTION, Quantity, energies_of, variables
+from foldyn.results.quantities import (
+    ESTIMATES,
+    MODES,
+    MOTION,
+    PATH,
+    PLACE,
+    RESPONSES,
+    Quantity,
+    energies_of,
+    variable,
+    variables,
+    with_reason,
+)
 
 FORMAT = 1
 """Number of the layout of results, raised when older programs could not read a new one."""
@@ -82,6 +93,125 @@ def trajectory_dataset(
     return result_dataset("trajectory", case, data, along, statistics, times)
 
 
+def path_dataset(
+    case: Case,
+    load_factor: ArrayLike,
+    displacement: ArrayLike,
+    reaction: ArrayLike,
+    energies: Mapping[str, ArrayLike],
+    solution: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any],
+    obstacles: tuple[str, ...] = (),
+) -> xr.Dataset:
+    """Dataset of a sequence of equilibria, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What was loaded.
+    load_factor : array_like, shape (ns,)
+        Load factor of each point.
+    displacement : array_like, shape (ns, n, 3)
+        Displacement (m) of every node.
+    reaction : array_like, shape (ns, nd)
+        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+    energies : mapping of str to array_like, shape (ns,)
+        work and the strain energies of the structure's `energy_groups` (J).
+    solution : mapping of str to array_like, shape (ns,)
+        How each point was found: negative_eigenvalues (-1 if not counted), point ("regular",
+        "limit" or "bifurcation"), iterations, residual.
+    statistics : mapping
+        Facts about the run, each stored as an attribute.
+    obstacles : tuple of str
+        Why the path cannot be run again from itself, beside what the case says.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `trajectory_dataset`, with the dimension step and the coordinate `load_factor`.
+    """
+    factor = np.array(load_factor, dtype=np.float64)
+    kinds = np.array(solution["point"], dtype="<U11")  # of the longest, "bifurcation"
+    values = {"displacement": displacement, "reaction": reaction, **energies, **solution}
+    data = variables({**PATH, **energies_of(case)}, "step", values | {"point": kinds})
+    along = {"load_factor": ("step", factor, {"long_name": "load factor"})}
+    return result_dataset("path", case, data, along, statistics, None, obstacles)
+
+
+def modes_dataset(
+    case: Case, values: Mapping[str, ArrayLike], statistics: Mapping[str, Any]
+) -> xr.Dataset:
+    """Dataset of modes about a state, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What vibrates.
+    values : mapping of str to array_like
+        The variables of `quantities.MODES`, and the `displacement` (n, 3) of the state, m.
+    statistics : mapping
+        Facts about the computation, each stored as an attribute.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables, with the coordinate `mode` = 1, 2, ..., and the case as in
+        `trajectory_dataset`.
+    """
+    data = variables(MODES, "mode", {name: values[name] for name in MODES})
+    text = "displacement of the state from the rest position"
+    data["displacement"] = variable(PLACE, values["displacement"], "m", text)
+    numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
+    along = {"mode": ("mode", numbers, {"long_name": "mode"})}
+    return result_dataset("modes", case, data, along, statistics)
+
+
+def frf_dataset(
+    case: Case,
+    frequency: ArrayLike,
+    quantity: str,
+    response: ArrayLike,
+    displacement: ArrayLike,
+    drive: ArrayLike,
+    statistics: Mapping[str, Any],
+    more: Mapping[str, ArrayLike] | None = None,
+) -> xr.Dataset:
+    """Dataset of a frequency response, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What responds; without the drive.
+    frequency : array_like, shape (m,)
+        Frequencies (Hz).
+    quantity : {"receptance", "transmissibility"}
+        What the response is.
+    response : array_like, shape (m, n, 3), complex
+        Response of every node, for the time dependence exp(+i w t).
+    displacement : array_like, shape (n, 3)
+        The state (m) about which it moves.
+    drive : array_like, shape (n, 3)
+        Amplitudes of the forces on the nodes (N), or of the displacements of the base (m).
+    statistics : mapping
+        Facts about the run, each stored as an attribute.
+    more : mapping of str to array_like, optional
+        Further variables, of `quantities.ESTIMATES`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The response under its own name, complex (frequency, node, axis), `displacement`, `drive`
+        (node, axis), and what every result has.
+    """
+    values = {quantity: np.asarray(response, np.complex128), **(more or {})}
+    data = variables({**RESPONSES, **ESTIMATES}, "frequency", values)
+    driven = "N" if quantity == "receptance" else "m"
+    data["displacement"] = variable(PLACE, displacement, "m", "displacement of the state")
+    data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
+    along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
+    return result_dataset("frf", case, data, along, statistics)
+
+
 def result_dataset(
     kind: str,
     case: Case,
@@ -113,7 +243,7 @@ def result_dataset(
     attributes: dict[str, Any] = {
         "foldyn_result": kind,
         "foldyn_format": FORMAT,
-        "foldyn_version": _version(),
+        "foldyn_version": __version__,
         "rerunnable": 0 if obstacles else 1,
     }
     if obstacles:
@@ -180,10 +310,3 @@ def _attributes(statistics: Mapping[str, Any]) -> dict[str, Any]:
         else:
             attributes[name] = str(value)
     return attributes
-
-
-def _version() -> str:
-    try:
-        return version("foldyn")
-    except PackageNotFoundError:
-        return "unknown"

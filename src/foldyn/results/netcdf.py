@@ -1,7 +1,17 @@
-"""Datasets in NetCDF files: written whole or not at all, and read whole or not at all."""
+"""Results, and other datasets, in NetCDF files: written and read whole or not at all.
+
+A seal at the end of a file, the digest of all that comes before it, shows damage. HDF5 ignores what
+follows its own end, and cuts it off when another program changes the file: such a file has no seal,
+like those of older programs, and is read without this check.
+
+NetCDF has no complex numbers: a complex variable of a result is stored as two, its real and its
+imaginary part, and put together again on loading.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
 import warnings
 from pathlib import Path
@@ -9,24 +19,91 @@ from typing import Any
 
 import h5netcdf  # noqa: F401  here, and not in the processes that read
 import h5py
+import numpy as np
 import xarray as xr
 from xarray.backends import list_engines
 
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
-from foldyn.results import seal
 from foldyn.results.apart import apart
-from foldyn.results.sink import Sink
+from foldyn.results.contents import check_result, whole_attribute
+from foldyn.results.dataset import FORMAT
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
 SUFFIXES = ("", ".nc", ".nc4", ".netcdf", ".cdf", ".h5", ".hdf5")
+_PARTS = ("real", "imag")
+_WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 MOST_PACKED = 1100
 """Bytes that one byte of a file may stand for: deflate packs no more than 1032."""
 LEAST_MEMORY = 2**29
-"""Bytes that a file without a seal may take beside what it holds."""
+"""Bytes that a file without a seal may take besides its content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
 """Computing time that a file without a seal may take, and the bytes that take a second more."""
+
+_MARK = b"\nfoldyn sha256 "
+_SEAL = len(_MARK) + 64 + 1  # its length
+_PIECE = 1 << 20
+
+
+def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a result to a NetCDF file.
+
+    The file appears only when it is complete; one of the same name is replaced.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result.
+    path : path
+        The file, as ``run.nc``; its folder must exist.
+
+    Raises
+    ------
+    InputError
+        Not a result, the path cannot be written, or its name is that of another kind of file, as
+        ``run.csv``.
+    """
+    check_result(ds, "cannot save: the dataset ")
+    write(_split(ds), path)
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result from a NetCDF file, whole into memory.
+
+    Parameters
+    ----------
+    path : path
+        A file that `save` wrote.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is not a Foldyn result.
+    """
+    path = Path(path)
+    ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)")
+    check_result(ds, f"{path}: ")
+    try:
+        newer = whole_attribute(ds, "foldyn_format") > FORMAT
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if newer:
+        raise InputError(
+            f"{path}: was written by Foldyn {ds.attrs.get('foldyn_version')}, whose format this "
+            "version does not know; update Foldyn"
+        )
+    try:
+        return _joined(ds)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{path}: is damaged: a complex variable lacks its real or imaginary part; restore it "
+            "from a copy, or compute it again"
+        ) from None
 
 
 def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -53,13 +130,13 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         with whole(path) as part:
             with Sink(part, "w+") as sink:
                 _fill(sink, ds)
-            seal.seal(part)
+            _seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
 
 
 def _fill(sink: Sink, ds: xr.Dataset) -> None:
-    """Write a dataset; what went wrong with the file comes before what HDF5 made of it."""
+    """Write a dataset; a failure of the file takes precedence over what HDF5 makes of it."""
     try:
         ds.to_netcdf(sink, engine=ENGINE)
     except Exception:
@@ -80,7 +157,7 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
     """
     path = check_file(path, "a NetCDF file")
     try:
-        sealed = seal.sound(path)
+        sealed = sound(path)
         if sealed is False:
             raise InputError(
                 f"{path}: is damaged: its checksum does not match its content; restore it from a "
@@ -137,6 +214,111 @@ def _check_header(path: Path) -> None:
 
 
 def _is_bare(item: h5py.Dataset) -> bool:
-    """Whether this stands for a dimension alone, without any numbers."""
+    """Whether this is only a dimension, without numbers."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
+
+
+def _seal(path: Path) -> None:
+    """Put a seal at the end of a file."""
+    with path.open("rb+") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(_MARK + digest.encode() + b"\n")
+
+
+def sound(path: Path) -> bool | None:
+    """Whether the seal of a file matches what comes before it; None where it has none."""
+    left = path.stat().st_size - _SEAL
+    if left < 0:
+        return None
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        file.seek(left)
+        found = file.read()
+        if not found.startswith(_MARK):
+            return None
+        file.seek(0)
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
+    return found == _MARK + digest.hexdigest().encode() + b"\n"
+
+
+class Sink(io.FileIO):
+    """A new file, open for reading and writing, whose failures are noted and not raised.
+
+    Where the disk is full, HDF5 cannot close its file, and the process ends in a segmentation
+    fault. So it writes through this, which takes the rest for written; the failure is raised at the
+    end. Nothing but the dataset itself is held in memory.
+
+    Attributes
+    ----------
+    failure : BaseException or None
+        What ended the writing: a full disk, or an interruption that came meanwhile.
+    """
+
+    failure: BaseException | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of it, or note why not."""
+        left = memoryview(data).cast("B")
+        size, end = len(left), self.tell() + len(left)
+        try:
+            while len(left) and self.failure is None:
+                left = left[super().write(left) :]
+        except BaseException as failure:
+            self.failure = failure
+        self.seek(end)
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Set the size, or note why not."""
+        try:
+            if self.failure is None:
+                return super().truncate(size)
+        except BaseException as failure:
+            self.failure = failure
+        return self.tell() if size is None else size
+
+    def readinto(self, buffer: Any, /) -> int:
+        """Read; zeros for what could not be written."""
+        room = memoryview(buffer).cast("B")
+        found = 0
+        if self.failure is None:
+            try:
+                found = super().readinto(room) or 0
+            except BaseException as failure:
+                self.failure = failure
+        if self.failure is not None:
+            room[found:] = bytes(len(room) - found)
+            return len(room)
+        return found
+
+
+def _split(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with the two parts of each complex variable instead of it."""
+    split = ds
+    for name, variable in ds.data_vars.items():
+        if np.iscomplexobj(variable.values):
+            own = {**variable.attrs, _WHOLE: str(name)}
+            parts = {f"{name}_{part}": getattr(variable, part).assign_attrs(own) for part in _PARTS}
+            split = split.drop_vars(str(name)).assign(parts)
+    return split
+
+
+def _joined(ds: xr.Dataset) -> xr.Dataset:
+    """Dataset with complex variables put together from their parts."""
+    names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
+    for name in names:
+        if name is None:
+            continue
+        real, imag = (ds[f"{name}_{part}"] for part in _PARTS)
+        if real.dims != imag.dims or {real.dtype.kind, imag.dtype.kind} != {"f"}:
+            raise TypeError(name)
+        # not real + 1j * imag: an infinite part would make the other one nan
+        whole = np.empty(real.shape, np.complex128)
+        whole.real, whole.imag = real.values, imag.values
+        own = {key: value for key, value in real.attrs.items() if key != _WHOLE}
+        ds = ds.drop_vars([f"{name}_{part}" for part in _PARTS])
+        ds = ds.assign({name: (real.dims, whole, own)})
+    return ds

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 
@@ -76,7 +77,7 @@ ESTIMATES: Mapping[str, Quantity] = {
     "swing": Quantity("degrees", "largest amplitude of a superlinear hinge"),
     "unsteadiness": Quantity("1", "relative error that transients leave, estimated"),
 }
-"""and what its method tells beside it."""
+"""and what its method adds to it."""
 
 
 def variables(
@@ -98,3 +99,39 @@ def variable(dims: tuple[str, ...], values: ArrayLike, units: str, text: str) ->
 def energies_of(case: Any) -> dict[str, Quantity]:
     """Parts of the strain energy of a case's structure."""
     return {name: Quantity("J", text) for name, text in case.structure.energy_groups.items()}
+
+
+REASONS: Mapping[str, str] = {
+    "frequency": "an unstable mode grows instead of swinging",
+    "damping_ratio": "a rigid or an unstable mode does not swing",
+    "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",
+    "transmissibility": "a resonance without damping, or no convergence",
+    "coherence": "what does not respond (held axes, nodes at rest) is coherent with nothing",
+    "swing": "the harmonic balance does not converge at the frequency",
+}
+"""Variables that may lack values, and why."""
+UNEXPECTED = "the computation was no longer finite"
+
+
+def with_reason(name: str, variable: tuple) -> tuple:
+    """Variable (dimensions, values, attributes) with the reason if it lacks values."""
+    dimensions, values, attributes = variable
+    if not _missing(values):
+        return variable
+    return dimensions, values, {**attributes, "missing": REASONS.get(name, UNEXPECTED)}
+
+
+def _missing(values: Any) -> int:
+    """Number of missing values."""
+    values = np.asarray(values)
+    return int(np.isnan(values).sum()) if values.dtype.kind in "fc" else 0
+
+
+def missing_values(ds: xr.Dataset) -> dict[str, str]:
+    """Say how many values each incomplete variable of a result lacks, and why, by name."""
+    return {
+        str(name): f"{_missing(ds[name].values)} of {ds[name].size} values are missing (nan): "
+        f"{ds[name].attrs.get('missing', UNEXPECTED)}"
+        for name in ds.data_vars
+        if _missing(ds[name].values)
+    }

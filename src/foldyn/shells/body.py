@@ -1,4 +1,4 @@
-"""Shells as solvers take them."""
+"""Shells as solvers see them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.blocks import SparseBlocks
 from foldyn.mechanics.body import Body, SoftHinges, largest_turn
-from foldyn.shells.balance import balanced_rotations
+from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
+from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
-from foldyn.shells.sparsity import ShellPattern, shell_pattern
-from foldyn.shells.step_tangent import shell_step_tangent
-from foldyn.shells.tangent import shell_tangent
+from foldyn.shells.tangent import (
+    ShellPattern,
+    add_extrapolated_strain,
+    shell_pattern,
+    shell_tangent,
+)
 
+ITERATIONS = 50
+BALANCED = 1e-13  # rad, of the last step of Newton's method
+FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
 GROUPS: Mapping[str, str] = {
     "strain_membrane": "strain energy of stretching",
     "strain_bending": "strain energy of bending",
@@ -90,25 +97,23 @@ class ShellBody(Body):
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Body`."""
-        work = shell_work(self.model)
-        return shell_tangent(self.model, self.sparsity, *self._split(q), work, floor)
+        return shell_tangent(self.model, self.sparsity, *self._split(q), floor)
 
     def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
         """See `Body`."""
-        old = None if before is None else self._split(before)[0]
-        work = shell_work(self.model)
-        return shell_step_tangent(self.model, self.sparsity, *self._split(q), work, old)
+        own = self.model.code < 0  # slopes of a user's law may fall on purpose
+        matrix = self.tangent(q, -np.inf if own else STEP_FLOOR)
+        if before is not None:
+            u, old = self._split(q)[0], self._split(before)[0]
+            add_extrapolated_strain(self.model, self.sparsity, u, old, matrix.data)
+        return matrix
 
     def blocks(self) -> SparseBlocks:
         """See `Body`."""
-        entries = (
-            np.zeros(len(self.sparsity.indices)),
-            self.sparsity.indices,
-            self.sparsity.indptr,
-        )
-        return SparseBlocks(
-            sparse.csr_array(entries, (self.size, self.size)), self.rows, positions(self.model)
-        )
+        pattern = self.sparsity
+        entries = (np.zeros(len(pattern.indices)), pattern.indices, pattern.indptr)
+        matrix = sparse.csr_array(entries, (self.size, self.size))
+        return SparseBlocks(matrix, self.rows, positions(self.model))
 
     def workspaces(self, threads: int) -> list[ShellWork]:
         """See `Body`."""
@@ -182,11 +187,33 @@ class ShellBody(Body):
 
 
 def positions(model: ShellModel) -> NDArray:
-    """Where in the shell its dofs are (3 rows, 3): rotations in the middle of their sides."""
-    found = np.zeros((3 * model.rows, 3))
+    """Where the dofs are in the shell (3 rows, 3): rotations in the middle of their sides."""
+    points = np.zeros((3 * model.rows, 3))
     n, tri = model.nodes, model.triangles
-    found[: 3 * n] = np.repeat(model.rest[:n], 3, axis=0)
+    points[: 3 * n] = np.repeat(model.rest[:n], 3, axis=0)
     middle = 0.5 * (model.rest[tri] + model.rest[np.roll(tri, -1, axis=1)])
     has = model.rotation >= 0
-    found[3 * n + model.rotation[has]] = middle[has]
-    return found
+    points[3 * n + model.rotation[has]] = middle[has]
+    return points
+
+
+def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> NDArray:
+    """Dofs (r,), m, of the rotations without moment at displacement u (n, 3), by Newton's method.
+
+    Raises
+    ------
+    ComputationError
+        There are none near zero.
+    """
+    work, x = shell_work(model), np.zeros(model.rotations)
+    force, couple = np.empty_like(u), np.empty_like(x)
+    for _ in range(ITERATIONS):
+        shell_force(model, u, x, force, couple, work)
+        if not couple.any():
+            return x
+        stiffness = shell_tangent(model, pattern, u, x, FLOOR)[u.size :][:, u.size :]
+        step = splu(sparse.csc_array(stiffness)).solve(-couple)
+        x = x + step
+        if model.per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
+            return x
+    raise ComputationError("the rotations of the shell do not balance at this displacement")

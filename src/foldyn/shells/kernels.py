@@ -1,6 +1,6 @@
 """Energy and forces of a shell of triangles, compiled.
 
-Displacements u (n, 3) and rotations; see `shells.element` and `shells.sides`. The dofs x (r,) of
+Displacements u (n, 3) and rotations; see `shells.sides`. The dofs x (r,) of
 the rotations are lengths as well, m, so that norms over all dofs do not depend on the unit of
 length: a rotation is x times `per_reach`.
 """
@@ -14,7 +14,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
@@ -45,7 +45,7 @@ class ShellModel(NamedTuple):
     piece_rest: NDArray  # (c,) rad
     piece_parameters: NDArray  # (c, 4)
     code: int  # of the creases' law
-    addresses: NDArray  # (3,) of a law of the user's
+    addresses: NDArray  # (3,) of a user's law
 
     @property
     def rows(self) -> int:
@@ -144,7 +144,7 @@ def shell_energy(model, u, x, work, out):
 
 @kernel
 def shell_force(model, u, x, force, couple, work):
-    """Internal force (n, 3), N, and what belongs to the rotations (r,), N."""
+    """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
     fold(model, u, x, work)
     n = u.shape[0]
     force[:] = 0.0

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-
-Edge = tuple[int, int]
+from foldyn.patterns.topology import Edge, around
+from foldyn.structures.mesh import Triangle, check_triangles
 
 EQUAL = 1e-6  # relative difference of diagonals that counts as none
 
@@ -40,15 +38,15 @@ class _Points:
     """Nodes as they are made."""
 
     def __init__(self, vertices: NDArray) -> None:
-        self.found: list[NDArray] = list(vertices)
+        self.all: list[NDArray] = list(vertices)
 
     def add(self, point: NDArray) -> int:
-        self.found.append(point)
-        return len(self.found) - 1
+        self.all.append(point)
+        return len(self.all) - 1
 
     def line(self, a: int, b: int, divisions: int) -> list[int]:
         """Nodes from a to b, both included, with new ones between them."""
-        x, y = self.found[a], self.found[b]
+        x, y = self.all[a], self.all[b]
         inner = [self.add(x + (y - x) * (step / divisions)) for step in range(1, divisions)]
         return [a, *inner, b]
 
@@ -66,24 +64,19 @@ def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
     }
     triangles, panels = [], []
     for number, face in enumerate(pattern.faces):
-        sides = [_side(edges, a, b) for a, b in _around(face)]
+        sides = [_side(edges, a, b) for a, b in around(face)]
         if len(face) == 3:
-            found = _divided(points, sides)
+            pieces = _divided(points, sides)
         elif len(face) == 4:
-            found = _grid(points, sides)
+            pieces = _grid(points, sides)
         else:
-            found = _fan(points, sides, divisions)
-        triangles += found
-        panels += [number] * len(found)
-    mesh = ShellMesh(
-        np.array(points.found), np.array(triangles, np.int64), np.array(panels, np.int64), edges
-    )
-    _check(mesh, pattern)
-    return mesh
-
-
-def _around(face: tuple[int, ...]) -> Iterator[Edge]:
-    return zip(face, (*face[1:], face[0]), strict=True)
+            pieces = _fan(points, sides, divisions)
+        triangles += pieces
+        panels += [number] * len(pieces)
+    nodes, rows, panel = np.array(points.all), np.array(triangles, np.int64), np.array(panels)
+    remedy = "it is not convex enough; cut it into convex panels"
+    check_triangles(nodes, rows, panel, pattern, remedy)
+    return ShellMesh(nodes, rows, panel, edges)
 
 
 def _side(edges: dict[Edge, list[int]], a: int, b: int) -> list[int]:
@@ -91,22 +84,22 @@ def _side(edges: dict[Edge, list[int]], a: int, b: int) -> list[int]:
     return edges[a, b] if a < b else edges[b, a][::-1]
 
 
-def _grid(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]:
+def _grid(points: _Points, sides: list[list[int]]) -> list[Triangle]:
     """Triangles of a quadrilateral with sides 0-1, 1-2, 2-3, 3-0."""
     bottom, right, top, left = sides[0], sides[1], sides[2][::-1], sides[3][::-1]
     n = len(bottom) - 1
-    p, q = points.found[bottom[0]], points.found[bottom[-1]]
-    r, s = points.found[top[-1]], points.found[top[0]]
+    p, q = points.all[bottom[0]], points.all[bottom[-1]]
+    r, s = points.all[top[-1]], points.all[top[0]]
     node = np.empty((n + 1, n + 1), np.int64)
     node[:, 0], node[:, n], node[0], node[n] = bottom, top, left, right
     for i in range(1, n):
         for j in range(1, n):
             x, y = i / n, j / n
             node[i, j] = points.add((1 - y) * ((1 - x) * p + x * q) + y * ((1 - x) * s + x * r))
-    return _halves(node, np.array([points.found[k] for k in node.ravel()]).reshape(n + 1, n + 1, 3))
+    return _halves(node, np.array([points.all[k] for k in node.ravel()]).reshape(n + 1, n + 1, 3))
 
 
-def _halves(node: NDArray, x: NDArray) -> list[tuple[int, int, int]]:
+def _halves(node: NDArray, x: NDArray) -> list[Triangle]:
     """Triangles of a grid of nodes (n + 1, n + 1) at x (n + 1, n + 1, 3).
 
     Each cell is cut at its shorter diagonal, in a pattern that has the panel's own symmetries;
@@ -122,10 +115,10 @@ def _halves(node: NDArray, x: NDArray) -> list[tuple[int, int, int]]:
     return list(map(tuple, np.stack([one, two], axis=2).reshape(-1, 3).tolist()))
 
 
-def _divided(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, int]]:
+def _divided(points: _Points, sides: list[list[int]]) -> list[Triangle]:
     """Triangles of a triangle with sides 0-1, 1-2, 2-0."""
     n = len(sides[0]) - 1
-    p, q, r = (points.found[side[0]] for side in sides)
+    p, q, r = (points.all[side[0]] for side in sides)
     node = {}
     for k in range(n + 1):
         node[k, 0], node[n - k, k], node[0, n - k] = sides[0][k], sides[1][k], sides[2][k]
@@ -141,26 +134,12 @@ def _divided(points: _Points, sides: list[list[int]]) -> list[tuple[int, int, in
     return out
 
 
-def _fan(points: _Points, sides: list[list[int]], divisions: int) -> list[tuple[int, int, int]]:
+def _fan(points: _Points, sides: list[list[int]], divisions: int) -> list[Triangle]:
     """Triangles of a polygon, cut along spokes from its corners to their mean."""
     corners = [side[0] for side in sides]
-    center = points.add(np.mean([points.found[k] for k in corners], axis=0))
+    center = points.add(np.mean([points.all[k] for k in corners], axis=0))
     spokes = [points.line(k, center, divisions) for k in corners]
     out = []
     for k, side in enumerate(sides):
         out += _divided(points, [side, spokes[(k + 1) % len(sides)], spokes[k][::-1]])
     return out
-
-
-def _check(mesh: ShellMesh, pattern: Pattern) -> None:
-    """Refuse triangles without area or inside out, naming their panel."""
-    a, b, c = (mesh.nodes[mesh.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    signed = 0.5 * np.einsum("ij,ij->i", normal, pattern.face_normals[mesh.panel])
-    small = signed <= 1e-9 * pattern.face_areas[mesh.panel]
-    if small.any():
-        number = int(mesh.panel[small][0])
-        raise InputError(
-            f"panel {number} {tuple(pattern.faces[number])}: cannot be meshed: it is not convex "
-            "enough, so that a triangle is flat or inside out; cut it into convex panels"
-        )

@@ -13,24 +13,23 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.shells.body import GROUPS, ShellBody
-from foldyn.shells.element import side_stiffness, without_free_sides
 from foldyn.shells.kernels import ShellModel
-from foldyn.shells.mesh import Edge, shell_mesh
-from foldyn.shells.sides import Sides, sides
-from foldyn.shells.sparsity import ShellPattern
+from foldyn.shells.mesh import shell_mesh
+from foldyn.shells.sides import Sides, side_stiffness, sides, without_free_sides
 from foldyn.structures import Sheet
-from foldyn.structures.calibration import check_scale, fold_stiffness
-from foldyn.structures.discretize import edge_lengths, per_crease
-from foldyn.structures.discretize import fold_rest as rest_of
-from foldyn.structures.discretized import Discretized, HingeKind
+from foldyn.structures.calibration import check_scale
+from foldyn.structures.discretize import check_kinds, fold_rest, fold_stiffness
+from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
-from foldyn.values import show, whole
+from foldyn.structures.mesh import lengths
+from foldyn.values import choice, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
 PER_NODE = 16_000.0
@@ -41,7 +40,7 @@ PER_DOUBLING, LEAST = 5900.0, 1450
 
 @dataclass(frozen=True)
 class ShellOptions:
-    """Arguments of `shell` beside pattern and sheet; see there."""
+    """Arguments of `shell` besides pattern and sheet; see there."""
 
     divisions: int = 16
     mass: str = "lumped"
@@ -68,7 +67,7 @@ class Shell(Discretized):
     piece_rest : (c,)
         Rest dihedral of each piece of a crease, in the order of `sides`, rad.
     pattern, sheet, options
-        What it was made of.
+        What it was made from.
     """
 
     nodes: NDArray
@@ -125,13 +124,8 @@ class Shell(Discretized):
 
     @property
     def rotations(self) -> int:
-        """Number of rotations beside the displacements."""
+        """Number of rotations, which are dofs besides the displacements."""
         return self.sides.rotations
-
-    @cached_property
-    def fold_law(self) -> HingeLaw:
-        """Law of the folds."""
-        return hinge_law(self.options.fold_law, "fold_law")
 
     @cached_property
     def folds(self) -> NDArray:
@@ -139,8 +133,7 @@ class Shell(Discretized):
         crease, first = np.unique(self.sides.piece_crease, return_index=True)
         rows = np.zeros((len(self.fold_stiffness), 4), np.int64)
         rows[crease] = self.sides.hinges[self.sides.piece_hinge[first]]
-        rows.setflags(write=False)
-        return rows
+        return read_only(rows)
 
     @cached_property
     def edge_nodes(self) -> NDArray:
@@ -152,43 +145,35 @@ class Shell(Discretized):
         ends = np.concatenate([self.pattern.creases, self.pattern.boundary]).reshape(-1, 2)
         count = self.options.divisions - 1
         inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)
-        found = np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
-        found.setflags(write=False)
-        return found
+        return read_only(np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1))
 
     @cached_property
     def bars(self) -> NDArray:
         """Sides of the triangles (nb, 2), each once."""
         tri = self.triangles
         ends = np.stack([tri, np.roll(tri, -1, axis=1)], axis=2).reshape(-1, 2)
-        found = np.unique(np.sort(ends, axis=1), axis=0)
-        found.setflags(write=False)
-        return found
+        return read_only(np.unique(np.sort(ends, axis=1), axis=0))
 
     @cached_property
     def fold_rest(self) -> NDArray:
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
-        rest = self.body.fold_rest
-        rest.setflags(write=False)
-        return rest
+        return read_only(self.body.fold_rest)
 
     @cached_property
     def _reach(self) -> float:
-        """Length (m) by which a rotation becomes a displacement: that of a side."""
+        """Length (m) that turns a rotation into a displacement: that of a side."""
         return float(np.sqrt((self.bar_length**2).mean()))
 
     @cached_property
     def model(self) -> ShellModel:
         """The arrays that the compiled kernels work on."""
-        corners, found, law = self.nodes[self.triangles], self.sides, self.fold_law
+        corners, ends, law = self.nodes[self.triangles], self.sides, self.fold_law
         side = np.roll(corners, -1, axis=1) - corners
         membrane, bending = side_stiffness(corners, self.sheet)
-        rest = np.concatenate([self.nodes, found.wings]) - self.nodes.mean(axis=0)
-        hinge_rest = mechanics.angles(rest, found.hinges.astype(np.uint32))
-        along = self.nodes[found.hinges[found.piece_hinge, 1]]
-        along = along - self.nodes[found.hinges[found.piece_hinge, 0]]
-        length = np.linalg.norm(along, axis=1)
-        whole = np.bincount(found.piece_crease, length, len(self.fold_stiffness))
+        rest = np.concatenate([self.nodes, ends.wings]) - self.nodes.mean(axis=0)
+        hinge_rest = mechanics.angles(rest, ends.hinges.astype(np.uint32))
+        length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
+        whole = np.bincount(ends.piece_crease, length, len(self.fold_stiffness))
         return ShellModel(
             nodes=len(self.nodes),
             rotations=self.rotations,
@@ -198,26 +183,21 @@ class Shell(Discretized):
             side=np.ascontiguousarray(side),
             per_length2=1.0 / np.einsum("tki,tki->tk", side, side),
             membrane=np.ascontiguousarray(membrane),
-            bending=np.ascontiguousarray(without_free_sides(bending, found.free)),
-            hinges=found.hinges,
+            bending=np.ascontiguousarray(without_free_sides(bending, ends.free)),
+            hinges=ends.hinges,
             hinge_rest=hinge_rest,
-            hinge=found.hinge,
-            weight=found.weight,
-            rotation=found.rotation,
-            sign=found.sign,
-            piece_hinge=found.piece_hinge,
-            piece_rotations=found.piece_rotations,
-            piece_stiffness=(self.fold_stiffness / whole)[found.piece_crease] * length,
+            hinge=ends.hinge,
+            weight=ends.weight,
+            rotation=ends.rotation,
+            sign=ends.sign,
+            piece_hinge=ends.piece_hinge,
+            piece_rotations=ends.piece_rotations,
+            piece_stiffness=(self.fold_stiffness / whole)[ends.piece_crease] * length,
             piece_rest=self.piece_rest.copy(),
             piece_parameters=law.parameters(self.piece_rest).reshape(-1, 4),
             code=int(law.code),
             addresses=np.array(law.addresses or (0, 0, 0), np.int64),
         )
-
-    @property
-    def sparsity(self) -> ShellPattern:
-        """Pattern of the tangent."""
-        return self.body.sparsity
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -251,8 +231,7 @@ class Shell(Discretized):
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m, with rotations in balance."""
-        u, x = self._state(u, None)
-        return self.forces(u, x)[0]
+        return self.forces(u, self.balanced(u))[0]
 
     def tangent(
         self, u: ArrayLike, rotation: ArrayLike | None = None, floor: float = -np.inf
@@ -265,7 +244,7 @@ class Shell(Discretized):
         return matrix
 
     def balanced(self, u: ArrayLike) -> NDArray:
-        """Rotations (r,) about which there is no moment at displacement u (n, 3)."""
+        """Rotations (r,) at which there are no moments at displacement u (n, 3)."""
         u, _ = self._state(u, np.zeros(self.rotations))
         return self.body.dofs(u)[u.size :] / self._reach
 
@@ -327,13 +306,9 @@ def shell(
     >>> fd.shell(pattern, sheet, divisions=4)
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f"pattern: got {type(pattern).__name__}, give a Pattern")
-    if not isinstance(sheet, Sheet):
-        raise InputError(f"sheet: got {type(sheet).__name__}, give a Sheet")
+    check_kinds(pattern, sheet)
     divisions = whole("divisions", divisions, least=1)
-    if not isinstance(mass, str) or mass not in MASSES:
-        raise InputError(f"mass = {mass!r}: choose one of {', '.join(MASSES)}")
+    choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
     edges = _clamped(clamped, pattern)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
@@ -341,25 +316,17 @@ def shell(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
         PER_NODE * nodes, "take fewer",
     )  # fmt: skip
-    check_scale(sheet, edge_lengths(pattern))
+    check_scale(sheet, pattern)
     mesh = shell_mesh(pattern, divisions)
-    found = sides(mesh, pattern, edges)
-    x = mesh.nodes
-    length = np.linalg.norm(x[pattern.creases[:, 1]] - x[pattern.creases[:, 0]], axis=1)
-    if crease_stiffness is None:
-        stiffness = fold_stiffness(length, sheet)
-    else:
-        stiffness = per_crease("crease_stiffness", crease_stiffness, pattern) * length
-        if (stiffness < 0.0).any():
-            raise InputError("crease_stiffness: must not be negative")
-    rest = rest_of(crease_rest, found.hinges[found.piece_hinge], x, pattern, found.piece_crease)
+    ends = sides(mesh, pattern, edges)
+    pieces = ends.hinges[ends.piece_hinge]
     return Shell(
-        nodes=x,
+        nodes=mesh.nodes,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
-        sides=found,
-        fold_stiffness=stiffness,
-        piece_rest=rest,
+        sides=ends,
+        fold_stiffness=fold_stiffness(crease_stiffness, pattern, sheet),
+        piece_rest=fold_rest(crease_rest, pieces, mesh.nodes, pattern, ends.piece_crease),
         pattern=pattern,
         sheet=sheet,
         options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
@@ -367,12 +334,12 @@ def shell(
 
 
 def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
-    boundary = {tuple(edge) for edge in pattern.boundary.tolist()}
+    boundary = edge_lookup(pattern.boundary)
     try:
         pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
     except TypeError:
         why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
         raise InputError(why, "clamped") from None
     if inner := [pair for pair in pairs if pair not in boundary]:
-        raise InputError(f": {inner[0]} is no boundary edge of the pattern", "clamped")
+        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", "clamped")
     return tuple((pair[0], pair[1]) for pair in pairs)

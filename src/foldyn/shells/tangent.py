@@ -1,6 +1,13 @@
-"""Tangent stiffness of a shell: exact, assembled into a sparse matrix of a known pattern."""
+"""Tangent stiffness of a shell: exact, assembled into a sparse matrix of a known pattern.
+
+Dofs are 3 node + axis, then the rotations. A *place* is a node, with three dofs, or a rotation,
+with one; what couples two places is a block of adjacent entries in each of its rows, so that a
+triangle with its three neighbors, 21 dofs, needs the first entries of 9 x 9 blocks only.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +16,99 @@ from scipy import sparse
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.switch import hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
-from foldyn.shells.kernels import ShellModel, ShellWork, fold, side_rotations, side_strains
-from foldyn.shells.sparsity import ShellPattern
+from foldyn.shells.kernels import ShellModel, fold, shell_work, side_rotations, side_strains
+
+
+class ShellPattern(NamedTuple):
+    """Pattern of the tangent, and where the elements' blocks go; -1 where there is no place.
+
+    Entry (a, b) of block (i, j) comes a * (indptr[d + 1] - indptr[d]) + b entries after the
+    block's first one, d the first dof of place i.
+    """
+
+    size: int  # of the matrix
+    indptr: NDArray  # (size + 1,)
+    indices: NDArray  # (nnz,)
+    corner: NDArray  # (nt, 3, 4) which of a triangle's six nodes the nodes of its hinges are
+    triangle_dof: NDArray  # (nt, 9) first dofs of its six nodes and three rotations
+    triangle: NDArray  # (nt, 9, 9) first entries
+    owner: NDArray  # (nh,) 3 t + k of a triangle with the hinge on its side k; -1 on creases
+    piece_dof: NDArray  # (c, 6) first dofs of a crease's four nodes and two rotations
+    piece: NDArray  # (c, 6, 6) first entries
+
+
+def shell_pattern(model: ShellModel) -> ShellPattern:
+    """Pattern of the tangent."""
+    n, count = model.nodes, model.nodes + model.rotations
+    nodes, corner = _neighborhoods(model)
+    triangle = np.concatenate([nodes, np.where(model.rotation >= 0, n + model.rotation, -1)], 1)
+    piece = np.concatenate([model.hinges[model.piece_hinge], n + model.piece_rotations], axis=1)
+    owner = np.full(len(model.hinges), -1, np.int64)
+    side = np.flatnonzero(model.hinge.ravel() >= 0)
+    owner[model.hinge.ravel()[side]] = side
+
+    coupled = _coupled((triangle, piece), count)
+    row, column = np.repeat(np.arange(count), np.diff(coupled.indptr)), coupled.indices
+    pairs = row * count + column
+    width = np.where(np.arange(count) < n, 3, 1)
+    dof = np.concatenate([[0], np.cumsum(width)])  # first of each place
+    behind = np.concatenate([[0], np.cumsum(width[column])])  # entries of one row of each place
+    start = behind[coupled.indptr]
+    length = np.repeat(np.diff(start), width)  # of the rows of the matrix
+    indptr = np.concatenate([[0], np.cumsum(length)])
+    first = indptr[dof[row]] + behind[:-1] - start[row]  # entry of each pair
+
+    once = np.repeat(dof[column] - behind[:-1], width[column]) + np.arange(behind[-1])
+    copy = np.arange(indptr[-1]) + np.repeat(np.repeat(start[:-1], width) - indptr[:-1], length)
+    return ShellPattern(
+        size=int(dof[-1]),
+        indptr=indptr.astype(np.int32),
+        indices=once.astype(np.int32)[copy],
+        corner=corner,
+        triangle_dof=_first_dofs(triangle, dof),
+        triangle=_first_entries(triangle, pairs, first, count),
+        owner=owner,
+        piece_dof=_first_dofs(piece, dof),
+        piece=_first_entries(piece, pairs, first, count),
+    )
+
+
+def _coupled(elements: tuple[NDArray, ...], count: int) -> sparse.csr_array:
+    """Which places occur in one element (e, k) together, sorted; each with itself."""
+    places = np.concatenate([np.arange(count), *(element.ravel() for element in elements)])
+    sizes = [np.ones(count, np.int64), *(np.full(len(e), e.shape[1]) for e in elements)]
+    number = np.repeat(np.arange(sum(map(len, sizes))), np.concatenate(sizes))
+    known = places >= 0
+    within = sparse.csr_array((np.ones(known.sum(), np.int32), (number[known], places[known])))
+    together = sparse.csr_array(within.T @ within)
+    together.sort_indices()
+    return together
+
+
+def _first_dofs(places: NDArray, dof: NDArray) -> NDArray:
+    return np.where(places >= 0, dof[places], -1).astype(np.int32)
+
+
+def _first_entries(places: NDArray, pairs: NDArray, first: NDArray, count: int) -> NDArray:
+    """First entries (e, k, k) of the blocks of places (e, k); -1 without one of them."""
+    row, column = places[:, :, None], places[:, None, :]
+    key = np.where((row >= 0) & (column >= 0), row * count + column, -1)
+    entry = np.where(key >= 0, first[np.searchsorted(pairs, key)], -1)
+    return entry.astype(np.int32)
+
+
+def _neighborhoods(model: ShellModel) -> tuple[NDArray, NDArray]:
+    """Nodes (nt, 6): corners, then the far wing of each side's hinge (-1: none); and `corner`."""
+    tri = model.triangles
+    nodes = np.concatenate([tri, np.full_like(tri, -1)], axis=1)
+    corner = np.zeros((len(tri), 3, 4), np.int8)
+    for k in range(3):
+        has = np.flatnonzero(model.hinge[:, k] >= 0)
+        row = model.hinges[model.hinge[has, k]]
+        own = row[:, :, None] == tri[has][:, None, :]
+        nodes[has, 3 + k] = row[~own.any(axis=2)]
+        corner[has, k] = np.where(own.any(axis=2), own.argmax(axis=2), 3 + k)
+    return np.where(nodes < model.nodes, nodes, -1), corner
 
 
 @scalar
@@ -154,14 +252,13 @@ def _add_creases(model, pattern, u, work, floor, data):
 
 
 def shell_tangent(
-    model: ShellModel, pattern: ShellPattern, u: NDArray, x: NDArray, work: ShellWork,
-    floor: float = -np.inf,
-) -> sparse.csr_array:  # fmt: skip
+    model: ShellModel, pattern: ShellPattern, u: NDArray, x: NDArray, floor: float = -np.inf
+) -> sparse.csr_array:
     """Tangent stiffness at displacements u (n, 3) and rotations x (r,).
 
     floor : slopes of the creases' law per unit stiffness below it are raised to it.
     """
-    data = np.zeros(len(pattern.indices))
+    data, work = np.zeros(len(pattern.indices)), shell_work(model)
     fold(model, u, x, work)
     work.moment[:] = 0.0
     _add_triangles(model, pattern, u, x, work, data)
@@ -170,3 +267,36 @@ def shell_tangent(
     return sparse.csr_array(
         (data, pattern.indices, pattern.indptr), shape=(pattern.size, pattern.size)
     )
+
+
+def add_extrapolated_strain(
+    model: ShellModel, pattern: ShellPattern, u: NDArray, before: NDArray, data: NDArray
+) -> None:
+    """Replace the stresses in a tangent's entries `data` at u by those extrapolated to it.
+
+    The strains that panels get from being moved along straight lines, of second order in their
+    turn, are kept out of the geometric stiffness of the next step of Newton's method, as
+    `mechanics.step_tangent` does for bars; the residual sees the true ones.
+
+    u, before : (n, 3) states after and before the last step.
+    """
+    old, new = _apart(model, before), _apart(model, u)
+    # e(u) - e(u0) - (D0 . d) / L^2 = |d|^2 / (2 L^2)
+    second = 0.5 * np.einsum("tki,tki->tk", new - old, new - old) * model.per_length2
+    excess = -np.einsum("tkl,tl->tk", model.membrane, second) * model.per_length2
+    dof = pattern.triangle_dof[:, :3]
+    diagonal = pattern.indptr[dof + 1] - pattern.indptr[dof] + 1  # from (0, 0) to (1, 1) of a block
+    slots, values = [], []
+    for k in range(3):
+        ends = (k, (k + 1) % 3)
+        for one in ends:
+            for other in ends:
+                for axis in range(3):
+                    slots.append(pattern.triangle[:, one, other] + axis * diagonal[:, one])
+                    values.append(excess[:, k] if one == other else -excess[:, k])
+    data += np.bincount(np.concatenate(slots), np.concatenate(values), len(data))
+
+
+def _apart(model: ShellModel, u: NDArray) -> NDArray:
+    """Relative displacements (nt, 3, 3) of the ends of the sides."""
+    return u[np.roll(model.triangles, -1, axis=1)] - u[model.triangles]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from foldyn.signals.circle_fit import CircleFit, circle_fit, circle_fits
 from foldyn.signals.conversions import base_transmissibility, convert_response, transmissibility
-from foldyn.signals.exponential_window import exponential_window, without_window
-from foldyn.signals.frequency_response import FrequencyResponse, frequency_response
-from foldyn.signals.half_power import HalfPower, half_power
+from foldyn.signals.frequency_response import (
+    FrequencyResponse,
+    exponential_window,
+    frequency_response,
+    without_window,
+)
 from foldyn.signals.log_decrement import LogDecrement, log_decrement
 from foldyn.signals.matrix_pencil import DecayingModes, matrix_pencil
-from foldyn.signals.peaks import Peaks, find_peaks
+from foldyn.signals.peaks import HalfPower, Peaks, find_peaks, half_power
 from foldyn.signals.preprocessing import (
     choose_window,
     fill_gaps,
@@ -17,7 +20,7 @@ from foldyn.signals.preprocessing import (
     remove_trend,
     subtract_final,
 )
-from foldyn.signals.sampling import is_uniform, sampling_interval
+from foldyn.signals.records import is_uniform, sampling_interval
 from foldyn.signals.spectrum import spectrum
 from foldyn.signals.stepped_sine import SineFit, fit_sine, stepped_sine
 

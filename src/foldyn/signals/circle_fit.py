@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import ComputationError, InputError
 from foldyn.signals import records
 from foldyn.signals.conversions import convert_response
+from foldyn.values import choice
 
 _FEWEST = 5  # points in a band: six real unknowns against ten real numbers
 _LARGEST_ERROR = 1.0 / 3.0  # of the damping ratio: mere noise gives circles with errors above 0.4
@@ -114,7 +115,7 @@ def circle_fit(
     9.300000 0.135000 2.500000
     """
     f, Y = _mobility(frequency, response, quantity)
-    return _told(_fit(*_in_band(f, Y, band)))
+    return _certain(_fit(*_in_band(f, Y, band)))
 
 
 def circle_fits(
@@ -152,16 +153,15 @@ def circle_fits(
         raise InputError("bands: empty; give one band (Hz) for each mode")
     f, Y = _mobility(frequency, response, quantity)
     parts = [_in_band(f, Y, band) for band in bands]
-    fits: list[CircleFit | None] = [None] * len(parts)
+    fits: dict[int, CircleFit] = {}
     before = np.full((len(parts), 2), np.inf)
     for _ in range(_SWEEPS):
         for k, (points, values) in enumerate(parts):
-            others = [fit for j, fit in enumerate(fits) if j != k and fit is not None]
+            others = [fit for j, fit in fits.items() if j != k]
             fits[k] = _fit(points, values - sum(fit.mobility(points) for fit in others))
-        found = [fit for fit in fits if fit is not None]
-        now = np.array([(fit.natural_frequency, fit.damping_ratio) for fit in found])
+        now = np.array([(fit.natural_frequency, fit.damping_ratio) for fit in fits.values()])
         if (np.abs(now - before) <= _SETTLED * now).all():
-            return tuple(_told(fit) for fit in found)
+            return tuple(_certain(fit) for fit in fits.values())
         before = now
     raise ComputationError(
         f"circle fits: they still change after {_SWEEPS} sweeps (natural frequencies "
@@ -173,7 +173,7 @@ def _mobility(
     frequency: ArrayLike, response: ArrayLike, quantity: str
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Frequencies above 0 and the mobility there; NaN may stand outside the bands."""
-    records.checked_choice("quantity", quantity, records.DERIVATIVES)
+    choice("quantity", quantity, records.DERIVATIVES)
     f = records.checked_frequencies(frequency, fewest=_FEWEST)
     Y = np.asarray(response)
     if Y.shape != f.shape:
@@ -252,8 +252,8 @@ def _fit(f: NDArray[np.float64], Y: NDArray[np.complex128]) -> CircleFit:
     )
 
 
-def _told(fit: CircleFit) -> CircleFit:
-    """The fit, where its points tell the damping."""
+def _certain(fit: CircleFit) -> CircleFit:
+    """The fit, where its points determine the damping."""
     if not fit.damping_error < _LARGEST_ERROR * fit.damping_ratio:
         raise ComputationError(
             f"circle fit: at {fit.natural_frequency:.6g} Hz the damping ratio is "

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import DERIVATIVES, checked_choice, checked_frequencies
+from foldyn.signals.records import DERIVATIVES, beside, checked_frequencies
+from foldyn.values import choice
 
 
 def convert_response(
@@ -28,7 +29,7 @@ def convert_response(
     Returns
     -------
     ndarray, shape (m, ...), complex
-        NaN at 0 Hz where a division by i w would be needed: the record does not tell.
+        NaN at 0 Hz where a division by i w would be needed.
 
     Raises
     ------
@@ -41,15 +42,15 @@ def convert_response(
     [0. +6.283j 0.+12.566j]
     """
     order = (
-        DERIVATIVES[checked_choice("target", target, DERIVATIVES)]
-        - DERIVATIVES[checked_choice("source", source, DERIVATIVES)]
+        DERIVATIVES[choice("target", target, DERIVATIVES)]
+        - DERIVATIVES[choice("source", source, DERIVATIVES)]
     )
     f, H = _over_frequency(frequency, response)
     if order == 0:
         return H
     iw = 2j * np.pi * np.where((f == 0.0) & (order < 0), np.nan, f)
     with np.errstate(invalid="ignore"):
-        return H * (iw**order).reshape(f.shape + (1,) * (H.ndim - 1))
+        return H * beside(iw**order, H)
 
 
 def transmissibility(response: ArrayLike, reference: ArrayLike) -> NDArray[np.complex128]:
@@ -76,7 +77,7 @@ def transmissibility(response: ArrayLike, reference: ArrayLike) -> NDArray[np.co
         )
     R = np.where(R == 0.0, np.nan, R)
     with np.errstate(invalid="ignore"):
-        return H / R.reshape(R.shape + (1,) * (H.ndim - 1))
+        return H / beside(R, H)
 
 
 def base_transmissibility(frequency: ArrayLike, relative: ArrayLike) -> NDArray[np.complex128]:
@@ -99,7 +100,7 @@ def base_transmissibility(frequency: ArrayLike, relative: ArrayLike) -> NDArray[
         Absolute displacement per displacement of the base, 1 at 0 Hz.
     """
     f, H = _over_frequency(frequency, relative)
-    return 1.0 - (2.0 * np.pi * f.reshape(f.shape + (1,) * (H.ndim - 1))) ** 2 * H
+    return 1.0 - (2.0 * np.pi * beside(f, H)) ** 2 * H
 
 
 def _over_frequency(

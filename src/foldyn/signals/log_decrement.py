@@ -34,7 +34,7 @@ class LogDecrement:
     time, height : ndarray, shape (k,)
         The maxima (s, unit of the record), above the rest position.
     successive : ndarray, shape (k - 1,)
-        Logarithm of the ratio of each pair: a trend tells damping that depends on the amplitude.
+        Logarithm of the ratio of each pair: a trend shows damping that depends on the amplitude.
     """
 
     decrement: float

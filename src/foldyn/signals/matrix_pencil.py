@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_count, checked_interval, checked_number, real_array
+from foldyn.signals.records import checked_interval, checked_number, real_array
+from foldyn.values import whole
 
 _FEWEST = 8
 _WIDEST = 500  # of a window: the singular value decomposition costs n width^2
@@ -124,7 +125,7 @@ def matrix_pencil(
     channels = samples.shape[1:]
     n = samples.shape[0]
     samples = samples.reshape(n, -1)
-    span = min(n // 3, _WIDEST) if width is None else checked_count("width", width)
+    span = min(n // 3, _WIDEST) if width is None else whole("width", width, least=1)
     if span > n - 1:
         raise InputError(f"width: {span}, but the record has {n} samples; give about {n // 3}")
 
@@ -132,7 +133,7 @@ def matrix_pencil(
     if order is None:
         order = _order(values, n, threshold)
     most = min(span, (n - span) * samples.shape[1])
-    if checked_count("order", order) > most:
+    if whole("order", order, least=1) > most:
         raise InputError(
             f"order: {order}, but {n} samples with windows of {span + 1} hold at most {most} "
             "poles; record longer, or ask for fewer"

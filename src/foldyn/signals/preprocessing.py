@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
+from foldyn.values import whole
 
 _FEWEST = 4
 
@@ -33,7 +34,7 @@ def fill_gaps(x: ArrayLike, longest: int = 5) -> NDArray[np.float64]:
         A longer gap, or one at an end: cut the record there.
     """
     values = records.real_numbers("x", x)
-    most = records.checked_count("longest", longest)
+    most = whole("longest", longest, least=1)
     known = np.isfinite(values)
     if values.ndim != 1 or known.sum() < _FEWEST:
         raise InputError(
@@ -104,13 +105,13 @@ def first_turning_point(x: ArrayLike, least: float = 0.1) -> int:
     if limit <= 0.0:
         raise InputError("x: constant throughout; there is no motion in it")
     turns = [find_peaks(sign * values, prominence=limit)[0] for sign in (1.0, -1.0)]
-    found = np.concatenate(turns)
-    if not found.size:
+    places = np.concatenate(turns)
+    if not places.size:
         raise InputError(
             "x: does not turn: it has no maximum or minimum between its ends that stands out by "
             f"{part:g} of its range; choose another window, or a lower `least`"
         )
-    return int(found.min())
+    return int(places.min())
 
 
 def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Checks of records, intervals, windows and curves that the estimators share."""
+"""Checks of records, their sampling, windows and curves that the estimators share."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.values import show, whole
+from foldyn.values import number
 
 Window: TypeAlias = str | tuple | ArrayLike | None
 
 # time derivatives of the displacement that a frequency response holds, per force
 DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
 DETRENDS = (None, "constant", "linear")
+
+# Times written as n*dt are rounded in proportion to their own size, so the slack of an interval is
+# a fraction of the interval plus a few units in the last place of the largest time.
+_RELATIVE_SLACK = 1e-6
+_ROUNDING_UNITS = 8.0
 
 
 def real_numbers(name: str, x: ArrayLike) -> NDArray[np.float64]:
@@ -56,15 +61,9 @@ def checked_record(name: str, x: ArrayLike, fewest: int) -> NDArray[np.float64]:
 
 def checked_interval(dt: float) -> float:
     """Return the sampling interval as a positive float."""
-    try:
-        interval = float(dt)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"dt: {dt!r} is not one number; for sample times use signals.sampling_interval(time)"
-        ) from error
-    if not (np.isfinite(interval) and interval > 0.0):
-        raise InputError(f"dt: {dt!r}; the sampling interval is a positive number of seconds")
-    return interval
+    if np.ndim(dt):
+        raise InputError("dt: is not one number; for sample times use signals.sampling_interval")
+    return checked_number("dt", dt, above=0.0)
 
 
 def checked_window(window: Window, n: int) -> NDArray[np.float64]:
@@ -98,37 +97,9 @@ def detrended(x: NDArray[np.float64], kind: str | None, axis: int = 0) -> NDArra
     return detrend(x, axis=axis, type=kind)
 
 
-def checked_number(
-    name: str,
-    value: Any,
-    least: float = -np.inf,
-    above: float = -np.inf,
-    below: float = np.inf,
-) -> float:
-    """Return `value` as a finite float within the bounds."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name}: {show(value)} is not a finite number") from error
-    if not (np.isfinite(number) and number >= least and above < number < below):
-        bounds = {"at least": least, "above": above, "below": below}
-        words = [f"{word} {bound:g}" for word, bound in bounds.items() if np.isfinite(bound)]
-        raise InputError(
-            f"{name}: {value!r} must be finite{''.join(', ' + word for word in words)}"
-        )
-    return number
-
-
-def checked_count(name: str, value: Any, least: int = 1) -> int:
-    """Return `value` as a whole number, at least `least`."""
-    return whole(name, value, least=least)
-
-
-def checked_choice(name: str, value: Any, known: Any) -> str:
-    """Return `value` where it is one of the `known` words."""
-    if not isinstance(value, str) or value not in known:
-        raise InputError(f"{name}: {value!r} is unknown; use one of {', '.join(known)}")
-    return value
+def checked_number(name: str, value: Any, **bounds: Any) -> float:
+    """Return a number, or an array without dimensions, as a float within bounds of `number`."""
+    return number(name, value.item() if getattr(value, "shape", None) == () else value, **bounds)
 
 
 def checked_frequencies(frequency: ArrayLike, fewest: int) -> NDArray[np.float64]:
@@ -168,3 +139,72 @@ def checked_curve(
 def _first(bad: NDArray[np.bool_]) -> int:
     """First index along the first axis of the first bad value."""
     return int(np.argwhere(np.atleast_1d(bad))[0][0])
+
+
+def beside(row: NDArray, other: NDArray) -> NDArray:
+    """A row over the first axis, shaped to multiply an array with channels behind it."""
+    return row.reshape(row.shape + (1,) * (other.ndim - 1))
+
+
+def is_uniform(time: ArrayLike, rtol: float = _RELATIVE_SLACK) -> bool:
+    """Tell whether sample times are evenly spaced and increasing.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Sample times (s).
+    rtol : float
+        Allowed deviation of any sample from the even grid between the first and the last one,
+        as a fraction of the mean interval.
+
+    Returns
+    -------
+    bool
+        False also for fewer than two samples, for NaN and infinity, and for anything that is not
+        one-dimensional.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all():
+        return False
+    step = (t[-1] - t[0]) / (t.size - 1)
+    if step <= 0.0:
+        return False
+    # Compared with the grid and not step by step: rounding then does not add up, drift shows.
+    grid = t[0] + step * np.arange(t.size)
+    slack = rtol * step + _ROUNDING_UNITS * np.finfo(np.float64).eps * np.abs(t).max()
+    return bool(np.abs(t - grid).max() <= min(slack, 0.5 * step))
+
+
+def sampling_interval(time: ArrayLike) -> float:
+    """Return the interval of evenly spaced sample times.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Sample times (s), n >= 2.
+
+    Returns
+    -------
+    float
+        Mean interval (s).
+
+    Raises
+    ------
+    InputError
+        Where the times are not evenly spaced and increasing.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    if t.ndim != 1 or t.size < 2:
+        raise InputError(
+            f"time: shape {t.shape} has no sampling interval; give at least two times in one row"
+        )
+    if not is_uniform(t):
+        if not np.isfinite(t).all():
+            where = int(np.flatnonzero(~np.isfinite(t))[0])
+            raise InputError(f"time: sample {where} is {t[where]}; every time must be finite")
+        steps = np.diff(t)
+        raise InputError(
+            f"time: samples are not evenly spaced (intervals from {steps.min():.6g} to "
+            f"{steps.max():.6g} s); store at a fixed interval, or resample before a spectrum"
+        )
+    return float((t[-1] - t[0]) / (t.size - 1))

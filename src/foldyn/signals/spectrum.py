@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
+from foldyn.values import whole
 
 MINIMUM_SAMPLES = 4
 
@@ -16,7 +17,7 @@ def spectrum(
     x: ArrayLike,
     dt: float,
     axis: int = 0,
-    window: str | tuple | ArrayLike | None = None,
+    window: records.Window = None,
     detrend: str | None = None,
     pad: int = 1,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -57,33 +58,27 @@ def spectrum(
         Fewer than 4 samples, NaN or infinity in the record, complex samples, an interval that is
         not positive, an unknown window or detrend, or a padding factor below 1.
     """
-    samples = _checked_samples(x, axis)
+    samples = records.real_numbers("x", x)
+    if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
+        raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
+    samples = records.finite("x", np.moveaxis(samples, axis, 0))
     n = samples.shape[0]
+    if n < MINIMUM_SAMPLES:
+        raise InputError(
+            f"x: {n} samples along axis {axis}; a spectrum needs at least {MINIMUM_SAMPLES}: run "
+            "longer or store more often"
+        )
     interval = records.checked_interval(dt)
-    length = n * records.checked_count("pad", pad)
+    length = n * whole("pad", pad, least=1)
 
     samples = records.detrended(samples, detrend)
     gain = float(n)
     if window is not None:
         weights = records.checked_window(window, n)
         gain = float(weights.sum())
-        samples = samples * weights.reshape((n,) + (1,) * (samples.ndim - 1))
+        samples = samples * records.beside(weights, samples)
 
     amplitude = np.abs(scipy.fft.rfft(samples, n=length, axis=0)) / gain
     doubled = slice(1, -1) if length % 2 == 0 else slice(1, None)
     amplitude[doubled] *= 2.0
     return scipy.fft.rfftfreq(length, interval), np.moveaxis(amplitude, 0, axis)
-
-
-def _checked_samples(x: ArrayLike, axis: int) -> NDArray[np.float64]:
-    """Return the samples as float64 with time along axis 0."""
-    samples = records.real_numbers("x", x)
-    if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
-        raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
-    samples = records.finite("x", np.moveaxis(samples, axis, 0))
-    if samples.shape[0] < MINIMUM_SAMPLES:
-        raise InputError(
-            f"x: {samples.shape[0]} samples along axis {axis}; a spectrum needs at least "
-            f"{MINIMUM_SAMPLES}: run longer or store more often"
-        )
-    return samples

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals.records import checked_count, checked_number, real_array
+from foldyn.signals.records import checked_number, real_array
+from foldyn.values import whole
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def fit_sine(
     2.0 -1.0
     """
     f = checked_number("frequency", frequency, above=0.0)
-    count = checked_count("harmonics", harmonics)
+    count = whole("harmonics", harmonics, least=1)
     t, samples = _steady_part(time, x, f, cycles)
     if np.diff(t).max() * f * count >= 0.5:
         raise InputError(
@@ -181,7 +182,7 @@ def _steady_part(
         raise InputError(f"x: shape {samples.shape}, but there are {t.size} times")
     # the last sample stands for the interval before it: n intervals are n dt long, not (n - 1) dt
     there = (t[-1] - t[0]) * t.size / (t.size - 1) * f
-    wanted = 2 if cycles is None else checked_count("cycles", cycles, least=2)
+    wanted = 2 if cycles is None else whole("cycles", cycles, least=2)
     if there < wanted * (1.0 - 1e-9):
         raise InputError(
             f"time: the record holds {there:.3g} cycles of {f:g} Hz, and {wanted} are needed; "

@@ -1,15 +1,14 @@
 """Statics: equilibrium paths, their stability and branches, and energy landscapes."""
 
-from foldyn.algebra.choice import SOLVERS
+from foldyn.algebra.solvers import SOLVERS
 from foldyn.statics.branch import switch_branch
 from foldyn.statics.energy_landscape import Equilibrium, Landscape, landscape
 from foldyn.statics.mechanism import mechanisms
-from foldyn.statics.methods import METHODS
-from foldyn.statics.newton import Solver
+from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.path_methods import METHODS
 from foldyn.statics.problem import Problem
-from foldyn.statics.settings import Settings
-from foldyn.statics.station import Point
+from foldyn.statics.stepping import Point
 from foldyn.statics.tracing import trace
 
 __all__ = [

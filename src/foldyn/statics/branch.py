@@ -8,7 +8,8 @@ then followed away from the crossing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,15 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
-from foldyn.statics.arguments import check_steps
-from foldyn.statics.course import free
-from foldyn.statics.methods import method_of
-from foldyn.statics.newton import Attempt, Solver
+from foldyn.statics.newton import Attempt, Settings, Solver, plane
 from foldyn.statics.origami import OrigamiProblem
-from foldyn.statics.settings import Settings
+from foldyn.statics.path_methods import METHODS, PathPlan, along
+from foldyn.statics.problem import balance
+from foldyn.statics.recording import record
 from foldyn.statics.stability import critical_modes
-from foldyn.statics.station import PathStoppedError, Point, Station, Walk, arrive
-from foldyn.statics.tolerance import balance
-from foldyn.statics.tracing import Recorder, on_nodes
-from foldyn.values import whole
+from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arrive
+from foldyn.statics.tracing import check_steps, on_nodes
+from foldyn.values import choice, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -86,8 +85,8 @@ def switch_branch(
         raise InputError(f"direction = {direction!r}: give 1 or -1")
     whole("mode", mode, least=0)
     check_steps(steps, path["displacement"][0].size)
-    rule = method_of(method).rule
-    if rule is None:
+    way = METHODS[choice("method", method, METHODS)]
+    if way.rule is None:
         raise InputError(f" = {method!r}: a branch takes 'arc_length' or 'mgdcm'", "method")
     problem = problem_of(path, case, at)
     solver = Solver(problem, settings)
@@ -103,31 +102,31 @@ def switch_branch(
         "started_from": "state",
     }
 
-    def course() -> Walk:
+    plan = PathPlan(way, crossing.point.factor, [], None, steps - 1, 0.0)
+
+    def stations() -> Walk:
         yield crossing
         first = _onto_branch(solver, crossing, mode, _multiplicity(path, at), direction)
         yield first
         away = first.point.u - crossing.point.u
-        yield from free(
-            solver, first, rule, 0.0, steps - 1, None, on_nodes(until, problem), direction=away
-        )
+        yield from along(solver, first, plan, on_nodes(until, problem), away)
 
-    return Recorder(problem, solver, facts, False).record(course(), progress)
+    return record(stations(), progress, solver, problem, facts)
 
 
 def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
     if "point" not in path:
         raise InputError("path: is not a path from trace")
-    found = np.flatnonzero(path["point"].values == "bifurcation")
-    if not len(found):
+    steps = np.flatnonzero(path["point"].values == "bifurcation")
+    if not len(steps):
         raise InputError(
             "path: has no bifurcation; trace it with settings that locate them (locate = True, "
             "and a method other than 'newton')"
         )
     if at is None:
-        return int(found[0])
-    if at not in found:
-        raise InputError(f"at = {at!r}: the bifurcations of the path are steps {found.tolist()}")
+        return int(steps[0])
+    if at not in steps:
+        raise InputError(f"at = {at!r}: the bifurcations of the path are steps {steps.tolist()}")
     return int(at)
 
 
@@ -150,14 +149,11 @@ def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at
     """A station at a step of a path, as it is stored."""
     factor = float(path["load_factor"].values[at])
     u = problem.actuation.body(factor).dofs(path["displacement"].values[at]).copy()
-    found = balance(problem, u, factor, problem.residual(u, factor))
-    station = arrive(solver, Attempt(u, factor, int(path["iterations"].values[at]), found))
-    stored: dict[str, Any] = {
-        "negative": int(path["negative_eigenvalues"].values[at]),
-        "kind": str(path["point"].values[at]),
-    }
-    point = Point(u, factor, station.point.iterations, found.relative, **stored)
-    return station._replace(point=point)
+    reached = balance(problem, u, factor, problem.residual(u, factor))
+    station = arrive(solver, Attempt(u, factor, int(path["iterations"].values[at]), reached))
+    negative = int(path["negative_eigenvalues"].values[at])
+    kind = str(path["point"].values[at])
+    return station._replace(point=replace(station.point, negative=negative, kind=kind))
 
 
 def _multiplicity(path: xarray.Dataset, at: int) -> int:
@@ -191,11 +187,8 @@ def _aside(solver: Solver, crossing: Station, shape: NDArray, turn: float) -> At
     """Equilibrium with an amplitude of a shape by which a hinge turns by `turn`."""
     point, probe = crossing.point, 1e-6 * solver.problem.length
     amplitude = probe * turn / solver.problem.turn(point.u, point.u + probe * shape)
-
-    def plane(moved: NDArray, step: NDArray, response: NDArray) -> float:
-        return (amplitude - float(shape @ (moved + step))) / float(shape @ response)
-
-    attempt = solver.correct(point.u + amplitude * shape, point.factor, plane, origin=point.u)
+    start, rule = point.u + amplitude * shape, plane(shape, amplitude)
+    attempt = solver.correct(start, point.factor, rule, origin=point.u)
     if not attempt.failure and np.linalg.norm(attempt.u - point.u) > FAR * amplitude:
         return attempt._replace(failure="it led far away")
     return attempt
@@ -206,18 +199,11 @@ def _directions(shapes: NDArray, mode: int, multiplicity: int) -> list[NDArray]:
 
     Where several eigenvalues vanish together, only some of the combinations of their shapes do.
     """
-    first = _oriented(shapes[:, mode])
+    first = shapes[:, mode]
     others = [k for k in range(multiplicity) if k != mode and mode < multiplicity]
     turned = [
-        np.cos(angle) * first + np.sin(angle) * _oriented(shapes[:, k])
+        np.cos(angle) * first + np.sin(angle) * shapes[:, k]
         for k in others
         for angle in np.radians([15, -15, 30, -30, 45, -45, 60, -60, 75, -75])
     ]
     return [first, *turned]
-
-
-def _oriented(shape: NDArray) -> NDArray:
-    """The shape with its largest entry positive, so that directions do not depend on a solver."""
-    largest = np.abs(shape).max()
-    first = int(np.flatnonzero(np.abs(shape) > (1.0 - 1e-6) * largest)[0])
-    return shape * np.sign(shape[first])

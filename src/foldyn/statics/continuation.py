@@ -10,15 +10,18 @@ degrees off the step before or the tangent at its own end: there it may have lef
 
 from __future__ import annotations
 
-from typing import Protocol
+import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.statics.newton import COLLIDES, Attempt, Rule, Solver
-from foldyn.statics.station import PathStoppedError, Station, Walk, arrive
-from foldyn.statics.stepping import step_to, stopped
-from foldyn.statics.tolerance import UNKNOWN
+from foldyn.statics.problem import UNKNOWN
+from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, step_to, stopped
+
+# rule of one step from its length and its prediction (m,)
+ArcRule = Callable[[float, NDArray], Rule]
 
 ALIGNED = 0.5  # cosine of the largest angle to the step before and to the tangent at its end
 BEND = np.radians(12.0)  # of the path within a step, aimed at
@@ -28,12 +31,55 @@ REMEDY = (
 )
 
 
-class ArcRule(Protocol):
-    """Makes the rule of one step of a length with a prediction (m,)."""
+class Plane:
+    """Rule of the modified generalized displacement control, the method of MERLIN2, for one step.
 
-    def __call__(self, length: float, prediction: NDArray) -> Rule:
-        """Rule of the step."""
-        ...
+    After the prediction c1 = df1 b1, with b1 the response to the load factor at the start of the
+    step, every correction a + df b is orthogonal to b1: df = -(b1.a)/(b1.b). Predictions are as
+    long as the first step of the path, |df1| = length/|b1|, which with the first response b0 is
+    the square root of the generalized stiffness parameter |b0.b0/(b1.b1)| (Leon, Lages, de Araujo
+    and Paulino, Comput. Mech. 53, 2014: "modified" is that the parameter and the plane take the
+    present step's response twice instead of that of the step before).
+    """
+
+    def __init__(self, length: float, prediction: NDArray) -> None:
+        self.prediction = prediction  # the plane stands at its end, whatever the length
+
+    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
+        """Change of the load factor; nan where the plane contains the response."""
+        across = float(self.prediction @ response)
+        # the motion reached is brought back into the plane where a step was taken in part only
+        short = float(self.prediction @ (moved + step)) - float(self.prediction @ self.prediction)
+        return -short / across if across != 0.0 else math.nan
+
+
+class Cylinder:
+    """Rule of the cylindrical arc length for one step: its end lies at a distance from its start.
+
+    With c the motion since the start of the step, a the step of Newton's method at the present
+    load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
+    for df (Crisfield, Computers and Structures 13, 1981). The root taken is the one that
+    continues in the direction of the step.
+    """
+
+    def __init__(self, length: float, prediction: NDArray) -> None:
+        self.length, self.prediction = length, prediction
+
+    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
+        """Change of the load factor; nan where the arc does not meet the linearized path."""
+        reached = moved + step
+        a = float(response @ response)
+        b = float(response @ reached)
+        c = float(reached @ reached) - self.length**2
+        root = b * b - a * c
+        if not root >= 0.0 or a == 0.0:
+            return math.nan
+        root = math.sqrt(root)
+        # without cancellation: one root by the sum of two terms of one sign, one by Vieta
+        far = -(b + math.copysign(root, b))
+        roots = (far / a, c / far if far != 0.0 else 0.0)
+        along = [float((reached + root * response) @ self.prediction) for root in roots]
+        return roots[int(np.argmax(along))]
 
 
 def follow(
@@ -46,7 +92,7 @@ def follow(
     solver, start
         Where the path begins.
     rule : ArcRule
-        That of a method, such as `arc_rules.Cylinder`.
+        That of a method, such as `Cylinder`.
     first_step : float
         Change of the load factor in the first step; the next steps are as long.
     direction : (m,) or None
@@ -64,7 +110,11 @@ def follow(
         if arrived is None or failure:
             solver.tally.cuts += 1
             if not pace.cut():
-                raise _stopped(station, failure)
+                raise PathStoppedError(
+                    "the path could not be followed beyond the load factor "
+                    f"{station.point.factor:.6g} ({failure})",
+                    REMEDY,
+                )
             continue
         pace.accept(station, arrived)
         station = arrived
@@ -79,8 +129,7 @@ class _Pace:
         self.length = float(np.linalg.norm(moved))
         self.shortest = self.length * 2.0**-self.settings.cuts
         self.largest = float(np.radians(self.settings.largest_turn))
-        size = float(np.linalg.norm(station.response))
-        climb = np.copysign(self.length / size, station.response @ moved)
+        climb = _climb(station, self.length, moved)
         self.scale = self.length / abs(climb) if climb != 0.0 else 1.0
         self.slope = np.arctan2(self.scale * climb, self.length)
 
@@ -88,7 +137,7 @@ class _Pace:
         """Why a converged step is not taken; empty if it is.
 
         The tangent at its end must lie along the step as well: otherwise the direction in which
-        the path goes on would be anybody's guess.
+        the path continues would be arbitrary.
         """
         moved = arrived.point.u - station.point.u
         along = _cosine(moved, self.moved), abs(_cosine(moved, arrived.response))
@@ -131,8 +180,7 @@ def _advance(
     solver: Solver, station: Station, rule: ArcRule, length: float, moved: NDArray
 ) -> Attempt:
     """One step of a length along the path in the direction in which it `moved`."""
-    size = float(np.linalg.norm(station.response))
-    climb = float(np.copysign(length / size, station.response @ moved))
+    climb = _climb(station, length, moved)
     prediction = climb * station.response
     point = station.point
     factor = point.factor + climb
@@ -143,14 +191,12 @@ def _advance(
     return solver.correct(u, factor, rule(length, prediction), origin=point.u)
 
 
+def _climb(station: Station, length: float, moved: NDArray) -> float:
+    """Change of the load factor over a length along the tangent, continuing a motion."""
+    size = float(np.linalg.norm(station.response))
+    return float(np.copysign(length / size, station.response @ moved))
+
+
 def _cosine(one: NDArray, other: NDArray) -> float:
     sizes = float(np.linalg.norm(one)) * float(np.linalg.norm(other))
     return float(one @ other) / sizes if sizes > 0.0 else 0.0
-
-
-def _stopped(station: Station, failure: str) -> PathStoppedError:
-    return PathStoppedError(
-        f"the path could not be followed beyond the load factor {station.point.factor:.6g} "
-        f"({failure})",
-        REMEDY,
-    )

@@ -10,22 +10,21 @@ stiffness), are located to rounding.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import check_result
 from foldyn.statics.branch import problem_of, station_of
-from foldyn.statics.newton import Solver
+from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.origami import OrigamiProblem
-from foldyn.statics.settings import Settings
-from foldyn.statics.stability import Mark, Section
-from foldyn.statics.station import Station
+from foldyn.statics.stability import LostError, Section
+from foldyn.statics.stepping import Station
 
 if TYPE_CHECKING:
     import xarray
@@ -46,7 +45,7 @@ class Equilibrium:
     energy : float
         Energy (J) above that of the landscape's first point.
     stable : bool
-        Whether it stays there when let go.
+        Whether it stays there when released.
     """
 
     displacement: NDArray
@@ -145,8 +144,7 @@ def landscape(
             break
         after = stations[k + 1]
         if force[k] * force[k + 1] < 0.0:
-            found = walker.root(walker.force, station, after)
-            states.append(walker.state(found, energy[0]))
+            states.append(walker.state(walker.root(walker.force, station, after), energy[0]))
         if falls[k] != falls[k + 1]:
             edges.append(walker.stroke(walker.root(walker.compliance, station, after)))
     if falls[0]:
@@ -164,28 +162,28 @@ class _Walker:
         self.problem, self.solver = problem, solver
         if problem.actuation.acts:
             raise InputError("path: is driven by folds; a landscape needs forces or moved supports")
-        self.moves = problem.motion
-        self.load = problem.growing
-        self.by_motion = bool(self.moves.any())
-        if self.by_motion == bool(self.load.any()):
+        self.by_motion = bool(problem.motion.any())
+        if self.by_motion == bool(problem.growing.any()):
             raise InputError(
                 "path: is driven by forces and moved supports together, or by neither; a landscape "
                 "needs one of them"
             )
-        self.size = float(np.abs(self.moves).max() if self.by_motion else np.abs(self.load).sum())
+        self.driver = problem.motion if self.by_motion else problem.growing
+        size = np.abs(self.driver)
+        self.size = float(size.max() if self.by_motion else size.sum())
 
     def force(self, station: Station) -> float:
         """Driving force, N."""
         point = station.point
         if not self.by_motion:
             return point.factor * self.size
-        return float(self.moves @ self.problem.residual(point.u, point.factor)) / self.size
+        return float(self.driver @ self.problem.residual(point.u, point.factor)) / self.size
 
     def stroke(self, station: Station) -> float:
         """Stroke, m."""
         if self.by_motion:
             return station.point.factor * self.size
-        return float(self.load @ station.point.u) / self.size
+        return float(self.driver @ station.point.u) / self.size
 
     def energy(self, station: Station) -> float:
         """Strain energy less the work of constant loads, J."""
@@ -196,8 +194,8 @@ class _Walker:
     def rigidity(self, station: Station) -> float:
         """Slope of the driving force over the stroke, up to a positive factor."""
         if not self.by_motion:
-            return float(self.load @ station.response)
-        return float(self.moves @ (station.stiffness.matrix @ station.response))
+            return float(self.driver @ station.response)
+        return float(self.driver @ (station.stiffness.matrix @ station.response))
 
     def compliance(self, station: Station) -> float:
         """A smooth function that vanishes where the slope changes its sign.
@@ -210,33 +208,21 @@ class _Walker:
 
     def state(self, station: Station, base: float) -> Equilibrium:
         """State without force at a station."""
-        stable = self.rigidity(station) > 0.0
         if self.by_motion:
-            stable = stable and station.point.negative <= 0
+            stable = self.rigidity(station) > 0.0 and station.point.negative <= 0
         else:
             stable = station.stiffness.factors.negative() == 0
         displacement = self.problem.displacement(station.point.u).copy()
         energy = self.energy(station) - float(base)
         return Equilibrium(displacement, self.stroke(station), energy, stable)
 
-    def root(self, function, start: Station, end: Station) -> Station:
+    def root(self, function: Callable[[Station], float], start: Station, end: Station) -> Station:
         """Station between two others at which a function vanishes."""
         section = Section(self.solver, start, end)
-        low, high = Mark(0.0, start), Mark(1.0, end)
-        found = {0.0: start, 1.0: end}
-
-        def value(share: float) -> float:
-            if share not in found:
-                mark = section.at(share, low, high)
-                if mark is None:
-                    raise ComputationError(
-                        "no equilibrium was found between the load factors "
-                        f"{start.point.factor:.6g} and {end.point.factor:.6g} of the path: trace "
-                        "it with smaller steps"
-                    )
-                found[share] = mark.station
-            return function(found[share])
-
-        share = float(brentq(value, 0.0, 1.0, xtol=1e-13))
-        value(share)
-        return found[share]
+        try:
+            return section.zero(lambda mark: function(mark.station), 1e-13).station
+        except LostError:
+            raise ComputationError(
+                f"no equilibrium was found between the load factors {start.point.factor:.6g} and "
+                f"{end.point.factor:.6g} of the path: trace it with smaller steps"
+            ) from None

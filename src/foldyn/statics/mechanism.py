@@ -16,18 +16,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import SuperLU
 from foldyn.errors import InputError
 from foldyn.mechanics.body import Unstrained
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.rigid import AXES, name_rigid_motions
+from foldyn.statics.stability import softest_modes
 
 SHIFT = 1e-13  # of the diagonal, so that the matrix of a mechanism can be factorized
-SUSPICIOUS = (
-    1e-11  # eigenvalues of the matrix scaled to a unit diagonal that call for a closer look
-)
+SUSPICIOUS = 1e-11  # eigenvalue, of the matrix with a unit diagonal, that asks for a closer look
 INVERSE_ITERATIONS = 4
 MOST_MODES = 12
 BAR_STRAIN = 1e-9  # elongations, as a fraction of what the motion of their ends could cause
@@ -59,20 +57,15 @@ def mechanisms(problem: OrigamiProblem) -> list[str]:
     held = np.zeros(structure.nodes.size, bool)
     held[problem.held] = True
     x = structure.nodes + problem.displacement(problem.start())
-    found = name_rigid_motions(x, held)
-    unstrained = None if found else structure.body.unstrained(problem.start())
-    return found if unstrained is None else _internal(problem, unstrained)
+    rigid = name_rigid_motions(x, held)
+    unstrained = None if rigid else structure.body.unstrained(problem.start())
+    if unstrained is None:
+        return rigid
+    return [_name(mode.reshape(-1, 3)) for mode in free_modes(problem, unstrained).T]
 
 
-def _internal(problem: OrigamiProblem, unstrained: Unstrained) -> list[str]:
-    modes = free_modes(problem, unstrained)
-    if not modes.shape[1]:
-        return []
-    size = np.linalg.norm(modes.reshape(-1, 3, modes.shape[1]), axis=1)  # (n, modes)
-    return [_name(modes[:, k].reshape(-1, 3), size[:, k]) for k in range(modes.shape[1])]
-
-
-def _name(mode: NDArray, size: NDArray) -> str:
+def _name(mode: NDArray) -> str:
+    size = np.linalg.norm(mode, axis=1)
     moving = np.flatnonzero(size > MOVED * size.max())
     moving = moving[np.argsort(-size[moving], kind="stable")]
     nodes = ", ".join(map(str, sorted(moving[:MOST_NAMED].tolist())))
@@ -96,30 +89,23 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     size = len(free)
     shifted = sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc"))
     factors = SuperLU(shifted)
-    guess = np.random.default_rng(0).standard_normal(size)
-    if _softest(factors, guess) > SUSPICIOUS:
+    if _softest(factors, size) > SUSPICIOUS:
         return np.zeros((len(diagonal) + len(problem.held), 0))
-    if size <= 600:
-        values, vectors = np.linalg.eigh(scaled.toarray())
-        vectors = vectors[:, :MOST_MODES]
-    else:
-        inverse = LinearOperator((size, size), matvec=factors.solve)
-        values, vectors = eigsh(scaled, k=MOST_MODES, sigma=-SHIFT, OPinv=inverse, v0=guess)
-        vectors = vectors[:, np.argsort(values)]
+    values, vectors = softest_modes(scaled, factors, MOST_MODES, dense=600, shift=-SHIFT)
+    vectors = vectors[:, np.argsort(values, kind="stable")[:MOST_MODES]]
     shapes = np.zeros((size + len(problem.held), vectors.shape[1]))
     shapes[free] = vectors * scale[:, None]
     kept = [k for k, mode in enumerate(shapes.T) if _strains_nothing(unstrained, mode)]
     return np.linalg.qr(shapes[:, kept])[0] if kept else shapes[:, :0]
 
 
-def _softest(factors: SuperLU, guess: NDArray) -> float:
+def _softest(factors: SuperLU, size: int) -> float:
     """Smallest eigenvalue, from above, by a few inverse iterations."""
-    value = np.inf
+    value, guess = np.inf, np.random.default_rng(0).standard_normal(size)
     for _ in range(INVERSE_ITERATIONS):
         guess = guess / np.linalg.norm(guess)
-        found = factors.solve(guess)
-        value = 1.0 / float(np.linalg.norm(found))
-        guess = found
+        guess = factors.solve(guess)
+        value = 1.0 / float(np.linalg.norm(guess))
     return value
 
 

@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.choice import factorizer
 from foldyn.algebra.reduction import Reduction
+from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
-from foldyn.statics.problem import Problem
-from foldyn.statics.settings import Settings
-from foldyn.statics.tolerance import Balance, balance, converged
+from foldyn.errors import InputError
+from foldyn.statics.problem import Balance, Problem, balance, converged
+from foldyn.values import number, whole
 
 COLLIDES = "panel would pass through panel"
 MOST_TURN = 0.2  # rad, of any part within one iteration
@@ -40,8 +40,67 @@ SHIFT = 1e-13  # of the mean diagonal, added to a tangent that is singular to ro
 Rule = Callable[[NDArray, NDArray, NDArray], float]
 
 
+@dataclass(frozen=True)
+class Settings:
+    """How equilibria are solved for and how steps are chosen.
+
+    Parameters
+    ----------
+    tolerance : float
+        A state is accepted when the residual is below this fraction of the forces at play and
+        the last step below this fraction of the displacements (both; see `statics.problem`).
+    iterations : int
+        Newton iterations after which an attempt is given up and the step is cut.
+    target : int
+        Iterations per point that the step control aims at: steps shrink above and grow below.
+    cuts : int
+        Halvings of the first step (of each interval of load factors) after which a path ends.
+    largest_turn : float
+        Degrees by which a hinge (or, without hinges, a bar) may turn within one step of
+        "mgdcm" and "arc_length".
+    jump : float
+        A step that moves more than this many times as far as its linear prediction has left the
+        path (snapped) and is cut.
+    stability : bool
+        Count the negative eigenvalues of the tangent at every point.
+    locate : bool
+        Find the limit and bifurcation points between the points of a path ("newton" returns only
+        the factors it is given and locates none).
+    solver : str
+        "auto", or one of `statics.SOLVERS`.
+    """
+
+    tolerance: float = 1e-9
+    iterations: int = 25
+    target: int = 6
+    cuts: int = 15
+    largest_turn: float = 10.0
+    jump: float = 3.0
+    stability: bool = True
+    locate: bool = True
+    solver: str = "auto"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        number("settings: tolerance", self.tolerance, least=1e-14, most=1e-2)
+        number("settings: largest_turn", self.largest_turn, above=0.0)
+        number("settings: jump", self.jump, above=1.0)
+        for name in ("iterations", "target", "cuts"):
+            whole(f"settings: {name}", getattr(self, name), least=1)
+        for name in ("stability", "locate"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"settings: {name} = {getattr(self, name)!r}: give True or False")
+
+
+def plane(normal: NDArray, reach: float) -> Rule:
+    """Rule of a step that ends in a plane at a distance (times |normal|) from its origin."""
+    return lambda moved, step, response: (
+        (reach - float(normal @ (moved + step))) / float(normal @ response)
+    )
+
+
 class Attempt(NamedTuple):
-    """What a correction came to; an equilibrium unless `failure` says why not."""
+    """Outcome of a correction: an equilibrium, unless `failure` says why not."""
 
     u: NDArray
     factor: float
@@ -66,7 +125,7 @@ class Stiffness:
         self.problem, self.matrix, self.factors = problem, matrix, factors
 
     def solve(self, force: NDArray, motion: NDArray) -> NDArray:
-        """Motion (m,) of all dofs under a force (m,) on the free ones as the held move."""
+        """Motion (m,) of all dofs under a force (m,) on the free ones while the held ones move."""
         problem = self.problem
         full = np.zeros(len(force))
         full[problem.held] = motion
@@ -90,7 +149,7 @@ class Solver:
         self.problem = problem
         self.settings = settings or Settings()
         self.tally = Tally()
-        self._reduce = Reduction(problem.free)
+        self.reduce = Reduction(problem.free)  # the block of the free dofs
         self.backend, self._factorize = factorizer(self.settings.solver, len(problem.free))
 
     def stiffness(self, u: NDArray, factor: float, before: NDArray | None = None) -> Stiffness:
@@ -100,7 +159,7 @@ class Solver:
         below any stiffness lets the iteration go on.
         """
         matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
-        block = self._reduce(matrix)
+        block = self.reduce(matrix)
         self.tally.factorizations += 1
         try:
             factors = self._factorize(block)
@@ -112,10 +171,6 @@ class Solver:
             shifted = block + shift * sparse.eye_array(block.shape[0], format="csc")
             factors = self._factorize(sparse.csc_array(shifted))
         return Stiffness(self.problem, matrix, factors)
-
-    def reduced(self, stiffness: Stiffness) -> sparse.csc_array:
-        """The tangent's block of the free dofs."""
-        return self._reduce(stiffness.matrix)
 
     def correct(
         self, u: NDArray, factor: float, rule: Rule | None = None,
@@ -130,16 +185,16 @@ class Solver:
         before = origin
         u, origin = u.copy(), u.copy() if origin is None else origin
         residual = problem.residual(u, factor)
-        found = balance(problem, u, factor, residual)
+        reached = balance(problem, u, factor, residual)
         least, since = np.inf, 0
         for iteration in range(1, settings.iterations + 1):
-            if not np.isfinite(found.residual):
-                return Attempt(u, factor, iteration - 1, found, "the forces are no longer finite")
+            if not np.isfinite(reached.residual):
+                return Attempt(u, factor, iteration - 1, reached, "the forces are no longer finite")
             self.tally.iterations += 1
             try:
                 tangent = stiffness or self.stiffness(u, factor, before)
             except SingularTangentError as error:
-                return Attempt(u, factor, iteration, found, str(error))
+                return Attempt(u, factor, iteration, reached, str(error))
             stiffness = None
             gap = problem.prescribed(factor) - u[problem.held]
             step, climb = tangent.solve(-residual, gap), 0.0
@@ -148,10 +203,10 @@ class Solver:
                 climb = rule(u - origin, step, response)
                 step = step + climb * response
             if not np.isfinite(step).all():
-                return Attempt(u, factor, iteration, found, "no step meets the path")
+                return Attempt(u, factor, iteration, reached, "no step meets the path")
             share = self._share(u, step)
             if share == 0.0:
-                return Attempt(u, factor, iteration, found, COLLIDES)
+                return Attempt(u, factor, iteration, reached, COLLIDES)
             if search and rule is None and share == 1.0 and not gap.any():
                 share = self._search(u, factor, step, residual)
             before, u = u, u + share * step
@@ -159,15 +214,15 @@ class Solver:
             if share == 1.0:
                 u[problem.held] = problem.prescribed(factor)
             residual = problem.residual(u, factor)
-            found = balance(problem, u, factor, residual)
+            reached = balance(problem, u, factor, residual)
             length = float(np.linalg.norm(step))
-            least, since = (found.residual, 0) if found.residual < least else (least, since + 1)
-            if share == 1.0 and converged(problem, found, u, length, settings.tolerance):
-                return Attempt(u, factor, iteration, found)
+            least, since = (reached.residual, 0) if reached.residual < least else (least, since + 1)
+            if share == 1.0 and converged(problem, reached, u, length, settings.tolerance):
+                return Attempt(u, factor, iteration, reached)
             if since == STALL:
-                return Attempt(u, factor, iteration, found, "no progress of the iteration")
+                return Attempt(u, factor, iteration, reached, "no progress of the iteration")
         failure = f"no convergence in {settings.iterations} iterations"
-        return Attempt(u, factor, settings.iterations, found, failure)
+        return Attempt(u, factor, settings.iterations, reached, failure)
 
     def _share(self, u: NDArray, step: NDArray) -> float:
         """Share of a step within which nothing turns too far and nothing collides."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +15,33 @@ from scipy import sparse
 
 from foldyn.cases import Actuate, Case
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.statics.actuation import Actuation
-from foldyn.statics.relief import Relief
-from foldyn.statics.tolerance import EPS
+from foldyn.mechanics.body import Body
+from foldyn.statics.problem import EPS
+from foldyn.statics.rigid import Relief
 
 PROBE = 1e-4  # change of the load factor that gives derivatives of what is not linear in it
 
 AdaptiveLoad = Callable[[NDArray, float], NDArray]
+
+
+class Actuation:
+    """A body whose folds' rest angles change by `change` (nf,) per unit of the factor.
+
+    A rest angle that leaves 0..2 pi becomes nan, which no solver accepts.
+    """
+
+    def __init__(self, body: Body, change: NDArray, constant: NDArray) -> None:
+        self._body, self._change, self._constant = body, change, constant
+        self.acts = bool(change.any() or constant.any())
+        self.body = lru_cache(maxsize=4)(self._folded)
+
+    def rest(self, factor: float) -> NDArray:
+        """Rest angles (nf,), rad."""
+        angle = self._body.fold_rest + self._constant + factor * self._change
+        return np.where((angle >= 0.0) & (angle <= 2.0 * math.pi), angle, np.nan)
+
+    def _folded(self, factor: float) -> Body:
+        return self._body.folded(self.rest(factor)) if self.acts else self._body
 
 
 class OrigamiProblem:
@@ -48,8 +70,6 @@ class OrigamiProblem:
         Displacements (m) imposed per unit of the factor.
     actuation : Actuation
         The body at each factor.
-    supported : ndarray of int
-        The case's supported dofs: those held, but for the pins of inertia relief.
     """
 
     def __init__(
@@ -63,22 +83,21 @@ class OrigamiProblem:
         self._work = body.workspaces(1)[0]
         self._shape = structure.nodes.shape
         self._rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
-        self.constant = self._extended(_forces(_selected(case, constant, True)))
-        self.growing = self._extended(_forces(_selected(case, constant, False)))
-        self.motion = np.zeros(body.size)
-        for vector, _ in case.imposed_terms:
-            self.motion += self._extended(vector)
+        loads, chosen = range(len(case.loads)), set(constant)
+        steady = with_loads(case, [i for i in loads if i in chosen])
+        growing = with_loads(case, [i for i in loads if i not in chosen])
+        self.constant = self._extended(_total(steady.load_terms, self._shape))
+        self.growing = self._extended(_total(growing.load_terms, self._shape))
+        self.motion = self._extended(_total(case.imposed_terms, self._shape))
         self._moves = self._extended(case.imposed).astype(bool)
+        folds = (len(structure.folds),)
         self.actuation = Actuation(
-            body,
-            _actuation(_selected(case, constant, False)),
-            _actuation(_selected(case, constant, True)),
+            body, _total(growing.actuation_terms, folds), _total(steady.actuation_terms, folds)
         )
         self._relief = Relief(case, self._rest[: structure.nodes.size]) if inertia_relief else None
         pins = self._relief.pins if self._relief else np.zeros(0, np.int64)
         self.free = np.concatenate([np.setdiff1d(case.free_dofs, pins), body.hidden])
         self.held = np.union1d(case.supported_dofs, pins)
-        self.supported = case.supported_dofs
         self.length = float(np.linalg.norm(structure.nodes - structure.nodes.mean(axis=0)))
         self.force_rounding = EPS * float(np.linalg.norm(body.scale()[self.free]))
 
@@ -102,28 +121,21 @@ class OrigamiProblem:
         """External forces (m,), N."""
         force = self.constant + factor * self.growing
         if self._adaptive is not None:
-            force = force + self._adapted(u, factor)
+            added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
+            if added.shape != self._shape:
+                raise InputError(
+                    f"adaptive_load: returned forces of shape {added.shape}, give {self._shape}"
+                )
+            force = force + self._extended(added)
         if self._relief is not None:
             nodal = u.size - self._hidden
             force[:nodal] = force[:nodal] - self._relief.inertia(u[:nodal], force[:nodal])
         return force
 
-    def _adapted(self, u: NDArray, factor: float) -> NDArray:
-        assert self._adaptive is not None
-        added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
-        if added.shape != self._shape:
-            raise InputError(
-                f"adaptive_load: returned forces of shape {added.shape}, give {self._shape}"
-            )
-        return self._extended(added)
-
-    def internal(self, u: NDArray, factor: float) -> NDArray:
-        """Internal forces (m,), N."""
-        return self.actuation.body(factor).internal(u, self._work)
-
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
-        return self.internal(u, factor) - self.external(u, factor)
+        internal = self.actuation.body(factor).internal(u, self._work)
+        return internal - self.external(u, factor)
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""
@@ -158,26 +170,16 @@ class OrigamiProblem:
         return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
 
 
-def _selected(case: Case, constant: Sequence[int], inside: bool) -> Case:
-    """The case with only those of its loads that are (not) constant."""
-    loads = [load for i, load in enumerate(case.loads) if (i in set(constant)) == inside]
+def with_loads(case: Case, chosen: Sequence[int]) -> Case:
+    """The case with only those of its loads that have these numbers."""
     with warnings.catch_warnings():  # they were given when the case was made
         warnings.simplefilter("ignore", FoldynWarning)
-        return replace(case, loads=loads)
+        return replace(case, loads=[case.loads[i] for i in chosen])
 
 
-def _forces(case: Case) -> NDArray:
-    total = np.zeros(case.structure.nodes.shape)
-    for vector, _ in case.load_terms:
-        total += vector
-    return total
-
-
-def _actuation(case: Case) -> NDArray:
-    total = np.zeros(len(case.structure.folds))
-    for change, _ in case.actuation_terms:
-        total += change
-    return total
+def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDArray:
+    """Sum of the vectors of a case's terms, whatever their histories."""
+    return sum((vector for vector, _ in terms), np.zeros(shape))
 
 
 def drives(case: Case, constant: Sequence[int]) -> bool:

@@ -6,13 +6,27 @@ With u (m,) all dofs and a load factor f, a path is the set of solutions of
     u = prescribed(f)                                     on the held ones,
 
 so a von Mises truss, a sheet of origami and a shell all look the same from here.
+
+A state counts as an equilibrium if both of these hold, with `tolerance` the same fraction (1e-9 by
+default):
+
+- the residual's norm over the free dofs is below tolerance times the forces at play: the largest
+  of the norms of the external forces, of the supports' forces and of the hinges' forces alone
+  (which bars balance where nothing is loaded, as in a sheet that unfolds by itself);
+- the last step is below tolerance times the displacements.
+
+Neither can be met below rounding. A residual below the rounding errors of the bars' forces (eps
+times the bars' EA) counts as zero, and with it the step, which is then noise as well.
 """
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
+
+EPS = float(np.finfo(float).eps)
 
 
 class Problem(Protocol):
@@ -21,7 +35,7 @@ class Problem(Protocol):
     Attributes
     ----------
     free, held : ndarray of int
-        Dofs that are solved for, and the others; together all, each increasing.
+        The dofs solved for, and the others; together all of them, each increasing.
     force_rounding : float
         Norm (N) of the residual's rounding errors on the free dofs.
     length : float
@@ -61,3 +75,34 @@ class Problem(Protocol):
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn (rad) of a part of the structure from u to v; inf if parts collide."""
         ...
+
+
+class Balance(NamedTuple):
+    """How far a state is from equilibrium."""
+
+    residual: float  # norm on the free dofs, N
+    reference: float  # norm of the forces at play, N
+
+    @property
+    def relative(self) -> float:
+        """Residual as a fraction of the forces at play; 0 where both vanish."""
+        return self.residual / self.reference if self.reference > 0.0 else 0.0
+
+
+UNKNOWN = Balance(float("nan"), float("nan"))
+
+
+def balance(problem: Problem, u: NDArray, factor: float, residual: NDArray) -> Balance:
+    """Measure a residual (m,) against the forces at play."""
+    reference = max(problem.reference(u, factor), float(np.linalg.norm(residual[problem.held])))
+    return Balance(float(np.linalg.norm(residual[problem.free])), reference)
+
+
+def converged(problem: Problem, forces: Balance, u: NDArray, step: float, tolerance: float) -> bool:
+    """Whether a state u reached by a last step of norm `step` is an equilibrium."""
+    if not forces.residual < np.inf:  # false for nan
+        return False
+    if forces.residual <= problem.force_rounding:
+        return True
+    size = max(float(np.linalg.norm(u)), EPS * problem.length / tolerance)
+    return forces.residual <= tolerance * forces.reference and step <= tolerance * size

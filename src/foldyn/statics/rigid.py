@@ -1,12 +1,24 @@
-"""Rigid motions: which ones supports leave free, and their names."""
+"""Rigid motions: which ones supports leave free, their names, and inertia relief.
+
+A free body under loads that do not balance accelerates as a rigid body. In the frame that moves
+with it the inertia forces M R a balance the loads, with R (3n, r) its free rigid motions in the
+current configuration and a = (R' M R)^-1 R' p their accelerations. What deforms the body is the
+difference p - M R a. Its place in space is fixed by holding r of its dofs, whose supports carry
+nothing.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
 
 FREE = 1e-9  # of a rigid motion's size: what held dofs may move in it
 AXES = "xyz"
+TIE = 1e-6  # by how much the last dof counts less than the first one where pins are chosen
 
 
 def rigid_motions(x: NDArray) -> NDArray:
@@ -45,24 +57,14 @@ def name_rigid_motions(x: NDArray, held: NDArray) -> list[str]:
     space = _free_space(motions, held)
     if not space.size:
         return []
-    # rotations last: those that remain once the translations are taken out
-    still = space @ _null_directions(space[3:])
-    names = [f"translation along {_direction(t)}" for t in _tidy(still[:3])]
-    turning = _tidy(_range_directions(space[3:]))
-    names += [f"rotation about {_direction(w)}" for w in turning]
-    return names
-
-
-def _null_directions(block: NDArray) -> NDArray:
-    """Combinations of the columns of a (3, r) block that vanish."""
-    _, values, right = np.linalg.svd(block, full_matrices=True)
+    left, values, right = np.linalg.svd(space[3:])
     rank = int((values > 1e-8).sum())
-    return right[rank:].T
-
-
-def _range_directions(block: NDArray) -> NDArray:
-    left, values, _ = np.linalg.svd(block)
-    return left[:, : int((values > 1e-8).sum())]
+    # rotations last: those that remain once the translations are taken out
+    translations, rotations = (space @ right[rank:].T)[:3], left[:, :rank]
+    return [
+        *(f"translation along {_direction(t)}" for t in _tidy(translations)),
+        *(f"rotation about {_direction(w)}" for w in _tidy(rotations)),
+    ]
 
 
 def _tidy(directions: NDArray) -> list[NDArray]:
@@ -86,3 +88,37 @@ def _direction(vector: NDArray) -> str:
         return AXES[axis]
     shown = vector / np.abs(vector).max() * (1 if vector[axis] > 0 else -1)
     return "(" + ", ".join(f"{value + 0.0:.3g}" for value in shown) + ")"
+
+
+class Relief:
+    """Balance of the loads of a case whose supports leave it free to move as a rigid body."""
+
+    def __init__(self, case: Case, start: NDArray) -> None:
+        self._nodes, self._held = case.structure.nodes, case.fixed.ravel()
+        try:
+            self._mass = case.structure.mass
+        except InputError as error:
+            raise InputError(
+                f": needs the mass of the structure: {error}", "inertia_relief"
+            ) from None
+        motions = self._motions(start)
+        self._count = motions.shape[1]
+        if not self._count:
+            raise InputError(
+                ": the supports leave no rigid motion free: leave it out", "inertia_relief"
+            )
+        free = np.flatnonzero(~self._held)
+        first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first
+        _, _, order = qr(motions[free].T * first, mode="economic", pivoting=True)
+        self.pins = np.sort(free[order[: self._count]])
+
+    def _motions(self, u: NDArray) -> NDArray:
+        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held)
+
+    def inertia(self, u: NDArray, force: NDArray) -> NDArray:
+        """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""
+        motions = self._motions(u)
+        if motions.shape[1] != self._count:
+            return np.full(len(force), np.nan)  # the supports now hold the turned body
+        carried = (self._mass @ motions.reshape(-1, 3 * self._count)).reshape(motions.shape)
+        return carried @ np.linalg.solve(motions.T @ carried, motions.T @ force)

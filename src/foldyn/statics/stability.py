@@ -1,10 +1,10 @@
-"""Critical points between the points of a path: located and told apart.
+"""Critical points between the points of a path: located and classified.
 
 Where the count of negative eigenvalues of the tangent changes along a step, an eigenvalue has
 passed through zero. The step is halved until one crossing remains, and the crossing is then found
 as the zero of the tangent's determinant, each point an equilibrium in the plane across the step.
 
-A crossing that cannot be located is left out: the counts on both sides tell of it all the same.
+A crossing that cannot be located is left out: the counts on both sides still show it.
 
 At a limit point the load factor turns: the response to the factor points along the step on one
 side and against it on the other. At a bifurcation it does not, and another path crosses.
@@ -12,16 +12,18 @@ side and against it on the other. At a bifurcation it does not, and another path
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from foldyn.statics.newton import Attempt, Solver
-from foldyn.statics.station import Station, arrive
+from foldyn.algebra.superlu import Factorization
+from foldyn.statics.newton import Solver, plane
+from foldyn.statics.stepping import Station, arrive
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
@@ -39,13 +41,18 @@ class Mark(NamedTuple):
         return self.station.point.negative
 
 
+class LostError(Exception):
+    """An equilibrium on a section of the path was not found."""
+
+
 class Section:
     """Equilibria in planes across a step from one station to another."""
 
     def __init__(self, solver: Solver, start: Station, end: Station) -> None:
-        self.solver, self.start, self.end = solver, start, end
+        self.solver, self.start = solver, start
         self.chord = end.point.u - start.point.u
         self.whole = float(self.chord @ self.chord)
+        self.ends = Mark(0.0, start), Mark(1.0, end)
 
     def at(self, share: float, low: Mark, high: Mark) -> Mark | None:
         """Station at a share of the step, sought from between two marks; None if not found."""
@@ -54,19 +61,41 @@ class Section:
         factor = one.factor + weight * (other.factor - one.factor)
         u = one.u + weight * (other.u - one.u)
         u[self.solver.problem.held] = self.solver.problem.prescribed(factor)
-        goal = share * self.whole
-
-        def plane(moved: NDArray, step: NDArray, response: NDArray) -> float:
-            return (goal - float(self.chord @ (moved + step))) / float(self.chord @ response)
-
-        attempt = self.solver.correct(u, factor, plane, origin=self.start.point.u)
-        if attempt.failure or self._strays(attempt):
+        rule = plane(self.chord, share * self.whole)
+        attempt = self.solver.correct(u, factor, rule, origin=self.start.point.u)
+        farthest = 2.0 * np.sqrt(self.whole)  # from the start: twice the length of the step
+        if attempt.failure or np.linalg.norm(attempt.u - self.start.point.u) > farthest:
             return None
         return Mark(share, arrive(self.solver, attempt))
 
-    def _strays(self, attempt: Attempt) -> bool:
-        """Whether a point lies farther from the start than twice the length of the step."""
-        return bool(np.linalg.norm(attempt.u - self.start.point.u) > 2.0 * np.sqrt(self.whole))
+    def zero(
+        self, function: Callable[[Mark], float], xtol: float,
+        ends: tuple[Mark, Mark] | None = None, nearest: bool = False,
+    ) -> Mark:  # fmt: skip
+        """Mark between two others at which a function of marks vanishes, or `LostError`.
+
+        xtol : share of the step to which it is located.
+        ends : the two; those of the section unless given.
+        nearest : whether equilibria are sought from between the nearest marks known.
+        """
+        low, high = ends or self.ends
+        marks = {low.share: low, high.share: high}
+
+        def value(share: float) -> float:
+            if share not in marks:
+                one, other = low, high
+                if nearest:
+                    one = marks[max(known for known in marks if known < share)]
+                    other = marks[min(known for known in marks if known > share)]
+                mark = self.at(share, one, other)
+                if mark is None:
+                    raise LostError
+                marks[share] = mark
+            return function(marks[share])
+
+        root = float(brentq(value, low.share, high.share, xtol=xtol))
+        value(root)
+        return marks[root]
 
     def climbs(self, mark: Mark) -> bool:
         """Whether the load factor grows along the step there."""
@@ -78,7 +107,7 @@ def critical_points(solver: Solver, start: Station, end: Station) -> list[Statio
     if start.point.negative == end.point.negative:
         return []
     section = Section(solver, start, end)
-    return _crossings(section, Mark(0.0, start), Mark(1.0, end))
+    return _crossings(section, *section.ends)
 
 
 def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
@@ -89,8 +118,8 @@ def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
         middle = section.at(0.5 * (low.share + high.share), low, high)
         if middle is not None:
             return _crossings(section, low, middle) + _crossings(section, middle, high)
-    found = _crossing(section, low, high)
-    return [] if found is None else [found]
+    critical = _crossing(section, low, high)
+    return [] if critical is None else [critical]
 
 
 def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
@@ -99,39 +128,25 @@ def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
     count = min(low.negative, high.negative)
     single = abs(high.negative - low.negative) == 1
     if single and low.station.stiffness.factors.pivots() is not None:
-        found = _zero_of_determinant(section, low, high)
+        critical = _zero_of_determinant(section, low, high)
     else:
-        found = _bisected(section, low, high)
-    if found is None:
+        critical = _bisected(section, low, high)
+    if critical is None:
         return None
-    return found._replace(point=replace(found.point, negative=count, kind=kind))
+    return critical._replace(point=replace(critical.point, negative=count, kind=kind))
 
 
 def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | None:
     scale = _log_determinant(low)
-    best = {low.share: low, high.share: high}
 
-    def determinant(share: float) -> float:
-        if share not in best:
-            left = max((m for m in best.values() if m.share < share), key=lambda m: m.share)
-            right = min((m for m in best.values() if m.share > share), key=lambda m: m.share)
-            found = section.at(share, left, right)
-            if found is None:
-                raise _LostError
-            best[share] = found
-        mark = best[share]
+    def determinant(mark: Mark) -> float:
         sign = 1.0 if (mark.negative - low.negative) % 2 == 0 else -1.0
         return sign * float(np.exp(min(_log_determinant(mark) - scale, 600.0)))
 
     try:
-        root = brentq(determinant, low.share, high.share, xtol=SHARP, rtol=4 * np.finfo(float).eps)
-    except _LostError:
+        return section.zero(determinant, SHARP, (low, high), nearest=True).station
+    except LostError:
         return _bisected(section, low, high)
-    return best[min(best, key=lambda share: abs(share - root))].station
-
-
-class _LostError(Exception):
-    """A section of the path was not found."""
 
 
 def _log_determinant(mark: Mark) -> float:
@@ -150,16 +165,36 @@ def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
 
 
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
-    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their shapes (m, k)."""
-    problem, size = solver.problem, len(solver.problem.free)
-    matrix = solver.reduced(station.stiffness)
-    if size <= 300 or count >= size - 1:
-        values, vectors = np.linalg.eigh(matrix.toarray())
-    else:
-        inverse = LinearOperator((size, size), matvec=station.stiffness.factors.solve)
-        start = np.random.default_rng(0).standard_normal(size)
-        values, vectors = eigsh(matrix, k=count, sigma=0.0, OPinv=inverse, v0=start)
+    """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
+    problem = solver.problem
+    matrix = solver.reduce(station.stiffness.matrix)
+    values, vectors = softest_modes(matrix, station.stiffness.factors, count, dense=300)
     nearest = np.argsort(np.abs(values))[:count]
     shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))
     shapes[problem.free] = vectors[:, nearest]
-    return values[nearest], shapes
+    return values[nearest], oriented(shapes)
+
+
+def softest_modes(
+    matrix: Any, factors: Factorization, count: int, dense: int, shift: float = 0.0
+) -> tuple[NDArray, NDArray]:
+    """Eigenvalues of a symmetric matrix nearest to a shift, and their vectors.
+
+    All of them up to a number of rows `dense`; else by Lanczos with the factors at the shift.
+    """
+    size = matrix.shape[0]
+    if size <= dense or count >= size - 1:
+        return np.linalg.eigh(matrix.toarray())
+    inverse = LinearOperator((size, size), matvec=factors.solve)
+    start = np.random.default_rng(0).standard_normal(size)
+    return eigsh(matrix, k=count, sigma=shift, OPinv=inverse, v0=start)
+
+
+def oriented(shapes: NDArray) -> NDArray:
+    """Shapes (m, k), the largest entry of each positive: their sign depends on no solver.
+
+    Of entries equal to rounding the first one counts.
+    """
+    size = np.abs(shapes)
+    first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
+    return shapes * np.sign(shapes[first, np.arange(shapes.shape[1])])

@@ -1,17 +1,30 @@
-"""Paths driven by the load factor: load stepping with Newton's method.
+"""Load stepping: equilibria one after the other, driven by the load factor.
 
 A step that does not converge, or that snaps to somewhere else, is tried again with a line search
 and then halved; after a success steps grow again. So a path ends where no equilibrium follows it:
 at a limit point, which only the methods with a moving load factor pass.
+
+The first point of a path is an equilibrium near a given state. A state that is not in equilibrium
+(under loads that are constant along the path, with folds that have a moment at rest, or simply a
+guess) is held by its own out-of-balance force, which is then released little by little: the same
+load stepping as along a path leads to the equilibrium that belongs to the state, instead of
+wherever one big step of Newton's method lands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from foldyn.statics.newton import COLLIDES, Attempt, Solver
-from foldyn.statics.station import PathStoppedError, Station, Walk, arrive, snapped
+import numpy as np
+from numpy.typing import NDArray
 
+from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
+from foldyn.statics.problem import Problem, balance
+
+NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
 SNAPS = "the structure snaps to a state off its path"
 REMEDY_LIMIT = (
     "a limit point may lie ahead: method 'arc_length' follows the path through it "
@@ -20,21 +33,80 @@ REMEDY_LIMIT = (
 REMEDY_COLLISION = "let the folds lock before panels meet (fold_law 'enhanced')"
 
 
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium on a path.
+
+    Attributes
+    ----------
+    u : (m,)
+        All dofs.
+    factor : float
+        Load factor.
+    iterations : int
+        Newton iterations that it took.
+    residual : float
+        Residual as a fraction of the forces at play.
+    negative : int
+        Negative eigenvalues of the tangent on the free dofs; -1 if they were not counted.
+    kind : str
+        "regular", "limit" or "bifurcation".
+    """
+
+    u: NDArray
+    factor: float
+    iterations: int
+    residual: float
+    negative: int = -1
+    kind: str = "regular"
+
+
+class Station(NamedTuple):
+    """A point with the tangent there and the response to the load factor (m,)."""
+
+    point: Point
+    stiffness: Stiffness
+    response: NDArray
+
+
+class PathStoppedError(Exception):
+    """A path cannot be continued; with the reason and a remedy."""
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__(f"{reason}; {remedy}")
+        self.reason, self.remedy = reason, remedy
+
+
+Walk = Iterator[Station]
+
+
+def arrive(solver: Solver, attempt: Attempt) -> Station:
+    """Station at the equilibrium that a correction found."""
+    stiffness = solver.stiffness(attempt.u, attempt.factor)
+    negative = stiffness.factors.negative() if solver.settings.stability else -1
+    relative = attempt.balance.relative
+    point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
+    return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
+
+
 def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
     """Equilibrium at another load factor, on the path on which `start` lies."""
-    plain = _guarded(solver, start, solver.correct(start.point.u, factor, None, start.stiffness))
+    plain = _step(solver, start, factor, False)
     if not plain.failure or plain.failure == SNAPS:
         return plain
-    searched = solver.correct(start.point.u, factor, None, start.stiffness, search=True)
-    searched = _guarded(solver, start, searched)
+    searched = _step(solver, start, factor, True)
     return plain if searched.failure else searched
 
 
-def _guarded(solver: Solver, start: Station, attempt: Attempt) -> Attempt:
-    """The attempt, refused if it has snapped to a state off its path."""
-    if not attempt.failure and snapped(solver, start, attempt):
-        return attempt._replace(failure=SNAPS)
-    return attempt
+def _step(solver: Solver, start: Station, factor: float, search: bool) -> Attempt:
+    """One attempt; it has snapped if it goes much farther than its linear prediction."""
+    attempt = solver.correct(start.point.u, factor, None, start.stiffness, search)
+    if attempt.failure:
+        return attempt
+    predicted = abs(factor - start.point.factor) * float(np.linalg.norm(start.response))
+    length = float(np.linalg.norm(attempt.u - start.point.u))
+    limit = solver.settings.jump * predicted + NEGLIGIBLE * solver.problem.length
+    return attempt._replace(failure=SNAPS) if length > limit else attempt
 
 
 def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool) -> Walk:
@@ -50,7 +122,8 @@ def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool
             left = goal - station.point.factor
             # no crumbs: the rest is taken in one or in two equal steps
             length = abs(left) if abs(left) <= 1.01 * step else min(step, 0.5 * abs(left))
-            target = goal if length == abs(left) else station.point.factor + length * _sign(left)
+            end = station.point.factor + math.copysign(length, left)
+            target = goal if length == abs(left) else end
             attempt = step_to(solver, station, target)
             if attempt.failure:
                 solver.tally.cuts += 1
@@ -74,5 +147,72 @@ def stopped(station: Station, attempt: Attempt) -> PathStoppedError:
     )
 
 
-def _sign(value: float) -> float:
-    return 1.0 if value >= 0.0 else -1.0
+class Released:
+    """A problem at one load factor; its out-of-balance force fades as this one's factor grows."""
+
+    def __init__(self, problem: Problem, u: NDArray, factor: float) -> None:
+        self.problem, self.factor = problem, factor
+        self.free, self.held = problem.free, problem.held
+        self.force_rounding, self.length = problem.force_rounding, problem.length
+        self._from = u[problem.held]
+        self._to = problem.prescribed(factor)
+        self._out = problem.residual(u, factor)
+        self._out[problem.held] = 0.0
+
+    def prescribed(self, factor: float) -> NDArray:
+        """The held dofs, on their way from where they stood to where they belong."""
+        return self._from + factor * (self._to - self._from)
+
+    def residual(self, u: NDArray, factor: float) -> NDArray:
+        """Residual less the force that still holds it."""
+        return self.problem.residual(u, self.factor) - (1.0 - factor) * self._out
+
+    def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
+        """Tangent of the problem."""
+        return self.problem.tangent(u, self.factor, before)
+
+    def rate(self, u: NDArray, factor: float) -> NDArray:
+        """Derivative of the residual."""
+        return self._out
+
+    def reference(self, u: NDArray, factor: float) -> float:
+        """Forces at play in the problem."""
+        return self.problem.reference(u, self.factor)
+
+    def turn(self, u: NDArray, v: NDArray) -> float:
+        """Turn in the problem."""
+        return self.problem.turn(u, v)
+
+
+def settle(solver: Solver, u: NDArray, factor: float) -> Station:
+    """Station at the equilibrium at a load factor that belongs to a state (m,).
+
+    Raises
+    ------
+    PathStoppedError
+        None was found.
+    """
+    problem = solver.problem
+    moved = not np.array_equal(u[problem.held], problem.prescribed(factor))
+    given = balance(problem, u, factor, problem.residual(u, factor))
+    negligible = max(problem.force_rounding, solver.settings.tolerance * given.reference)
+    if given.residual <= negligible and not moved:
+        return arrive(solver, Attempt(u, factor, 0, given))
+    released = Solver(Released(problem, u, factor), solver.settings)
+    released.tally = solver.tally
+    at_rest = balance(released.problem, u, 0.0, released.problem.residual(u, 0.0))
+    try:
+        *_, last = walk(released, arrive(released, Attempt(u, 0.0, 0, at_rest)), [1.0], False)
+    except PathStoppedError as stop:
+        raise PathStoppedError(
+            f"no equilibrium was found at the load factor {factor:.6g} from the state given",
+            "start from a state nearer to it, or apply what is constant along the path in "
+            f"smaller steps ({stop.reason})",
+        ) from None
+    attempt = solver.correct(last.point.u, factor)
+    if attempt.failure:
+        raise PathStoppedError(
+            f"the first point at the load factor {factor:.6g} did not settle ({attempt.failure})",
+            "start from another state",
+        )
+    return arrive(solver, attempt)

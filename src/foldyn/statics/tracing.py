@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-import time
-import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.fill import check_fill
-from foldyn.cases import Case, State
-from foldyn.errors import ComputationError, FoldynWarning, InputError, MotionInterrupted
-from foldyn.results import path_dataset
-from foldyn.statics import stability_changes
-from foldyn.statics.arguments import (
-    PathPlan,
-    check_actuation,
-    check_case,
-    check_start,
-    check_steps,
-    constant_loads,
-    initial_state,
-    plan,
-)
-from foldyn.statics.course import Until, driven, free
+from foldyn.algebra.solvers import check_fill
+from foldyn.cases import Case, Gravity, State
+from foldyn.errors import InputError
+from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
-from foldyn.statics.methods import PathMethod, method_of
-from foldyn.statics.newton import Solver
-from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem
-from foldyn.statics.settings import Settings
-from foldyn.statics.settle import settle
-from foldyn.statics.station import PathStoppedError, Point, Station, Walk
-from foldyn.statics.stepping import walk
-from foldyn.structures.structure import hinge_angles
+from foldyn.statics.newton import Settings, Solver
+from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
+from foldyn.statics.path_methods import PathPlan, Until, along, plan_path
+from foldyn.statics.recording import record
+from foldyn.statics.stepping import Point, Walk, settle, walk
+from foldyn.values import indices, show, whole
 
 if TYPE_CHECKING:
     import xarray
 
-CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
+SHORTEST = 1e-3  # of a bar's length, that is left of it where a path starts
+COPIES = 8  # of a point's dofs, while forces, work and the dataset are made of it
 
 
 def trace(
@@ -67,7 +51,7 @@ def trace(
     ----------
     case : Case
     method : {"newton", "displacement", "mgdcm", "arc_length"}
-        "newton" goes by the load factor and returns the given factors, nothing else;
+        "newton" steps the load factor and returns the points at the given ones only;
         "displacement" does so where supports or folds are moved, and returns every point on the
         way; "mgdcm" and "arc_length" let the factor move freely, through limit points.
     load_factors : sequence of float, optional
@@ -133,170 +117,146 @@ def trace(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
-    way = method_of(method)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
-    route = plan(way, load_factors, steps, first_step)
-    held = constant_loads(case, constant)
-    state = initial_state(case, initial)
-    check_case(case, way, held, route, adaptive_load is not None)
+    plan = plan_path(method, load_factors, steps, first_step)
+    steady = _constant_loads(case, constant)
+    displacement = None if initial is None else displacement_of(initial, case, "initial")
+    _check_case(case, plan, steady, adaptive_load is not None)
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
         raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
     check_fill(case.structure.fill, case.structure.body.size)
-    problem = OrigamiProblem(case, held, state, adaptive_load, inertia_relief)
-    check_start(problem)
-    check_actuation(problem, route)
+    problem = OrigamiProblem(case, steady, displacement, adaptive_load, inertia_relief)
+    _check_start(problem)
+    _check_actuation(problem, plan)
     refuse_mechanisms(problem)
     solver = Solver(problem, settings)
     facts = {
-        "method": way.name,
-        "steps": route.steps,
+        "method": method,
+        "steps": plan.steps,
         "load_factors": load_factors,
-        "first_step": route.first_step if way.rule is not None else None,
-        "constant": held or None,
+        "first_step": plan.first_step if plan.method.rule is not None else None,
+        "constant": steady or None,
         "inertia_relief": inertia_relief,
-        "started_from": "rest" if state is None else "state",
+        "started_from": "rest" if initial is None else "state",
     }
-    recorder = Recorder(problem, solver, facts, adaptive_load is not None)
 
-    def course() -> Walk:
-        first = _first(solver, problem, route, state)
+    def stations() -> Walk:
+        first = settle(solver, problem.start(), 0.0 if initial is None else plan.begin)
+        if first.point.factor != plan.begin:
+            *_, first = walk(solver, first, [plan.begin], False)
         yield first
-        yield from _onward(solver, way, route, first, on_nodes(until, problem))
+        yield from along(solver, first, plan, on_nodes(until, problem))
 
-    return recorder.record(course(), progress)
-
-
-def _first(
-    solver: Solver, problem: OrigamiProblem, route: PathPlan, state: NDArray | None
-) -> Station:
-    """The point where the path begins."""
-    if state is not None:
-        return settle(solver, problem.start(), route.begin)
-    first = settle(solver, problem.start(), 0.0)
-    if route.begin != 0.0:
-        *_, first = walk(solver, first, [route.begin], False)
-    return first
+    return record(stations(), progress, solver, problem, facts, adaptive_load is not None)
 
 
-def _onward(
-    solver: Solver, way: PathMethod, route: PathPlan, first: Station, until: Until | None
-) -> Walk:
-    if way.rule is None:
-        return driven(solver, first, route.factors, way.between, until)
-    return free(solver, first, way.rule, route.first_step, route.steps, route.end, until)
-
-
-def on_nodes(until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem) -> Any:
+def on_nodes(
+    until: Callable[[NDArray, float], bool] | None, problem: OrigamiProblem
+) -> Until | None:
     """A user's function of displacements (n, 3) as one of flat dofs."""
     if until is None:
         return None
     return lambda u, factor: bool(until(problem.displacement(u).copy(), factor))
 
 
-class Recorder:
-    """Keeps the points of a path as they are found, and makes its dataset."""
+def check_steps(steps: Any, dofs: int) -> None:
+    """Refuse steps that are not a positive whole number, or that memory cannot hold."""
+    count = whole("steps", steps, least=1)
+    check_memory(
+        "steps", f"a path of {float(count):.3g} points", 8.0 * COPIES * count * dofs, "take fewer"
+    )
 
-    def __init__(
-        self, problem: OrigamiProblem, solver: Solver, facts: dict[str, Any], adaptive: bool
-    ) -> None:
-        self.problem, self.solver, self.facts = problem, solver, facts
-        self.points: list[Point] = []
-        self._adaptive = adaptive
 
-    def record(self, course: Walk, progress: Callable[[Point], None] | None) -> xarray.Dataset:
-        """Run a course to its end; raises where it cannot go on, with what there is."""
-        began = time.perf_counter()
-        end: dict[str, Any] = {"status": "complete"}
-        try:
-            for station in course:
-                self.points.append(station.point)
-                if progress is not None:
-                    progress(station.point)
-        except PathStoppedError as stop:
-            remedy = self._closed() or stop.remedy
-            end = {"status": "stopped", "stopped_because": stop.reason, "remedy": remedy}
-            message = f"{stop.reason}; {remedy}"
-            raise ComputationError(message, self._partial(began, end)) from None
-        except KeyboardInterrupt:
-            end = {"status": "stopped", "stopped_because": "interrupted"}
-            raise MotionInterrupted(
-                f"interrupted after {len(self.points)} points", self._partial(began, end)
-            ) from None
-        return self.dataset(time.perf_counter() - began, end)
+def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
+    """Numbers of the loads that do not grow with the load factor."""
+    if isinstance(constant, str):
+        if constant != "gravity":
+            raise InputError(
+                f' = {show(constant)}: give "gravity", or numbers of loads, as in [0]', "constant"
+            )
+        chosen = tuple(i for i, load in enumerate(case.loads) if isinstance(load, Gravity))
+        if not chosen:
+            raise InputError(' = "gravity": the case has no Gravity among its loads', "constant")
+        return chosen
+    if np.size(constant) == 0:
+        return ()
+    chosen = sorted(indices("constant", constant, "load", 'or "gravity"'))
+    for which in chosen:
+        if not 0 <= which < len(case.loads):
+            raise InputError(
+                f": the case has no load {which}; it has {len(case.loads)}, counted from 0",
+                "constant",
+            )
+    return tuple(chosen)
 
-    def _closed(self) -> str:
-        """A remedy where the path ends because a fold is closed; empty otherwise."""
-        structure = self.problem.structure
-        if not self.points or not len(structure.folds):
-            return ""
-        state = structure.nodes + self.problem.displacement(self.points[-1].u)
-        folds = np.degrees(hinge_angles(state, structure.folds))
-        crease = int(np.argmax(np.abs(folds - 180.0)))
-        if abs(folds[crease] - 180.0) < CLOSED:
-            return ""
-        return (
-            f"crease {crease} is closed ({folds[crease]:.5g} degrees): a fold law that locks "
-            "before panels meet ('enhanced') lets the path go on"
+
+def displacement_of(
+    state: Any, case: Case, field: str, expected: str = "a State, as fd.initial_state(path, at=-1)"
+) -> NDArray:
+    """Displacements (n, 3) of a case in a state, zero where it has none."""
+    if not isinstance(state, State):
+        raise InputError(f": got {type(state).__name__}; give {expected}", field)
+    shape = case.structure.nodes.shape
+    if state.displacement is None:
+        return np.zeros(shape)
+    displacement = np.array(state.displacement, float)
+    if displacement.shape != shape:
+        raise InputError(
+            f": displacement of shape {displacement.shape}: the case has {shape}", field
+        )
+    return displacement
+
+
+def check_movable(case: Case) -> None:
+    """Refuse a case whose supports hold every dof."""
+    if not len(case.free_dofs):
+        raise InputError(
+            "supports: hold every node along x, y and z, so that nothing can move: free one"
         )
 
-    def _partial(self, began: float, end: dict[str, Any]) -> xarray.Dataset | None:
-        return self.dataset(time.perf_counter() - began, end) if self.points else None
 
-    def dataset(self, seconds: float, end: dict[str, Any]) -> xarray.Dataset:
-        """The points so far, with the case and the facts about the run."""
-        problem, points, tally = self.problem, self.points, self.solver.tally
-        from_rest = self.facts["started_from"] == "rest"
-        free = method_of(self.facts["method"]).rule is not None
-        told = stability_changes.warning(points, from_rest, free)
-        if told:
-            warnings.warn(told, FoldynWarning, stacklevel=4)
-        residuals = [problem.residual(p.u, p.factor) for p in points]
-        energies = np.array([problem.energies(p.u, p.factor) for p in points])
-        columns = dict(zip(problem.groups, energies.T, strict=True))
-        statistics = {
-            **end,
-            **self.facts,
-            **asdict(self.solver.settings),
-            "solver": self.solver.backend,
-            "newton_iterations": tally.iterations,
-            "factorizations": tally.factorizations,
-            "step_cuts": tally.cuts,
-            "wall_seconds": seconds,
-            **stability_changes.facts(points, from_rest),
-        }
-        own = "an adaptive load, a function of the user's own, acted on it"
-        return path_dataset(
-            problem.case,
-            [p.factor for p in points],
-            [problem.displacement(p.u) for p in points],
-            np.reshape([r[problem.supported] for r in residuals], (len(points), -1)),
-            {**columns, "work": self._work(residuals)},
-            {
-                "negative_eigenvalues": [p.negative for p in points],
-                "point": [p.kind for p in points],
-                "iterations": [p.iterations for p in points],
-                "residual": [p.residual for p in points],
-            },
-            statistics,
-            (own,) if self._adaptive else (),
+def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
+    """Refuse a case in which nothing happens along the path."""
+    check_movable(case)
+    moves = bool(case.imposed.any()) or is_actuated(case)
+    if plan.method.name == "displacement" and not moves:
+        raise InputError(
+            " 'displacement' needs something that moves: an Impose among the supports or an "
+            "Actuate among the loads; paths under forces take 'newton' or 'arc_length'",
+            "method",
+        )
+    if not plan.factors and plan.begin == 0.0 and plan.method.rule is None:
+        return  # one point, of what is constant
+    if not (drives(case, constant) or adaptive):
+        raise InputError(
+            "nothing grows along the path: give a Force, Gravity, Actuate or Impose that is not "
+            "among the constant loads (load_factors = [0] finds the state under these alone)"
         )
 
-    def _work(self, residuals: list[NDArray]) -> NDArray:
-        """Work (J) of loads, supports and actuators since the first point, by trapezoids."""
-        problem, points = self.problem, self.points
-        forces = []
-        for point, residual in zip(points, residuals, strict=True):
-            force = problem.external(point.u, point.factor)
-            force[problem.held] += residual[problem.held]
-            forces.append(force)
-        rates = [problem.actuation_rate(p.u, p.factor) for p in points]
-        work = np.zeros(len(points))
-        for k in range(1, len(points)):
-            one, other = points[k - 1], points[k]
-            done = 0.5 * (forces[k - 1] + forces[k]) @ (other.u - one.u)
-            done += 0.5 * (rates[k - 1] + rates[k]) * (other.factor - one.factor)
-            work[k] = work[k - 1] + done
-        return work
+
+def _check_start(problem: OrigamiProblem) -> None:
+    """Refuse a state in which a bar has no length left."""
+    structure = problem.structure
+    x = structure.nodes + problem.displacement(problem.start())
+    length = np.linalg.norm(x[structure.bars[:, 1]] - x[structure.bars[:, 0]], axis=1)
+    short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
+    if short.size:
+        one, other = structure.bars[short[0]]
+        raise InputError(f": the neighboring nodes {one} and {other} fall together", "initial")
+
+
+def _check_actuation(problem: OrigamiProblem, plan: PathPlan) -> None:
+    """Refuse load factors at which a rest angle would leave 0 to 360 degrees."""
+    if not problem.actuation.acts:
+        return
+    for factor in (plan.begin, *plan.factors, *([] if plan.end is None else [plan.end])):
+        beyond = np.flatnonzero(np.isnan(problem.actuation.rest(factor)))
+        if beyond.size:
+            raise InputError(
+                f": at {factor:g} the rest angle of crease {beyond[0]} would leave 0 "
+                "to 360 degrees; actuated folds reach their angle at the factor 1",
+                "load_factors",
+            )

@@ -2,8 +2,7 @@
 
 from foldyn.structures.discretize import discretize
 from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.options import ModelOptions
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.structure import Structure, hinge_angles
+from foldyn.structures.structure import ModelOptions, Structure, hinge_angles
 
 __all__ = ["MASS_RULES", "ModelOptions", "Sheet", "Structure", "discretize", "hinge_angles"]

@@ -1,4 +1,4 @@
-"""Bars and hinges as solvers take them."""
+"""Bars and hinges as solvers see them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.blocks import BarsHingesBlocks
 from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
-from foldyn.mechanics.model import BarsHinges
-from foldyn.mechanics.renumber import node_order, ranks, renumber
-from foldyn.mechanics.step_tangent import put_tangent
+from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
+from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
 
 GROUPS: Mapping[str, str] = {
     "strain_bars": "strain energy of the bars",
@@ -37,7 +35,7 @@ class BarsHingesBody(Body):
     law : HingeLaw
         Law of the folds.
     like : BarsHingesBody, optional
-        One with the same nodes of all elements.
+        One whose elements have the same nodes.
     """
 
     energy_groups = tuple(GROUPS)

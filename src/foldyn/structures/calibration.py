@@ -10,8 +10,8 @@ bars of an N5B8 quad         t |H^2 - nu W^2| / (2 H (1 - nu^2)) for edges 1 and
 bars of every other panel    2 S t / ((1 - nu) sum L) for edges and inner bars alike.
 
 Sources: Filipov et al., Int. J. Solids Struct. 124, 2017; Liu and Paulino (MERLIN2). MERLIN2
-assigns two of these in another order than their formulas say; `calibration="merlin2"` reproduces
-that exactly (`_merlin2_corners`, `_merlin2_edges`), because published results contain it.
+assigns two of these in a different order than their formulas say; `calibration="merlin2"`
+reproduces that exactly (`_merlin2_corners`, `_merlin2_edges`): published results contain it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns import Pattern
-from foldyn.structures.mesh import Mesh
+from foldyn.patterns.topology import around, edge_of
+from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
 STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
@@ -95,18 +96,24 @@ def bar_areas(
     t, nu = sheet.thickness, sheet.poissons_ratio
     x = mesh.nodes
     inner = np.zeros(len(mesh.inner))
-    inner_length = np.linalg.norm(x[mesh.inner[:, 1]] - x[mesh.inner[:, 0]], axis=1)
+    inner_length = lengths(x, mesh.inner)
     inner_sum = np.bincount(mesh.inner_panel, inner_length, minlength=len(pattern.faces))
-    panel_area = np.bincount(mesh.triangle_panel, mesh.triangle_areas(), len(pattern.faces))
+    triangle_area = 0.5 * np.linalg.norm(double_areas(x, mesh.triangles), axis=1)
+    panel_area = np.bincount(mesh.triangle_panel, triangle_area, len(pattern.faces))
     inner_first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
     creases = set(map(tuple, pattern.creases.tolist()))
     edges: dict[tuple[int, int], float] = {}
     weak: list[int] = []
     for panel, face in enumerate(pattern.faces):
         inside = slice(inner_first[panel], inner_first[panel + 1])
-        ends = [(min(e), max(e)) for e in zip(face, face[1:] + face[:1], strict=True)]
+        ends = [edge_of(a, b) for a, b in around(face)]
         length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
         if len(face) == 4 and mesh.centers[panel] >= 0:
+            if nu <= 0.0:
+                raise InputError(
+                    f"sheet: poissons_ratio = {nu}: N5B8 quadrilaterals need it above 0 (the area "
+                    'of their spokes is proportional to it); use scheme = "n4b5"'
+                )
             w, h = 0.5 * (length[0] + length[2]), 0.5 * (length[1] + length[3])
             scale = t / (2.0 * (1.0 - nu**2))
             along = scale * abs(h**2 - nu * w**2) / h
@@ -148,8 +155,9 @@ def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> N
     return out
 
 
-def check_scale(sheet: Sheet, edges: NDArray) -> None:
-    """Refuse a sheet and edges (m) whose stiffness or mass is too far from 1 to compute with."""
+def check_scale(sheet: Sheet, pattern: Pattern) -> None:
+    """Refuse a sheet and pattern whose stiffness or mass is too far from 1 to compute with."""
+    edges = lengths(pattern.vertices, pattern.edges)
     low, high = float(edges.min()), float(edges.max())
     stretching, mass = sheet.youngs_modulus * sheet.thickness, sheet.thickness * high**2
     for what, value in (
@@ -165,13 +173,3 @@ def check_scale(sheet: Sheet, edges: NDArray) -> None:
                 f"{sheet.youngs_modulus:g} Pa, thickness = {sheet.thickness:g} m{density} and the "
                 f"pattern, whose edges have {low:.3g} to {high:.3g} m"
             )
-
-
-def check_poisson(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> None:
-    """Refuse a Poisson's ratio that leaves N5B8 spokes without area."""
-    quads = [p for p, f in enumerate(pattern.faces) if len(f) == 4 and mesh.centers[p] >= 0]
-    if quads and sheet.poissons_ratio <= 0.0:
-        raise InputError(
-            f"sheet: poissons_ratio = {sheet.poissons_ratio}: N5B8 quadrilaterals need it above 0 "
-            '(the area of their spokes is proportional to it); use scheme = "n4b5"'
-        )

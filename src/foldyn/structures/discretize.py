@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn import materials
 from foldyn.errors import InputError
-from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
+from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
-from foldyn.structures.mass import check_mass_rule
-from foldyn.structures.n4b5 import n4b5
-from foldyn.structures.n5b8 import n5b8
-from foldyn.structures.options import ModelOptions
+from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.mesh import lengths, n4b5, n5b8
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.structure import Structure, hinge_angles
-from foldyn.values import numbers, vector
+from foldyn.structures.structure import ModelOptions, Structure, hinge_angles
+from foldyn.values import choice, numbers, vector
 
 PER_NODE = 5000.0
 """Bytes a node with its tangent: 5200 and 4900 measured with 20,000 and 80,000 nodes."""
@@ -79,36 +78,25 @@ def discretize(
     >>> fd.discretize(pattern, sheet).fold_stiffness.round(4).tolist()
     [0.0639]
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f"pattern: got {type(pattern).__name__}, give a Pattern")
-    if not isinstance(sheet, Sheet):
-        raise InputError(f"sheet: got {type(sheet).__name__}, give a Sheet")
+    check_kinds(pattern, sheet)
     options = ModelOptions(
         scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest
     )
-    _check_laws(options)
-    check_mass_rule(mass)
+    materials.bar_law(bar_law)
+    materials.hinge_law(fold_law, "fold_law")
+    materials.hinge_law(bend_law, "bend_law")
+    choice("mass", mass, MASS_RULES)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
-    calibrate.check_scale(sheet, edge_lengths(pattern))
+    calibrate.check_scale(sheet, pattern)
     points = _given_centers(centers or {}, pattern, scheme)
     mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
-    calibrate.check_poisson(mesh, pattern, sheet)
-
     merlin2 = calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
     outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
 
     x = mesh.nodes
-    crease_length = np.linalg.norm(x[pattern.creases[:, 1]] - x[pattern.creases[:, 0]], axis=1)
-    if crease_stiffness is None:
-        fold_stiffness = calibrate.fold_stiffness(crease_length, sheet)
-    else:
-        per_length = per_crease("crease_stiffness", crease_stiffness, pattern)
-        if (per_length < 0.0).any():
-            raise InputError("crease_stiffness: must not be negative")
-        fold_stiffness = per_length * crease_length
     return Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
@@ -117,7 +105,7 @@ def discretize(
         options=options,
         pattern=pattern,
         folds=mesh.folds,
-        fold_stiffness=fold_stiffness,
+        fold_stiffness=fold_stiffness(crease_stiffness, pattern, sheet),
         fold_rest=fold_rest(crease_rest, mesh.folds, x, pattern),
         bends=mesh.bends,
         bend_stiffness=calibrate.bend_stiffness(mesh, pattern, sheet, merlin2),
@@ -128,10 +116,11 @@ def discretize(
     ).marked()
 
 
-def _check_laws(options: ModelOptions) -> None:
-    bar_law(options.bar_law)
-    hinge_law(options.fold_law, "fold_law")
-    hinge_law(options.bend_law, "bend_law")
+def check_kinds(pattern: Any, sheet: Any) -> None:
+    """Refuse what is not a pattern and a sheet."""
+    for name, value, kind in (("pattern", pattern, Pattern), ("sheet", sheet, Sheet)):
+        if not isinstance(value, kind):
+            raise InputError(f"{name}: got {type(value).__name__}, give a {kind.__name__}")
 
 
 def _given_centers(
@@ -150,13 +139,20 @@ def _given_centers(
     return points
 
 
-def edge_lengths(pattern: Pattern) -> NDArray:
-    """Lengths (ne,) of all edges of a pattern, m."""
-    x = pattern.vertices
-    return np.linalg.norm(x[pattern.edges[:, 1]] - x[pattern.edges[:, 0]], axis=1)
+def fold_stiffness(
+    given: float | Sequence[float] | None, pattern: Pattern, sheet: Sheet
+) -> NDArray:
+    """Stiffness of whole creases (nf,), N m/rad, calibrated or from that `given` per length."""
+    length = lengths(pattern.vertices, pattern.creases)
+    if given is None:
+        return calibrate.fold_stiffness(length, sheet)
+    per_length = _per_crease("crease_stiffness", given, pattern)
+    if (per_length < 0.0).any():
+        raise InputError("crease_stiffness: must not be negative")
+    return per_length * length
 
 
-def per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
+def _per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
     """One number for each crease (nf,) from a number, or from one for each."""
     n = len(pattern.creases)
     array = numbers(field, value)
@@ -172,7 +168,7 @@ def fold_rest(
     pattern: Pattern,
     crease: NDArray | None = None,
 ) -> NDArray:
-    """Rest dihedrals (rad) of hinge rows, strictly between closed on either side.
+    """Rest dihedrals (rad) of hinge rows, none of them closed.
 
     crease : crease that each row lies on; the creases in order unless given.
     """
@@ -188,8 +184,10 @@ def fold_rest(
                 "the pattern, or give crease_rest and start from an opened one"
             )
         return rest
-    degrees = per_crease("crease_rest", given, pattern)
-    if ((degrees <= 0.0) | (degrees >= 360.0)).any():
-        bad = degrees[(degrees <= 0.0) | (degrees >= 360.0)][0]
-        raise InputError(f"crease_rest = {bad:g}: must lie between 0 and 360 degrees (flat: 180)")
+    degrees = _per_crease("crease_rest", given, pattern)
+    closed = degrees[(degrees <= 0.0) | (degrees >= 360.0)]
+    if closed.size:
+        raise InputError(
+            f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
+        )
     return np.radians(degrees)[crease]

@@ -1,21 +1,22 @@
-"""What a pattern is discretized as, whatever the model: what a case holds."""
+"""What all models have in common: a discretized pattern, as a case holds it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from foldyn.algebra.fill import Fill
+from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import HingeLaw
+from foldyn.materials import HingeLaw, hinge_law
 from foldyn.mechanics.body import Body
-from foldyn.structures.made import Made
 from foldyn.structures.mass import Surface
+from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
 
@@ -29,8 +30,14 @@ class HingeKind(NamedTuple):
     rest: NDArray
 
 
-class Discretized(Made):
-    """Base of the data classes that are structures.
+def read_only(array: NDArray) -> NDArray:
+    """Return the array, which nobody can change from now on."""
+    array.setflags(write=False)
+    return array
+
+
+class Discretized:
+    """Base of the data classes that are structures, with arrays that nobody can change.
 
     Attributes
     ----------
@@ -42,8 +49,8 @@ class Discretized(Made):
         Node number of each panel's center, -1 without one.
     mass : (n, n)
         Nodal mass matrix, kg; one value serves the three axes.
-    folds, fold_rest, fold_law
-        Hinge row (nf, 4), rest angle (nf,), rad, of each fold, and the law of all.
+    folds, fold_rest : (nf, 4), (nf,)
+        Hinge row and rest angle (rad) of each fold.
     body : Body
         What solvers take.
     kind : str
@@ -51,9 +58,12 @@ class Discretized(Made):
     energy_groups : mapping of str to str
         Parts of its strain energy, and what they are.
     massless : str
-        What of it has dofs without mass, "the rotations of a shell"; empty if nothing has.
+        Its dofs without mass, "the rotations of a shell"; empty if it has none.
     fill : Fill
         Memory of the factors of its tangent.
+    as_made : bool
+        Whether `discretize`, or the function of its model, made it and would make it again from
+        pattern, sheet and options. `dataclasses.replace` does not pass it on.
     """
 
     nodes: NDArray
@@ -63,22 +73,37 @@ class Discretized(Made):
     centers: NDArray
     pattern: Any
     sheet: Sheet
+    options: Any
     mass: sparse.csr_array
     folds: NDArray
     fold_rest: NDArray
-    fold_law: HingeLaw
     body: Body
     fill: Fill
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
     massless: ClassVar[str] = ""
+    as_made: bool = False
+
+    def __post_init__(self) -> None:
+        for item in fields(cast(Any, self)):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, item.name, read_only(np.array(value)))
+
+    def marked(self) -> Self:
+        """Mark it as made."""
+        object.__setattr__(self, "as_made", True)
+        return self
+
+    @cached_property
+    def fold_law(self) -> HingeLaw:
+        """Law of the folds."""
+        return hinge_law(self.options.fold_law, "fold_law")
 
     @cached_property
     def bar_length(self) -> NDArray:
         """Rest lengths of the bars (nb,), m."""
-        length = np.linalg.norm(self.nodes[self.bars[:, 1]] - self.nodes[self.bars[:, 0]], axis=1)
-        length.setflags(write=False)
-        return length
+        return read_only(lengths(self.nodes, self.bars))
 
     @property
     def coarser(self) -> Discretized | None:
@@ -96,14 +121,13 @@ class Discretized(Made):
         """
         if self.sheet.density is None:
             raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
-        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
         return Surface(
             nodes=self.nodes,
             faces=self.pattern.faces if self.pattern is not None else (),
             centers=self.centers,
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
-            triangle_area=0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1),
+            triangle_area=0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1),
             areal_density=self.sheet.density * self.sheet.thickness,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Edge, around
+
+PARALLEL = 1e-12  # of two vectors: the squared sine of an angle that rounding spoils
+Triangle = tuple[int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,48 +45,240 @@ class Mesh:
     triangle_panel: NDArray
     folds: NDArray
 
-    def triangle_areas(self) -> NDArray:
-        """Area of each triangle (nt,), m2."""
-        a, b, c = (self.nodes[self.triangles[:, k]] for k in range(3))
-        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
+def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh:
+    """Mesh of a pattern with a center node in each panel of more than three corners.
 
-def fold_rows(pattern: Pattern, triangles: NDArray, triangle_panel: NDArray) -> NDArray:
-    """Hinge rows of the creases: j to k runs along the crease as wing i's panel does.
-
-    Wing i is the third corner of the triangle that runs low to high, wing l that of the other.
+    centers : center points by panel number, in place of the computed ones.
     """
-    third = third_corners(triangles.tolist(), triangle_panel.tolist())
-    rows = [
+    sizes = np.array([len(face) for face in pattern.faces])
+    number = np.where(sizes > 3, len(pattern.vertices) + np.cumsum(sizes > 3) - 1, -1).tolist()
+    points = np.zeros((len(sizes), 3))
+    quads = np.array([face for face in pattern.faces if len(face) == 4], np.int64).reshape(-1, 4)
+    points[sizes == 4] = quad_centers(pattern.vertices[quads])
+    for panel in np.flatnonzero(sizes > 4).tolist():
+        points[panel] = polygon_center(pattern.vertices[list(pattern.faces[panel])])
+    lost = np.flatnonzero(np.isnan(points).any(axis=1))
+    if lost.size:
+        raise InputError(
+            f"panel {lost[0]}: is so narrow that rounding hides where its diagonals cross; cut "
+            'it into shorter panels, or use scheme = "n4b5"'
+        )
+    for panel, point in (centers or {}).items():
+        points[panel] = point
+
+    def spokes(panel: int) -> tuple[list[Triangle], list[Edge]]:
+        face, hub = pattern.faces[panel], number[panel]
+        if hub < 0:
+            return [(face[0], face[1], face[2])], []
+        return [(a, b, hub) for a, b in around(face)], [(hub, a) for a in face]
+
+    nodes = np.concatenate([pattern.vertices, points[sizes > 3]])
+    remedy = 'its center cannot see every edge; use scheme = "n4b5" or cut the panel'
+    return _mesh(pattern, nodes, np.array(number), spokes, remedy)
+
+
+def n4b5(pattern: Pattern) -> Mesh:
+    """Mesh of a pattern whose panels are cut by diagonals, without further nodes.
+
+    A quadrilateral is cut at its shorter diagonal inside the panel (tie: corners 0 and 2), a
+    larger polygon recursively at the shortest one.
+    """
+
+    def diagonals(panel: int) -> tuple[list[Triangle], list[Edge]]:
+        return _cut(list(pattern.faces[panel]), pattern, panel)
+
+    none = np.full(len(pattern.faces), -1)
+    remedy = "correct the panel or cut it into triangles"
+    return _mesh(pattern, pattern.vertices, none, diagonals, remedy)
+
+
+def _mesh(
+    pattern: Pattern,
+    nodes: NDArray,
+    centers: NDArray,
+    cut: Callable[[int], tuple[list[Triangle], list[Edge]]],
+    remedy: str,
+) -> Mesh:
+    """Mesh of a pattern whose panels are each `cut` into triangles with inner bars.
+
+    j to k runs along a crease as wing i's panel does: wing i is the third corner of the triangle
+    that runs low to high, wing l that of the other.
+    """
+    triangles, triangle_panel, inner, inner_panel = [], [], [], []
+    third = {}  # corner by panel and directed side: a diagonal may be an edge of another panel
+    for panel in range(len(pattern.faces)):
+        pieces, bars = cut(panel)
+        for a, b, c in pieces:
+            third[panel, a, b], third[panel, b, c], third[panel, c, a] = c, a, b
+        triangles += pieces
+        triangle_panel += [panel] * len(pieces)
+        inner += bars
+        inner_panel += [panel] * len(bars)
+    bends = [
+        (a, b, third[panel, a, b], third[panel, b, a])
+        for panel, (a, b) in zip(inner_panel, inner, strict=True)
+    ]
+    folds = [
         (low, high, third[front, low, high], third[back, high, low])
         for (low, high), (front, back) in zip(
             pattern.creases.tolist(), pattern.crease_faces.tolist(), strict=True
         )
     ]
-    return np.array(rows, np.int64).reshape(-1, 4)
+    mesh = Mesh(
+        nodes=nodes,
+        centers=centers,
+        inner=_rows(inner, 2),
+        inner_panel=np.array(inner_panel, np.int64),
+        bends=_rows(bends, 4),
+        triangles=_rows(triangles, 3),
+        triangle_panel=np.array(triangle_panel, np.int64),
+        folds=_rows(folds, 4),
+    )
+    check_triangles(nodes, mesh.triangles, mesh.triangle_panel, pattern, remedy)
+    return mesh
 
 
-def third_corners(triangles: list, panels: list) -> dict[tuple[int, int, int], int]:
-    """Third corner of the triangle of a panel that runs a to b, by (panel, a, b).
-
-    By panel, because a diagonal of one panel may be an edge of another.
-    """
-    third = {}
-    for panel, (a, b, c) in zip(panels, triangles, strict=True):
-        third[panel, a, b], third[panel, b, c], third[panel, c, a] = c, a, b
-    return third
+def _rows(rows: list, width: int) -> NDArray:
+    return np.array(rows, np.int64).reshape(-1, width)
 
 
-def check_triangles(mesh: Mesh, pattern: Pattern, remedy: str) -> Mesh:
-    """Refuse a mesh with a flat or inside-out triangle, naming its panel."""
-    a, b, c = (mesh.nodes[mesh.triangles[:, k]] for k in range(3))
-    normals = pattern.face_normals[mesh.triangle_panel]
-    signed = 0.5 * np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
-    small = signed <= 1e-9 * pattern.face_areas[mesh.triangle_panel]
+def lengths(x: NDArray, pairs: NDArray) -> NDArray:
+    """Distances (k,) between the points of pairs (k, 2), x (n, 3)."""
+    return np.linalg.norm(x[pairs[:, 1]] - x[pairs[:, 0]], axis=1)
+
+
+def double_areas(x: NDArray, triangles: NDArray) -> NDArray:
+    """Normals (nt, 3) of triangles (nt, 3) of points x (n, 3), as long as twice their areas."""
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def check_triangles(
+    nodes: NDArray, triangles: NDArray, panels: NDArray, pattern: Pattern, remedy: str
+) -> None:
+    """Refuse flat and inside-out triangles, naming their panel."""
+    normals = pattern.face_normals[panels]
+    signed = 0.5 * np.einsum("ij,ij->i", double_areas(nodes, triangles), normals)
+    small = signed <= 1e-9 * pattern.face_areas[panels]
     if small.any():
-        panel = int(mesh.triangle_panel[small][0])
+        panel = int(panels[small][0])
         raise InputError(
             f"panel {panel} (vertices {', '.join(map(str, pattern.faces[panel]))}) is cut into a "
             f"triangle that is degenerate or inside out: {remedy}"
         )
-    return mesh
+
+
+def _cut(face: list[int], pattern: Pattern, number: int) -> tuple[list[Triangle], list[Edge]]:
+    """Triangles and diagonals of a face, by recursion."""
+    if len(face) == 3:
+        return [(face[0], face[1], face[2])], []
+    x = _in_plane(pattern.vertices[face], pattern.face_normals[number])
+    i, j = _shortest_diagonal(x, pattern.vertices[face], number, face)
+    left, left_cuts = _cut(face[i : j + 1], pattern, number)
+    right, right_cuts = _cut(face[j:] + face[: i + 1], pattern, number)
+    return left + right, [(face[i], face[j]), *left_cuts, *right_cuts]
+
+
+def _in_plane(x: NDArray, normal: NDArray) -> NDArray:
+    """Coordinates (m, 2) in the plane across `normal`, counter-clockwise seen from its tip."""
+    first = x[1] - x[0] - ((x[1] - x[0]) @ normal) * normal
+    first /= np.linalg.norm(first)
+    return (x - x[0]) @ np.stack([first, np.cross(normal, first)], 1)
+
+
+def _shortest_diagonal(flat: NDArray, x: NDArray, number: int, face: list[int]) -> tuple[int, int]:
+    m = len(flat)
+    best, chosen = np.inf, None
+    for i in range(m):
+        for j in range(i + 2, m):
+            if (i, j) == (0, m - 1):
+                continue
+            length = np.linalg.norm(x[j] - x[i])
+            if length < best * (1.0 - 1e-12) and _inside(flat, i, j):
+                best, chosen = length, (i, j)
+    if chosen is None:
+        raise InputError(
+            f"panel {number} (vertices {', '.join(map(str, face))}) has no diagonal inside it: "
+            "its outline crosses itself; correct the panel"
+        )
+    return chosen
+
+
+def _inside(flat: NDArray, i: int, j: int) -> bool:
+    """Whether the diagonal i-j runs inside the counter-clockwise polygon `flat`."""
+    m = len(flat)
+
+    def turn(a, b, c):
+        u, v = flat[b] - flat[a], flat[c] - flat[a]
+        return u[0] * v[1] - u[1] * v[0]
+
+    def in_cone(a, b):
+        before, after = (a - 1) % m, (a + 1) % m
+        if turn(before, a, after) >= 0:
+            return turn(a, b, before) > 0 and turn(b, a, after) > 0
+        return not (turn(a, b, after) >= 0 and turn(b, a, before) >= 0)
+
+    if not (in_cone(i, j) and in_cone(j, i)):
+        return False
+    for p in range(m):
+        q = (p + 1) % m
+        if p in (i, j) or q in (i, j):
+            continue
+        if turn(i, j, p) * turn(i, j, q) < 0 and turn(p, q, i) * turn(p, q, j) < 0:
+            return False
+    return True
+
+
+def quad_centers(x: NDArray) -> NDArray:
+    """Crossing of the diagonals of quadrilaterals x (m, 4, 3).
+
+    Where a panel is not flat, the point of the shorter diagonal that is nearest to the other;
+    for equal ones, of the diagonal through corners 1 and 3 (counted from 0). nan where the
+    diagonals are parallel to rounding.
+    """
+    p, q = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
+    start = x[:, 1] - x[:, 0]
+    pp, qq, pq = (np.einsum("ij,ij->i", a, b) for a, b in ((p, p), (q, q), (p, q)))
+    ps, qs = np.einsum("ij,ij->i", p, start), np.einsum("ij,ij->i", q, start)
+    determinant = pp * qq - pq * pq
+    determinant[determinant <= PARALLEL * pp * qq] = np.nan
+    on_p = (ps * qq - pq * qs) / determinant
+    on_q = (pq * ps - pp * qs) / determinant
+    first = (pp < qq * (1.0 - 1e-12))[:, None]
+    return np.where(first, x[:, 0] + on_p[:, None] * p, x[:, 1] + on_q[:, None] * q)
+
+
+def polygon_center(x: NDArray) -> NDArray:
+    """Point of a polygon x (m, 3) that minimizes sum |(xj - c) x (xi - c)| / Lij^2 over diagonals.
+
+    The sum is one of weighted distances to lines: convex and piecewise linear, so its minimum is
+    at a crossing of two diagonals. Where several tie, the corners' mean if it is one of the
+    minimizers, else the mean of the tied crossings. A polygon that is not flat is projected on
+    its mean plane for this.
+    """
+    origin = x.mean(axis=0)
+    _, _, axes = np.linalg.svd(x - origin)
+    flat = (x - origin) @ axes[:2].T
+    m = len(x)
+    pairs = [(i, j) for i in range(m) for j in range(i + 2, m) if (i, j) != (0, m - 1)]
+    start = flat[[i for i, _ in pairs]]
+    along = flat[[j for _, j in pairs]] - start
+    length = np.linalg.norm(along, axis=1)
+    normal = np.stack([-along[:, 1], along[:, 0]], 1) / length[:, None]
+    offset = np.einsum("ij,ij->i", normal, start)
+
+    def total(points: NDArray) -> NDArray:
+        return (np.abs(points @ normal.T - offset) / length).sum(axis=1)
+
+    crossings = [np.zeros(2)]
+    for a in range(len(pairs)):
+        for b in range(a + 1, len(pairs)):
+            system = normal[[a, b]]
+            if abs(np.linalg.det(system)) > 1e-9:
+                crossings.append(np.linalg.solve(system, offset[[a, b]]))
+    candidates = np.array(crossings)
+    value = total(candidates)
+    tied = value <= value.min() + 1e-9
+    best = candidates[0] if tied[0] else candidates[tied].mean(axis=0)
+    return origin + best @ axes[:2]

@@ -2,28 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn import mechanics
-from foldyn.algebra.fill import Fill
-from foldyn.materials import BarLaw, HingeLaw, bar_law, hinge_law
+from foldyn.algebra.solvers import Fill
+from foldyn.errors import InputError
+from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
-from foldyn.structures.discretized import Discretized, HingeKind
-from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.options import ModelOptions
+from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.sheet import Sheet
+from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
 """Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
+SCHEMES = ("n5b8", "n4b5")
+CALIBRATIONS = ("standard", "merlin2")
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """Arguments of `discretize` besides pattern and sheet; see there."""
+
+    scheme: Literal["n5b8", "n4b5"] = "n5b8"
+    mass: str = "mixed_voronoi"
+    bar_law: str | BarLaw = "ogden"
+    fold_law: str | HingeLaw = EnhancedLinear()
+    bend_law: str | HingeLaw = "superlinear"
+    calibration: Literal["standard", "merlin2"] = "standard"
+    crease_stiffness: float | Sequence[float] | None = None
+    crease_rest: float | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("crease_stiffness", "crease_rest"):
+            value = getattr(self, name)
+            if isinstance(value, bool):
+                raise InputError(f"{name} = {value}: give a number, or one for each crease")
+            if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
+                object.__setattr__(self, name, tuple(value))  # a copy that stays as it is
+        choice("scheme", self.scheme, SCHEMES)
+        choice("calibration", self.calibration, CALIBRATIONS)
 
 
 def _none(width: int, kind: type = np.int64) -> NDArray:
@@ -50,7 +77,7 @@ class Structure(Discretized):
     centers : (np,)
         Node number of each panel's center, -1 without one.
     pattern, sheet, options
-        What it was made of.
+        What it was made from.
     """
 
     nodes: NDArray
@@ -87,11 +114,6 @@ class Structure(Discretized):
         return bar_law(self.options.bar_law)
 
     @cached_property
-    def fold_law(self) -> HingeLaw:
-        """Law of the folds."""
-        return hinge_law(self.options.fold_law, "fold_law")
-
-    @cached_property
     def bend_law(self) -> HingeLaw:
         """Law of the bends."""
         return hinge_law(self.options.bend_law, "bend_law")
@@ -99,14 +121,12 @@ class Structure(Discretized):
     @cached_property
     def model(self) -> mechanics.BarsHinges:
         """The arrays that the compiled kernels work on."""
-        folds = (self.folds, self.fold_stiffness, self.fold_rest, self.fold_law)
-        bends = (self.bends, self.bend_stiffness, self.bend_rest, self.bend_law)
         return mechanics.build(
             self.nodes,
             self.bars,
             self.sheet.youngs_modulus * self.bar_area / self.bar_length,
             self.bar_law,
-            (mechanics.Hinges(*folds), mechanics.Hinges(*bends)),
+            tuple(mechanics.Hinges(h.nodes, h.stiffness, h.rest, h.law) for h in self.hinge_kinds),
         )
 
     @cached_property
@@ -122,13 +142,7 @@ class Structure(Discretized):
         rows[np.lexsort(self.folds.T)] = there[
             np.lexsort(self.model.hinges[there].astype(np.int64).T)
         ]
-        rows.setflags(write=False)
-        return rows
-
-    @property
-    def sparsity(self) -> mechanics.Sparsity:
-        """Pattern of the tangent."""
-        return self.body.sparsity
+        return read_only(rows)
 
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
@@ -148,11 +162,11 @@ class Structure(Discretized):
             The sheet has no density, or the rule does not suit the structure.
         """
         if self.node_mass is not None:
-            mass = sparse.csr_array(sparse.diags_array(self.node_mass))
+            mass = lumped(self.node_mass)
         else:
             mass = MASS_RULES[self.options.mass](self.surface)
         for array in (mass.data, mass.indices, mass.indptr):
-            array.setflags(write=False)
+            read_only(array)
         return mass
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:

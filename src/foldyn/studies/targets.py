@@ -1,4 +1,4 @@
-"""Values and claims of a paper beside what was computed: the rows of a study's `targets.toml`."""
+"""Values and claims of a paper next to computed values: the rows of a study's `targets.toml`."""
 
 from __future__ import annotations
 
@@ -77,17 +77,17 @@ class Verdict:
         """One line for people."""
         return (
             f"{self.target.what}: {self.computed:.4g} {self.target.unit} beside "
-            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.told}"
+            f"{self.asked} ({self.target.source}), {self.deviation:+.1%}: {self.word}"
         )
 
     @property
-    def told(self) -> str:
-        """In a word whether they agree."""
+    def word(self) -> str:
+        """Whether they agree."""
         return {True: "holds", False: "fails", None: "beside"}[self.holds]
 
     @property
     def asked(self) -> str:
-        """The target's number, with what it is of a claim."""
+        """The target's number; of a claim, as a bound."""
         before = {"least": "at least ", "most": "at most ", None: ""}[self.target.bound]
         return f"{before}{self.target.value:.4g}"
 

@@ -24,16 +24,10 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.materials.switch import (
-    bar_energy,
-    bar_slope,
-    bar_stress,
-    hinge_energy,
-    hinge_moment,
-    hinge_slope,
-)
+from foldyn.materials import switch
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
+from foldyn.mechanics.tangent import add_to_bar, add_to_hinge
 
 GAUSS = 0.5 - math.sqrt(3.0) / 6.0  # the first of the two points of Gauss's rule
 NOISE = 16.0 * float(np.finfo(float).eps)  # of an energy: differences below that are rounding
@@ -57,10 +51,10 @@ def mean_stress(code, address, x, change):
     stress, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
         e = _extension(x + 2.0 * point * change)
-        stress += 0.5 * bar_stress(code, e, address[1])
-        slope += 0.5 * point * bar_slope(code, e, address[2])
-    before = bar_energy(code, _extension(x), address[0])
-    after = bar_energy(code, _extension(x + 2.0 * change), address[0])
+        stress += 0.5 * switch.bar_stress(code, e, address[1])
+        slope += 0.5 * point * switch.bar_slope(code, e, address[2])
+    before = switch.bar_energy(code, _extension(x), address[0])
+    after = switch.bar_energy(code, _extension(x + 2.0 * change), address[0])
     missed = after - before - stress * change
     if abs(change) > LEAST and abs(missed) > NOISE * max(abs(before), abs(after)):
         stress += missed / change
@@ -73,10 +67,10 @@ def mean_moment(code, address, p, rest, theta, change):
     moment, slope = 0.0, 0.0
     for point in (GAUSS, 1.0 - GAUSS):
         t = theta + point * change
-        moment += 0.5 * hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
-        slope += 0.5 * point * hinge_slope(code, t, rest, p[0], p[1], address[2])
-    before = hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
-    after = hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
+        moment += 0.5 * switch.hinge_moment(code, t, rest, p[0], p[1], p[2], p[3], address[1])
+        slope += 0.5 * point * switch.hinge_slope(code, t, rest, p[0], p[1], address[2])
+    before = switch.hinge_energy(code, theta, rest, p[0], p[1], p[2], p[3], address[0])
+    after = switch.hinge_energy(code, theta + change, rest, p[0], p[1], p[2], p[3], address[0])
     missed = after - before - moment * change
     size = max(abs(before), abs(after))
     if p[2] != 0.0 or p[3] != 0.0:  # what stress-free laws subtract cancels digits
@@ -135,12 +129,12 @@ def discrete_gradient(x, dx, turn, points, plain, gradient):
         points[v, 1] = stretch * r1 - along * w1
         points[v, 2] = stretch * r2 - along * w2
     p, flat = points, plain.reshape(12)
-    found = dihedral_gradient(
+    dihedral = dihedral_gradient(
         p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
         p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
     )  # fmt: skip
     for c in range(12):
-        flat[c] = found[1 + c]
+        flat[c] = dihedral[1 + c]
     missed, size = turn, 0.0
     for v in range(4):
         along = w0 * plain[v, 0] + w1 * plain[v, 1] + w2 * plain[v, 2]
@@ -238,10 +232,7 @@ def add_bar_tangent(model, u0, u1, stress, slots, data):
                     if p == q:
                         value += 0.5 * stress[e]
                     value *= model.bar_stiffness[e]
-                    data[slots[e, 0, 0], p, q] += value
-                    data[slots[e, 1, 1], p, q] += value
-                    data[slots[e, 0, 1], p, q] -= value
-                    data[slots[e, 1, 0], p, q] -= value
+                    add_to_bar(data, slots, e, p, q, value)
 
 
 @kernel
@@ -256,11 +247,11 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
     for run in range(model.hinge_runs.shape[0]):
         code, address = model.hinge_runs[run, 2], model.addresses[model.hinge_runs[run, 3]]
         for e in range(model.hinge_runs[run, 0], model.hinge_runs[run, 1]):
-            found, k = hinge_dihedral(model, u1, e), model.hinge_stiffness[e]
+            dihedral, k = hinge_dihedral(model, u1, e), model.hinge_stiffness[e]
             flat = end.reshape(12)
             for c in range(12):
-                flat[c] = found[1 + c]
-            turn = found[0] - angle0[e]
+                flat[c] = dihedral[1 + c]
+            turn = dihedral[0] - angle0[e]
             _gather(model, e, u0, u1, x, dx)
             discrete_gradient(x, dx, turn, points, plain, gradient)
             parameters, rest = model.hinge_parameters[e], model.hinge_rest[e]
@@ -269,11 +260,4 @@ def add_hinge_tangent(model, u0, u1, angle0, floor, slots, data):
                 slope = max(slope, 0.5 * floor)
             block[:] = 0.0
             add_hessian(points, plain, 0.5 * k * moment, block)
-            for v in range(4):
-                for w in range(4):
-                    slot = slots[e, v, w]
-                    for a in range(3):
-                        for b in range(3):
-                            data[slot, a, b] += (
-                                block[v, a, w, b] + k * slope * gradient[v, a] * end[w, b]
-                            )
+            add_to_hinge(data, slots, e, block, k * slope, gradient, end)

@@ -15,13 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
-from foldyn.dynamics.course import Course, Outcome, Plan, Samples, sample
-from foldyn.dynamics.implicit import convergence
-from foldyn.dynamics.implicit.control import next_step, remembered, smaller_step
-from foldyn.dynamics.implicit.horizon import horizon
-from foldyn.dynamics.implicit.matrix import StepMatrix
-from foldyn.dynamics.implicit.newton import Newton
-from foldyn.dynamics.implicit.scheme import Bench, Scheme
+from foldyn.algebra.superlu import SingularTangentError
+from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
+from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Newton, Scheme
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
@@ -30,16 +27,26 @@ SAME_TIME = 1e-9  # of a step: times as near as that are one
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
 TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
+# the control of the step by its error
+SAFETY = 0.9
+GROWTH = 2.0  # of a step at most
+WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kept
+NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
+LEAST = 0.2  # share of a refused step that is tried next, at least
+MEMORY = 0.9  # share of an error that counts a step later
+OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
 class Implicit:
-    """An implicit scheme that advances a motion; see `foldyn.dynamics.engine.Engine`.
+    """An implicit scheme that advances a motion.
 
     Parameters
     ----------
     make : callable
-        The scheme from a bench.
+        The scheme from a case and a course.
     packed : Packed
+    course : Course
+    plan : StepPlan
     jumps : tuple of float
         Times (s), in order, at which loads jump: steps end there, so that no step sees a jump.
     """
@@ -47,99 +54,117 @@ class Implicit:
     threads = 1
 
     def __init__(
-        self, make: Callable[[Bench], Scheme], packed: Packed, jumps: tuple[float, ...]
-    ) -> None:
-        self._make, self._packed, self._jumps = make, packed, jumps
-        self._newton: Newton | None = None
+        self, make: Callable[[Packed, Course], Scheme], packed: Packed, course: Course,
+        plan: StepPlan, jumps: tuple[float, ...],
+    ) -> None:  # fmt: skip
+        self._packed, self._course, self._plan, self._jumps = packed, course, plan, jumps
+        self._scheme = make(packed, course)
+        self._matrix = StepMatrix(packed, self._scheme.symmetric)
+        self._newton = Newton(self._scheme, self._matrix)
         self._halved = 0
         self._horizon = 0.0  # s in which a vibration moves on
 
     def facts(self) -> dict[str, Any]:
         """Statistics of the run."""
-        newton = self._newton
-        if newton is None:
-            return {}
-        return dict(newton.scheme.facts) | {
-            "iterations": newton.iterations,
-            "factorizations": newton.matrix.factorizations,
-            "linear_solver": newton.matrix.solver,
+        return dict(self._scheme.facts) | {
+            "iterations": self._newton.iterations,
+            "factorizations": self._matrix.factorizations,
+            "linear_solver": self._matrix.solver,
             "halved_steps": self._halved,
         }
 
-    def advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
-        """See `Engine`."""
+    def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
+        """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         with one_thread():
-            return self._advance(course, plan, out, stretch)
+            return self._advance(out, stretch)
 
-    def _advance(self, course: Course, plan: Plan, out: Samples, stretch: int) -> tuple[int, int]:
-        if self._newton is None:
-            found = self._begin(course, plan, out)
-            if found != Outcome.DONE:
-                return found, -1
-        newton = self._newton
-        assert newton is not None
-        last = course.tally.steps + stretch
+    def _advance(self, out: Samples, stretch: int) -> tuple[int, int]:
+        plan, tally = self._plan, self._course.tally
+        if tally.samples == 0:
+            outcome = self._begin(out)
+            if outcome != Outcome.DONE:
+                return outcome, -1
+        last = tally.steps + stretch
         advance = self._fixed if plan.steps else self._adaptive
         end = min(last, plan.steps) if plan.steps else last
-        while course.tally.steps < end and (plan.steps or course.tally.time < plan.end):
-            if plan.every and not plan.steps and course.tally.samples == len(out.time):
+        while tally.steps < end and (plan.steps or tally.time < plan.end):
+            if plan.every and not plan.steps and tally.samples == len(out.time):
                 return Outcome.FULL, -1
-            found, hinge = advance(newton, course, plan, out)
-            course.tally.evaluations = newton.evaluations
-            if found != Outcome.DONE:
-                return found, hinge
+            outcome, hinge = advance(out)
+            tally.evaluations = self._newton.evaluations
+            if outcome != Outcome.DONE:
+                return outcome, hinge
         return Outcome.DONE, -1
 
-    def _begin(self, course: Course, plan: Plan, out: Samples) -> int:
-        bench = Bench(self._packed, course)
-        scheme = self._make(bench)
-        newton = Newton(scheme, StepMatrix(self._packed, scheme.symmetric))
+    def _begin(self, out: Samples) -> int:
+        scheme, plan = self._scheme, self._plan
         scheme.begin(plan.start)
-        course.tally.farthest = _largest(bench.displacement())
+        self._course.tally.farthest = _largest(scheme.displacement())
         if self._packed.system.varies and not plan.steps:
-            self._horizon = horizon(bench, newton.matrix, plan.end - plan.start)
-        newton.prepare(plan.dt, plan.start)
-        self._newton = newton
-        return self._note(newton, course, plan.start, out)
+            self._horizon = self._impulse_lasts()
+        self._newton.prepare(plan.dt, plan.start)
+        return self._sample(plan.start, out)
 
-    def _note(self, newton: Newton, course: Course, t: float, out: Samples) -> int:
+    def _impulse_lasts(self) -> float:
+        """How long an impulse acts on: the time (s) in which a vibration moves on.
+
+        It is 1/omega of the vibration that the histories set in motion, at most the duration.
+        Rayleigh's quotient of the displacements that they would cause if they acted slowly: over
+        the duration, for bodies that nothing holds. Hinges count with their nominal stiffness.
+        """
+        scheme, matrix, packed = self._scheme, self._matrix, self._packed
+        duration, u = self._plan.end - self._plan.start, scheme.displacement()
+        force = scheme.push(scheme.old, np.ones(len(scheme.old.factor)))
+        matrix.blocks.put(packed.body.nominal(u), matrix.pattern, u, u, False, matrix.stiffness)
+        slow = (2.0 * math.pi / duration) ** 2
+        try:
+            matrix.factorize(Weights(stiffness=1.0, mass=slow, damping=0.0))
+        except SingularTangentError:
+            return duration
+        scheme.step[:] = 0.0
+        x = matrix.solve(force, scheme.step)
+        matrix.forget()
+        times_mass(packed.mass, x, scheme.out)
+        inertia, work = float((x * scheme.out).sum()), float((x * force).sum())
+        square = work / inertia - slow if inertia > 0.0 else 0.0
+        return 1.0 / math.sqrt(square) if square * duration * duration > 1.0 else duration
+
+    def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
-        packed, bench = self._packed, newton.scheme.bench
+        scheme = self._scheme
         return _write(
-            packed.model, packed.system, packed.mass, course, t, out, bench.work, bench.scratch,
-            bench.out,
-        )  # fmt: skip
+            *self._packed.arrays, self._course, t, out, scheme.work, scheme.scratch, scheme.out
+        )
 
-    def _fixed(self, newton: Newton, course: Course, plan: Plan, out: Samples) -> tuple[int, int]:
+    def _fixed(self, out: Samples) -> tuple[int, int]:
         """One step of dt, in parts where a load jumps or Newton's method fails."""
-        step = int(course.tally.steps) + 1
-        t, end, h = float(course.tally.time), plan.start + step * plan.dt, plan.dt
+        plan, tally = self._plan, self._course.tally
+        step = int(tally.steps) + 1
+        t, end, h = float(tally.time), plan.start + step * plan.dt, plan.dt
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = _divide(t, goal, h, jump)
-            found, hinge = self._attempt(newton, part, stop, jump)
-            if found == Outcome.DONE:
-                self._accept(newton, course, part, stop, jump)
+            outcome, hinge = self._attempt(part, stop, jump)
+            if outcome == Outcome.DONE:
+                self._accept(part, stop, jump)
                 t = stop
                 continue
-            if self._hopeless(part, plan.dt):
-                course.tally.time = t
-                return found, hinge
+            if self._hopeless(part):
+                tally.time = t
+                return outcome, hinge
             h, whole = 0.5 * part, False
         self._halved += not whole
-        course.tally.steps, course.tally.time = step, end
+        tally.steps, tally.time = step, end
         if step % plan.every == 0:
-            return self._note(newton, course, end, out), -1
+            return self._sample(end, out), -1
         return Outcome.DONE, -1
 
-    def _adaptive(
-        self, newton: Newton, course: Course, plan: Plan, out: Samples
-    ) -> tuple[int, int]:
+    def _adaptive(self, out: Samples) -> tuple[int, int]:
         """One step whose error is within the tolerance."""
-        tally = course.tally
+        plan, tally = self._plan, self._course.tally
         t = float(tally.time)
-        due, waits = self._due(plan, course, out)
+        due, waits = self._due(out)
         while True:
             wanted = min(float(tally.wanted), plan.dt)
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
@@ -147,32 +172,33 @@ class Implicit:
             near = SAME_TIME * wanted
             goal, jump = self._next_jump(t, _next_stop(plan, t, due, near), near)
             h, end, jump = _divide(t, goal, wanted, jump)
-            found, hinge = self._attempt(newton, h, end, jump)
-            if found != Outcome.DONE:
-                if self._hopeless(h, plan.dt):
-                    return found, hinge
+            outcome, hinge = self._attempt(h, end, jump)
+            if outcome != Outcome.DONE:
+                if self._hopeless(h):
+                    return outcome, hinge
                 tally.wanted = 0.5 * h
                 tally.refused += 1
                 continue
-            error, scale = self._error(newton, plan, t, h, float(tally.farthest))
+            error, scale = self._error(t, h)
             if error <= 1.0:
                 break
-            tally.wanted = smaller_step(h, error)
+            tally.wanted = _smaller_step(h, error)
             tally.refused += 1
-        self._accept(newton, course, h, end, jump)
+        self._accept(h, end, jump)
         tally.steps += 1
         tally.time, tally.farthest = end, scale
-        error = remembered(error, tally.error, h, tally.last or h)
+        # the error of a vibration vanishes twice in each period; the ones before still count then
+        error = max(error, MEMORY * tally.error * (h / (tally.last or h)) ** 3)
         tally.error, tally.last = error, h
-        tally.wanted = max(wanted if end == goal else 0.0, next_step(h, error))
+        tally.wanted = max(wanted if end == goal else 0.0, _next_step(h, error))
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         if tally.steps % plan.every == 0 if plan.every else waits and end == due:
-            return self._note(newton, course, end, out), -1
+            return self._sample(end, out), -1
         return Outcome.DONE, -1
 
-    def _due(self, plan: Plan, course: Course, out: Samples) -> tuple[float, bool]:
+    def _due(self, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps end, and whether a sample waits there."""
-        number = int(course.tally.samples)
+        plan, number = self._plan, int(self._course.tally.samples)
         if plan.every or number == len(out.time):
             return plan.end, False
         time = plan.start + number * plan.interval
@@ -188,42 +214,34 @@ class Implicit:
         jump = self._jumps[k]
         return (end if abs(jump - end) <= near else jump), jump
 
-    def _attempt(self, newton: Newton, h: float, end: float, jump: float | None) -> tuple[int, int]:
+    def _attempt(self, h: float, end: float, jump: float | None) -> tuple[int, int]:
         """Solve a step that ends before the jump, if there is one; returns (outcome, hinge)."""
-        bench = newton.scheme.bench
-        bench.predict(h)
-        found = newton.solve(h, end if jump is None else math.nextafter(min(end, jump), -math.inf))
+        self._scheme.predict(h)
+        moment = end if jump is None else math.nextafter(min(end, jump), -math.inf)
+        verdict = self._newton.solve(h, moment)
         if self._packed.callbacks.error is not None:
             return Outcome.NOT_FINITE, -1
-        turned = np.abs(bench.work.angle - bench.course.angle)
+        turned = np.abs(self._scheme.work.angle - self._course.angle)
         if turned.max(initial=0.0) > TURN:
             return Outcome.PENETRATION, int(turned.argmax())
-        if found == convergence.SOLVED:
-            return Outcome.DONE, -1
-        return (
-            Outcome.NOT_FINITE if found == convergence.NOT_FINITE else Outcome.NOT_CONVERGED
-        ), -1
+        return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
 
-    def _hopeless(self, h: float, wanted: float) -> bool:
+    def _hopeless(self, h: float) -> bool:
         """Whether a smaller step would not help either."""
-        return h < LEAST_STEP * wanted or self._packed.callbacks.error is not None
+        return h < LEAST_STEP * self._plan.dt or self._packed.callbacks.error is not None
 
-    def _accept(
-        self, newton: Newton, course: Course, h: float, end: float, jump: float | None
-    ) -> None:
-        scheme = newton.scheme
+    def _accept(self, h: float, end: float, jump: float | None) -> None:
+        scheme, course = self._scheme, self._course
         done, lost = scheme.works(h)
         course.tally.work += done
         course.tally.dissipated += lost
-        course.angle[:] = scheme.bench.work.angle
+        course.angle[:] = scheme.work.angle
         scheme.accept(h)
         if jump is not None:
             scheme.begin(max(end, jump))
 
-    def _error(
-        self, newton: Newton, plan: Plan, t: float, h: float, scale: float
-    ) -> tuple[float, float]:
-        """Error of the worst node in a step from t, over the tolerance, and the new scale.
+    def _error(self, t: float, h: float) -> tuple[float, float]:
+        """Error of the worst node in a step from t, over the tolerance, and its new scale.
 
         The scale is the largest displacement so far. The change of the acceleration goes through
         the matrix of the step, which takes away what stiff bars add to it and displacements do not
@@ -233,28 +251,41 @@ class Implicit:
         whole motion. In a step shorter than a vibration it is an impulse that lasts: its error is
         the displacement that it leads to later.
         """
-        scheme, bench = newton.scheme, newton.scheme.bench
-        scale = max(scale, _largest(bench.moved()))
-        reference, error, force = max(scale, plan.floor), 0.0, bench.unseen(t, t + h)
+        scheme, matrix, plan = self._scheme, self._matrix, self._plan
+        scale = max(float(self._course.tally.farthest), _largest(scheme.moved()))
+        reference, error, force = max(scale, plan.floor), 0.0, scheme.unseen(t, t + h)
         if force is not None:
-            if not newton.matrix.factorized and not newton.renew(h):
+            if not matrix.factorized and not self._newton.renew(h):
                 return math.inf, scale
-            moved = newton.matrix.solve(force, bench.step) / reference
+            moved = matrix.solve(force, scheme.step) / reference
             error = _largest(moved) ** 1.5
             if h < self._horizon:
-                error = max(error, _largest(moved[~bench.massless]) * self._horizon / h)
+                error = max(error, _largest(moved[~scheme.massless]) * self._horizon / h)
         change = scheme.change(h)
-        if change.any() and newton.matrix.factorized:
-            times_mass(self._packed.mass, scheme.weights(h).mass * change, bench.out)
-            error = max(error, _largest(newton.matrix.solve(bench.out, bench.step)) / reference)
+        if change.any() and matrix.factorized:
+            times_mass(self._packed.mass, scheme.weights(h).mass * change, scheme.out)
+            error = max(error, _largest(matrix.solve(scheme.out, scheme.step)) / reference)
         return error / plan.tolerance, scale
+
+
+def _next_step(h: float, error: float) -> float:
+    """Step after an accepted one of h (s) with the error, relative to the tolerance."""
+    factor = GROWTH if error <= 0.0 else min(GROWTH, SAFETY * error ** (-1.0 / 3.0))
+    if factor < NEAR:
+        return h * CUT
+    return h if factor < WORTHWHILE else h * factor
+
+
+def _smaller_step(h: float, error: float) -> float:
+    """Step after a refused one."""
+    return h * min(0.9, max(LEAST, SAFETY * error ** (-1.0 / 3.0)))
 
 
 def _largest(values: NDArray) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def _next_stop(plan: Plan, t: float, end: float, near: float) -> float:
+def _next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
     """Where a step from t has to end at the latest, for the knots of the histories."""
     k = int(np.searchsorted(plan.stops, t + near, side="right"))
     return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end

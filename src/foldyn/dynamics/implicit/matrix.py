@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.banded import BandLU, Cholesky
-from foldyn.algebra.choice import factorizer, takes_band
+from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
-from foldyn.mechanics import Sparsity
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.tangent import Sparsity, block_keys
 
 
 class Weights(NamedTuple):
@@ -31,8 +31,8 @@ class Weights(NamedTuple):
     damping: float  # 1/s, of beta K0
 
 
-class Blocks(NamedTuple):
-    """The matrices, (nnz, 3, 3) each."""
+class Matrices(NamedTuple):
+    """The three matrices as blocks, (nnz, 3, 3) each."""
 
     stiffness: NDArray
     mass: NDArray
@@ -67,32 +67,28 @@ class StepMatrix:
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
         self.pattern, where = _with_mass(self.blocks.pattern, nodal)
         shape = (len(self.pattern.indices), 3, 3)
-        self.stiffness = np.zeros(shape)
-        self._blocks = Blocks(self.stiffness, np.zeros(shape), np.zeros(shape))
-        self._blocks.mass[where] = nodal.data[:, None, None] * np.eye(3)
-        blocks = system.damping.viscous(3 * nodes).tobsr((3, 3))
-        blocks.sort_indices()
-        where = _slots(self.pattern, blocks.indptr, blocks.indices)
-        self._blocks.damping[where] = blocks.data
+        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
+        masses[where] = nodal.data[:, None, None] * np.eye(3)
+        damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
+        damping.sort_indices()
+        own = block_keys(self.pattern.indptr, self.pattern.indices)
+        viscous[np.searchsorted(own, block_keys(damping.indptr, damping.indices))] = damping.data
+        self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[self.blocks.unused] = True
         along = self.blocks.order
         self.free = along[~held[along]]
-        self._symmetric = symmetric
-        filled = self.blocks.filled(self.pattern) | (self._blocks.mass != 0.0)
-        self._prepare(_entries(self.pattern, self.free, filled))
+        filled = self.blocks.filled(self.pattern) | (masses != 0.0)
+        row, column, take = _entries(self.pattern, self.free, filled)
+        size, width = len(self.free), int(np.abs(row - column).max(initial=0))
+        self._sparse = _Sparse(row, column, take, size, symmetric)
+        self._band = None
+        if takes_band(size, width, symmetric):
+            self._band = _Band(row, column, take, size, width, symmetric)
+        self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
         self.factorizations = 0
-
-    def _prepare(self, entries: tuple[NDArray, NDArray, NDArray]) -> None:
-        row, column, take = entries
-        size, width = len(self.free), int(np.abs(row - column).max(initial=0))
-        self._sparse = _Sparse(row, column, take, size, self._symmetric)
-        self._band = None
-        if takes_band(size, width, self._symmetric):
-            self._band = _Band(row, column, take, size, width, self._symmetric)
-        self.solver = "banded" if self._band else self._sparse.solver
 
     def factorize(self, weights: Weights) -> None:
         """Make the matrix from the stiffness as it stands, and factorize it.
@@ -106,12 +102,12 @@ class StepMatrix:
         self.factorizations += 1
         if self._band is not None:
             try:
-                self._factors = self._band(weights, self._blocks)
+                self._factors = self._band(weights, self._matrices)
                 return
             except SingularTangentError:  # not definite: the motion leaves an unstable state
                 if not np.isfinite(self.stiffness).all():
                     raise
-        self._factors = self._sparse(weights, self._blocks)
+        self._factors = self._sparse(weights, self._matrices)
 
     def forget(self) -> None:
         """Give up the factors."""
@@ -146,10 +142,10 @@ class _Band:
         self._put = (diagonal + row - column) + rows * column
         self._memory = np.zeros((size, rows)).T
 
-    def __call__(self, weights: Weights, blocks: Blocks) -> Any:
+    def __call__(self, weights: Weights, matrices: Matrices) -> Any:
         flat = self._memory.T.reshape(-1)
         flat[:] = 0.0
-        _gather(weights, blocks, self._take, self._put, flat)
+        _gather(weights, matrices, self._take, self._put, flat)
         return self._make(self._memory)
 
 
@@ -167,9 +163,9 @@ class _Sparse:
         if symmetric:
             self.solver, self._make = factorizer("auto", size)
 
-    def __call__(self, weights: Weights, blocks: Blocks) -> Any:
+    def __call__(self, weights: Weights, matrices: Matrices) -> Any:
         data, put = np.empty(len(self._take)), np.arange(len(self._take))
-        _gather(weights, blocks, self._take, put, data)
+        _gather(weights, matrices, self._take, put, data)
         shape = (self._size, self._size)
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
 
@@ -177,9 +173,7 @@ class _Sparse:
 def _with_mass(pattern: Sparsity, nodal: sparse.csr_array) -> tuple[Sparsity, NDArray]:
     """Pattern with the entries of a nodal matrix too, and where these stand."""
     nodes = nodal.shape[0]
-    row = np.repeat(np.arange(nodes), np.diff(pattern.indptr))
-    own = row * nodes + pattern.indices.astype(np.int64)
-    other = np.repeat(np.arange(nodes), np.diff(nodal.indptr)) * nodes + nodal.indices
+    own, other = (block_keys(each.indptr, each.indices) for each in (pattern, nodal))
     both = np.union1d(own, other)
     moved = np.searchsorted(both, own)
     return Sparsity(
@@ -188,14 +182,6 @@ def _with_mass(pattern: Sparsity, nodal: sparse.csr_array) -> tuple[Sparsity, ND
         moved[pattern.bar_slots],
         moved[pattern.hinge_slots],
     ), np.searchsorted(both, other)
-
-
-def _slots(pattern: Sparsity, indptr: NDArray, indices: NDArray) -> NDArray:
-    """Where the blocks of another matrix stand in a pattern that contains them."""
-    nodes = len(indptr) - 1
-    own = np.repeat(np.arange(nodes), np.diff(pattern.indptr)) * nodes + pattern.indices
-    other = np.repeat(np.arange(nodes), np.diff(indptr)) * nodes + indices
-    return np.searchsorted(own, other)
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:
@@ -213,9 +199,9 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray
 
 
 @kernel
-def _gather(weights, blocks, take, put, out):
+def _gather(weights, matrices, take, put, out):
     """out[put] = the weighted sum of the matrices at `take`, all flat."""
-    stiffness, mass, damping = flat(blocks.stiffness), flat(blocks.mass), flat(blocks.damping)
+    stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
     for k in range(take.size):
         e = take[k]
         value = weights.stiffness * stiffness[e] + weights.mass * mass[e]

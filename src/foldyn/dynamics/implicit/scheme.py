@@ -1,22 +1,66 @@
-"""What an implicit scheme provides, and what its steps share."""
+"""What an implicit scheme provides, and Newton's method for the end of a step.
+
+The matrix is made anew in each iteration, unless the residual falls fast with the last one: panels
+that turn within a step move the directions of their stiff bars, and with the old directions the
+iteration soon converges slowly or not at all. Iterations whose matrix is kept cost a force and a
+substitution each.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.implicit.convergence import Goal
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
 from foldyn.jit.compiled import kernel
-from foldyn.jit.flat import flat
+from foldyn.jit.intrinsics import flat
 
 EPS = float(np.finfo(float).eps)
+MOST = 25  # iterations
+SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
+FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
+GROWTH = 1e8  # of the residual, at which the iteration has lost its way
+# what is left where the residual no longer falls: rounding, if it is below one of these
+ENOUGH = 1e-8  # of the forces at play
+ROUNDING = 8.0  # times the rounding of the bars' forces
+STALL = 0.5  # share of the residual that an iteration leaves, above which it does not fall
+
+SOLVED, GO_ON, NEW_MATRIX, NOT_CONVERGED, NOT_FINITE = range(5)
+
+
+class Goal(NamedTuple):
+    """What the residual is judged by, N."""
+
+    tolerance: float  # relative to the forces at play
+    least: float  # forces at play at least
+    rounding: float  # of the bars' forces
+
+
+@kernel
+def judge(goal, norm, reference, last, lowest):
+    """What to do next: the residual (N) is `norm`, it was `last`, and `lowest` at its best.
+
+    reference : forces at play, N.
+    last : 0 where there is no matrix yet, inf before the first iteration with an old one.
+    """
+    if not norm < np.inf:
+        return NOT_FINITE
+    forces = max(reference, goal.least)
+    if norm <= goal.tolerance * forces:
+        return SOLVED
+    if norm > STALL * last and norm <= max(ENOUGH * forces, ROUNDING * goal.rounding) and last > 0:
+        return SOLVED
+    if norm > GROWTH * lowest:
+        return NOT_CONVERGED
+    return NEW_MATRIX if norm > FAST * last else GO_ON
 
 
 class Phase(NamedTuple):
@@ -29,67 +73,8 @@ class Phase(NamedTuple):
     factor: NDArray  # (h, 3) of the histories
 
 
-class Scheme(Protocol):
-    """A step from `old` to `new`, whose unknown is the displacement in it, bench.shift.
-
-    Attributes
-    ----------
-    symmetric : bool
-        Whether its tangent is.
-    tolerance : float
-        Residual, relative to the forces at play, with which a step is accepted.
-    bench : Bench
-    facts : mapping
-        Its parameters, for the result's attributes.
-    """
-
-    symmetric: bool
-    tolerance: float
-    bench: Bench
-    facts: Mapping[str, float]
-
-    def begin(self, t: float) -> None:
-        """Make bench.old the beginning of a motion, or of its part after a jump, at t (s)."""
-        ...
-
-    def weights(self, h: float) -> Weights:
-        """Factors of the matrices for a step h (s)."""
-        ...
-
-    def residual(self, h: float, t: float) -> tuple[float, float]:
-        """Out-of-balance force of the step to the time t (s), into bench.out.
-
-        Makes `new` what belongs to bench.shift. Returns the norm of the force on the free dofs
-        and that of the forces at play, N.
-        """
-        ...
-
-    def keep_on(
-        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
-        most: int,
-    ) -> tuple[int, float, int] | None:  # fmt: skip
-        """`Newton._keep_on` as one compiled function for matrices with a `band`, or None."""
-        ...
-
-    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
-        """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
-        ...
-
-    def works(self, h: float) -> tuple[float, float]:
-        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
-        ...
-
-    def change(self, h: float) -> NDArray:
-        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
-        ...
-
-    def accept(self, h: float) -> None:
-        """Make the end of the step the beginning of the next one."""
-        ...
-
-
-class Bench:
-    """Arrays and compiled parts that the steps of a motion work with.
+class Scheme(ABC):
+    """Steps from `old` to `new`, whose unknown is the displacement in a step, `shift`.
 
     Parameters
     ----------
@@ -97,7 +82,20 @@ class Bench:
         The case.
     course : Course
         Where the motion stands: q, w and a of `old` are its arrays.
+
+    Attributes
+    ----------
+    symmetric : bool
+        Whether the tangent is.
+    tolerance : float
+        Residual, relative to the forces at play, with which a step is accepted.
+    facts : mapping
+        Parameters, for the result's attributes.
     """
+
+    symmetric: ClassVar[bool]
+    tolerance: ClassVar[float]
+    facts: Mapping[str, float] = {}
 
     def __init__(self, packed: Packed, course: Course) -> None:
         self.packed, self.course = packed, course
@@ -117,11 +115,50 @@ class Bench:
         self.rounding = EPS * float(np.linalg.norm(packed.body.scale()))
         self.folds = np.zeros_like(self.work.fold_angle)  # at old.q, rad
 
+    @abstractmethod
+    def weights(self, h: float) -> Weights:
+        """Factors of the matrices for a step h (s)."""
+
+    @abstractmethod
+    def residual(self, h: float, t: float) -> tuple[float, float]:
+        """Out-of-balance force of the step to the time t (s), into `out`.
+
+        Makes `new` what belongs to `shift`. Returns the norm of the force on the free dofs and that
+        of the forces at play, N.
+        """
+
+    @abstractmethod
+    def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
+        """Fill the stiffness blocks at new.q; see `Blocks.put` for `before` and `again`."""
+
+    @abstractmethod
+    def works(self, h: float) -> tuple[float, float]:
+        """Work of loads, supports and actuators in the step, and energy dissipated, J."""
+
+    @abstractmethod
+    def change(self, h: float) -> NDArray:
+        """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
+
+    def iterate(
+        self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
+        most: int,
+    ) -> tuple[int, float, int]:  # fmt: skip
+        """Iterate with the matrix as it is; returns what `judge` says, the residual, how often."""
+        norm = np.inf
+        for steps in range(most):
+            norm, reference = self.residual(h, t)
+            verdict = judge(goal, norm, reference, last, lowest)
+            if verdict != GO_ON:
+                return verdict, norm, steps
+            lowest, last = min(lowest, norm), norm
+            self.earlier[:] = self.new.q
+            self.shift -= matrix.solve(self.out, self.step)
+        return NOT_CONVERGED, norm, most
+
     def begin(self, t: float) -> None:
-        """Make forces and accelerations of `old` those at the time t (s)."""
+        """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        packed = self.packed
-        acceleration(packed.model, packed.system, packed.mass, old.q, old.w, t, old.a, self.work, s)
+        acceleration(*self.packed.arrays, old.q, old.w, t, old.a, self.work, s)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -164,12 +201,11 @@ class Bench:
 
     def push(self, phase: Phase, change: NDArray) -> NDArray:
         """Force (n, 3) that a change (h,) of the factors exerts at a phase, N; uses `out`."""
-        packed, s = self.packed, self.scratch
-        model, system, mass = packed.model, packed.system, packed.mass
+        s = self.scratch
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
             s.factor[:, 0] += moved
-            acceleration(model, system, mass, phase.q, phase.w, 0.0, self.earlier, self.work, s)
+            acceleration(*self.packed.arrays, phase.q, phase.w, 0.0, self.earlier, self.work, s)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out
@@ -184,7 +220,7 @@ class Bench:
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
     def accept(self, h: float) -> None:
-        """Make `new` the `old` one."""
+        """Make the end of a step h (s) the beginning of the next one."""
         speed = self.shift / h
         self._growth[:] = (speed - self._speed) / (0.5 * (h + self._last))
         self._speed[:], self._last = speed, h
@@ -193,22 +229,98 @@ class Bench:
         self.folds[:] = self.work.fold_angle
 
 
+class Newton:
+    """Newton's method with the matrix that it keeps from one step to the next."""
+
+    def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
+        self.scheme, self.matrix = scheme, matrix
+        self.iterations = 0
+        self.evaluations = 0
+        self._h = 0.0  # of the last factorization
+        self._lasting = False  # whether a matrix served a whole step: the next one begins with it
+
+    def prepare(self, h: float, t: float) -> None:
+        """Have everything compiled that a step needs."""
+        scheme = self.scheme
+        scheme.shift[:] = 0.0
+        scheme.residual(h, t)
+        scheme.tangent(self.matrix, scheme.displacement(), False)
+        scheme.works(h)
+
+    def renew(self, h: float) -> bool:
+        """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
+        self.scheme.tangent(self.matrix, self.scheme.displacement(), False)
+        try:
+            self.matrix.factorize(self.scheme.weights(h))
+        except SingularTangentError:
+            return False
+        self._h = h
+        return True
+
+    def solve(self, h: float, t: float) -> int:
+        """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
+
+        Returns `SOLVED`, or why not.
+        """
+        scheme, matrix = self.scheme, self.matrix
+        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
+        kept = self._lasting and abs(h - self._h) < SAME_STEP * h
+        last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
+        before, again = scheme.displacement().copy(), False
+        while left > 0:
+            verdict, norm, steps = scheme.iterate(matrix, goal, h, t, last, lowest, left)
+            self.iterations += steps
+            self.evaluations += steps + 1
+            left, again = left - steps, again or steps > 0
+            if verdict != NEW_MATRIX:
+                self._lasting = verdict == SOLVED and matrix.factorizations <= made + 1
+                return verdict
+            lowest = min(lowest, norm)
+            if again:
+                before = scheme.carried(scheme.earlier, scheme.new.factor)
+            scheme.tangent(matrix, before, again)
+            try:
+                matrix.factorize(scheme.weights(h))
+            except SingularTangentError:
+                break
+            self._h, last, again = h, norm, True
+            scheme.earlier[:] = scheme.new.q
+            scheme.shift -= matrix.solve(scheme.out, scheme.step)
+            self.iterations += 1
+            left -= 1
+        self._lasting = False
+        return NOT_CONVERGED
+
+
 @kernel
-def clear_supported(system, force):
-    """Sum of squares of a force (n, 3) at the supports, N2, where it becomes zero."""
-    values, total = flat(force), 0.0
+def norms(system, force, inertia, factor):
+    """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
+
+    The force becomes zero at the supports, where it is a reaction.
+
+    inertia : sum of squares of the inertial forces, N2.
+    factor : (h, 3) of the histories, for the loads.
+    """
+    values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
     for k in range(system.supported.size):
         dof = system.supported[k]
-        total += values[dof] * values[dof]
+        reactions += values[dof] * values[dof]
         values[dof] = 0.0
-    return total
+    loads = system.loads
+    for k in range(loads.dof.size):
+        load = loads.value[k] * factor[loads.row[k], 0]
+        pushed += load * load
+    for i in range(values.size):
+        left += values[i] * values[i]
+    return np.sqrt(left), np.sqrt(max(inertia, reactions, pushed))
 
 
 @kernel
-def load_square(system, factor):
-    """Sum of squares of the loads for factors (h, 3), N2."""
-    loads, total = system.loads, 0.0
+def add_load_work(loads, before, after, shift, work):
+    """`work` (J) and that of the loads along a shift (n, 3), for factors (h, 3) at its ends."""
+    along = flat(shift)
     for k in range(loads.dof.size):
-        load = loads.value[k] * factor[loads.row[k], 0]
-        total += load * load
-    return total
+        row = loads.row[k]
+        mean = 0.5 * (before[row, 0] + after[row, 0])
+        work += loads.value[k] * mean * along[loads.dof[k]]
+    return work

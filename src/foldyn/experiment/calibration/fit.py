@@ -1,4 +1,4 @@
-"""`fit`: least squares over parameters of a case."""
+"""`fit`: least squares over parameters of a case; every evaluation of the model is kept."""
 
 from __future__ import annotations
 
@@ -7,21 +7,26 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from foldyn.errors import ComputationError
-from foldyn.experiment.calibration.evaluations import Evaluations
+from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.calibration.fit_problem import Problem, problem
-from foldyn.experiment.calibration.fitted import Descent, Estimate, Fit, score
+from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score, spread
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.experiment.calibration.uncertainty import Uncertainty, uncertainty
+from foldyn.store import Store, name_of
 from foldyn.values import number, whole
+from foldyn.workers import Workers
+from foldyn.writing import remove_leftovers
+from foldyn.writing import whole as whole_file
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
@@ -42,6 +47,11 @@ WHY = {
 
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
+
+Outcome = NDArray[np.float64] | str
+"""All predictions in a row, or why there are none."""
+Values = tuple[float, ...]
+"""Of the parameters."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,7 @@ def fit(
     case : path
         A case file of kind "statics" or "dynamics".
     data : sequence of Measurement
-        `ForceDisplacement`, `Shapes`, `History`, `Spectrum`.
+        `ForceDisplacement`, `Shapes`, `TimeHistory`, `Spectrum`.
     parameters : sequence of Parameter
     ties : mapping of str to str, optional
         Keys that follow parameters, ``{"model.fold_law.theta2": "360 - model.fold_law.theta1"}``.
@@ -110,9 +120,9 @@ def fit(
     Raises
     ------
     InputError
-        Anything cannot be used; the message says what and why.
+        An argument or a file cannot be used; the message says what and why.
     ComputationError
-        No search found an end.
+        No search converged.
 
     Notes
     -----
@@ -124,74 +134,54 @@ def fit(
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
-    best = [math.inf]
-
-    def tell(computed: int, found: int) -> None:
-        if progress is not None:
-            progress(Course(computed, found, best[0]))
-
-    kept = None if folder is None else Path(folder)
-    with Evaluations(made, processes, kept, tell) as evaluations:
-        searches = [_Search(made, evaluations, best) for _ in points]
-        if processes > 1 and starts > 1:
-            descents = _at_a_time(min(starts, processes), evaluations, searches, points)
+    pool = Workers(processes) if processes > 1 else None
+    with pool or nullcontext():
+        evaluations = Evaluations(made, pool, folder, progress)
+        search = _Search(made, evaluations)
+        if pool is not None and starts > 1:
+            descents = _at_a_time(min(starts, processes), pool, search, points)
         else:
-            descents = [one.descend(point) for one, point in zip(searches, points, strict=True)]
+            descents = [search.descend(point) for point in points]
         lowest = min(descents, key=lambda one: one.cost)
         if not math.isfinite(lowest.cost):
-            raise ComputationError(f"no search found an end: {lowest.message}")
+            raise ComputationError(f"no search converged: {lowest.message}")
         values = np.array(lowest.values)
-        known = searches[0].uncertainty(values, confidence)
-        predicted = _split(made, _sound(evaluations.at([values])[0]))
-        spent = evaluations.computed + evaluations.found
+        known = search.uncertainty(values, confidence)
+        (best,) = evaluations.at([values])
+        ends = np.cumsum([len(one) for one in made.observed()])
+        predicted = np.split(np.asarray(best), ends[:-1])
     return Fit(
-        _estimates(made, values, known),
-        known.correlation,
-        known.singular_values,
-        known.directions,
-        confidence,
-        known.freedom,
-        known.misfit,
-        tuple(
-            score(one.name, one.held_out, one.unit, one.observed(), said)
-            for one, said in zip(made.measurements, predicted, strict=True)
-        ),
-        tuple(descents),
-        made,
-        tuple(predicted),
-        spent,
-        time.perf_counter() - began,
-    )
+        known.estimates(made.space.keys, values), known.correlation, known.singular_values,
+        known.directions, confidence, known.freedom, known.misfit,
+        tuple(map(score, made.measurements, predicted)), tuple(descents), made, tuple(predicted),
+        evaluations.computed + evaluations.found, time.perf_counter() - began,
+    )  # fmt: skip
 
 
 def _at_a_time(
-    count: int,
-    evaluations: Evaluations,
-    searches: Sequence[_Search],
-    points: NDArray[np.float64],
+    count: int, pool: Workers, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
     """Search from several starts in threads, which end where this one is interrupted."""
-    threads = ThreadPoolExecutor(count)
-    try:
-        return list(threads.map(_Search.descend, searches, points))
-    except BaseException:
-        evaluations.stop()
-        raise
-    finally:
-        threads.shutdown(cancel_futures=True)
+    with ThreadPoolExecutor(count) as threads:
+        try:
+            return list(threads.map(search.descend, points))
+        except BaseException:
+            pool.stop()  # threads that wait for it go on with an error
+            threads.shutdown(cancel_futures=True)
+            raise
 
 
 class _Search:
     """A search for the smallest misfit, in parameters over their scales."""
 
-    def __init__(self, made: Problem, evaluations: Evaluations, best: list[float]) -> None:
-        self.made, self.evaluations, self.best = made, evaluations, best
+    def __init__(self, made: Problem, evaluations: Evaluations) -> None:
+        self.made, self.evaluations = made, evaluations
         space = made.space
         self.scale = space.column("scale")
         self.lower, self.upper = space.column("lower"), space.column("upper")
         observed = made.observed()
         weights = [
-            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or _spread(seen)))
+            np.full(len(seen), 0.0 if one.held_out else 1.0 / (one.sigma or spread(seen)))
             for one, seen in zip(made.measurements, observed, strict=True)
         ]
         self.weight = np.concatenate(weights)
@@ -201,11 +191,11 @@ class _Search:
     def descend(self, start: NDArray[np.float64]) -> Descent:
         """Search from a start."""
         begin = tuple(start.tolist())
-        (first,) = self.evaluations.at([start])
-        if isinstance(first, str):
-            return Descent(begin, begin, math.inf, 1, first, False)
         try:
-            found = least_squares(
+            (first,) = self.evaluations.at([start])
+            if isinstance(first, str):
+                raise ComputationError(first)
+            end = least_squares(
                 lambda z: self._residual([z * self.scale])[0],
                 start / self.scale,
                 lambda z: self._jacobian(z * self.scale, both_sides=False),
@@ -214,27 +204,27 @@ class _Search:
             )  # fmt: skip
         except ComputationError as error:
             return Descent(begin, begin, math.inf, 1, str(error), False)
-        values = tuple((found.x * self.scale).tolist())
-        return Descent(
-            begin, values, float(found.cost), int(found.nfev), WHY[found.status], found.status > 0
-        )
+        values = tuple((end.x * self.scale).tolist())
+        why = WHY[end.status]
+        return Descent(begin, values, float(end.cost), int(end.nfev), why, end.status > 0)
 
     def uncertainty(self, values: NDArray[np.float64], confidence: float) -> Uncertainty:
         """How well the parameters are known at the end of a search."""
         jacobian = self._jacobian(values, both_sides=True)
         near = STEP * self.scale
         at_bound = (values - self.lower < near) | (self.upper - values < near)
-        return uncertainty(jacobian, self._residual([values])[0], self.scale, at_bound, confidence)
+        (residual,) = self._residual([values])
+        return Uncertainty.of(jacobian, residual, self.scale, at_bound, confidence)
 
     def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
         residuals = []
-        for said in self.evaluations.at(points):
-            if isinstance(said, str):
+        for predicted in self.evaluations.at(points):
+            if isinstance(predicted, str):
                 residuals.append(np.full(int(self.chosen.sum()), np.inf))
                 continue
-            residual = ((said - self.observed) * self.weight)[self.chosen]
-            self.best[0] = min(self.best[0], 0.5 * float(residual @ residual))
+            residual = ((predicted - self.observed) * self.weight)[self.chosen]
+            self.evaluations.cost = min(self.evaluations.cost, 0.5 * float(residual @ residual))
             residuals.append(residual)
         return residuals
 
@@ -243,19 +233,17 @@ class _Search:
         points = [values]
         pairs: list[tuple[int, int, float]] = []  # points of each quotient, and their distance
         for k, scale in enumerate(self.scale):
-            up, down = (values.copy() for _ in range(2))
-            up[k] += STEP * scale
-            down[k] -= STEP * scale
-            above, below = up[k] <= self.upper[k], down[k] >= self.lower[k]
-            sides = [side for side, fits in ((up, above), (down, below)) if fits]
+            step = np.zeros(len(values))
+            step[k] = STEP * scale
+            both = values + step, values - step
+            sides = [side for side in both if self.lower[k] <= side[k] <= self.upper[k]]
             if not sides:
                 raise ComputationError(
                     f"{self.made.space.keys[k]}: the bounds are closer than {STEP:g} of its scale"
                 )
-            sides = sides if both_sides else sides[:1]
-            points += sides
-            first = len(points) - len(sides)
-            end = first + 1 if len(sides) == 2 else 0
+            first = len(points)
+            points += sides if both_sides else sides[:1]
+            end = first + 1 if len(points) == first + 2 else 0
             pairs.append((first, end, (points[first][k] - points[end][k]) / scale))
         residuals = self._residual(points)
         with np.errstate(invalid="ignore"):  # where the model fails
@@ -269,34 +257,95 @@ class _Search:
         return np.stack(columns, axis=1)
 
 
-def _spread(observed: NDArray[np.float64]) -> float:
-    """Size of measured values, by which they are weighed where their error is not known."""
-    return float(np.std(observed)) or float(np.abs(observed).max()) or 1.0
+class Evaluations:
+    """Predictions of a model at values of its parameters, each computed once.
+
+    Several threads may ask at a time.
+
+    Parameters
+    ----------
+    problem : Problem
+    pool : Workers, optional
+        Evaluate; by default this process does.
+    folder : path, optional
+        Keeps every evaluation; those that are there are not computed again.
+    progress : callable, optional
+        Called with a `Course` after each.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        pool: Workers | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        progress: Callable[[Course], None] | None = None,
+    ) -> None:
+        self.problem, self.pool, self.progress = problem, pool, progress
+        self.folder = None if folder is None else Path(folder)
+        self.computed, self.found, self.cost = 0, 0, math.inf
+        self._known: dict[Values, Outcome] = {}
+        self._lock = Lock()
+        self._digest = problem.digest()
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(self.folder)
+
+    def at(self, points: Sequence[NDArray]) -> list[Outcome]:
+        """Predictions at several points, at the same time where there is a pool."""
+        wanted = [tuple(map(float, point)) for point in points]
+        new = [values for values in dict.fromkeys(wanted) if not self._look(values)]
+        evaluate = partial(_evaluate, self.problem)
+        if self.pool is None:
+            for values in new:
+                self._keep(values, evaluate(values))
+        else:
+            self.pool.each(evaluate, new, self._keep)
+        return [self._known[values] for values in wanted]
+
+    def _look(self, values: Values) -> bool:
+        """Whether a point is known, or kept in the folder."""
+        if values not in self._known and self.folder is not None:
+            name = name_of([self._digest, values])
+            outcome = KEPT.find(self.folder / f"{name}.npz", name)
+            if outcome is not None:
+                self._count(values, outcome, found=1)
+        return values in self._known
+
+    def _keep(self, values: Values, outcome: Outcome) -> None:
+        if self.folder is not None:
+            name = name_of([self._digest, values])
+            KEPT.keep(self.folder / f"{name}.npz", name, outcome)
+        self._count(values, outcome, computed=1)
+
+    def _count(self, values: Values, outcome: Outcome, computed: int = 0, found: int = 0) -> None:
+        self._known[values] = outcome
+        with self._lock:
+            self.computed += computed
+            self.found += found
+            if self.progress is not None:
+                self.progress(Course(self.computed, self.found, self.cost))
 
 
-def _estimates(
-    made: Problem, values: NDArray[np.float64], known: Uncertainty
-) -> tuple[Estimate, ...]:
-    at_bound = np.isnan(known.standard_error)
-    return tuple(
-        Estimate(
-            key, float(value), float(error), float(value - half), float(value + half),
-            bool(determined), bool(held),
-        )
-        for key, value, error, half, determined, held in zip(
-            made.space.keys, values, known.standard_error, known.half_width, known.determined,
-            at_bound, strict=True,
-        )
-    )  # fmt: skip
+def _read(file: Path) -> tuple[str, Outcome]:
+    with np.load(file) as kept:
+        predicted = kept["predicted"]
+        if predicted.dtype != np.float64 or predicted.ndim != 1:
+            raise ValueError
+        return str(kept["stamp"]), str(kept["failure"]) or predicted
 
 
-def _sound(said: NDArray[np.float64] | str) -> NDArray[np.float64]:
-    if isinstance(said, str):
-        raise ComputationError(said)
-    return said
+def _write(file: Path, stamp: str, outcome: Outcome) -> None:
+    failed = isinstance(outcome, str)
+    predicted, failure = (np.zeros(0), outcome) if failed else (outcome, "")
+    with whole_file(file) as part:
+        np.savez(part, predicted=predicted, failure=np.array(failure), stamp=np.array(stamp))
 
 
-def _split(made: Problem, said: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Predictions of each measurement."""
-    lengths = [len(one) for one in made.observed()]
-    return np.split(said, np.cumsum(lengths)[:-1])
+KEPT: Store[Outcome] = Store(_read, _write, warns=False)
+
+
+def _evaluate(problem: Problem, values: Values) -> Outcome:
+    try:
+        return np.concatenate(problem.predict(values))
+    except (InputError, ComputationError) as error:
+        return str(error)

@@ -1,27 +1,30 @@
-"""What `foldyn fit` leaves for people to look at: figures and a page."""
+"""What `foldyn fit` leaves for people to look at: figures, measured beside model, and a page."""
 
 from __future__ import annotations
 
 import math
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.experiment.calibration import fit_figures
-from foldyn.experiment.calibration.fit_problem import Run
+from foldyn.cases.supports import AXES
+from foldyn.experiment.calibration.fit_problem import Computation
 from foldyn.experiment.calibration.fitted import Fit
-from foldyn.experiment.calibration.measured_motions import History, Spectrum
-from foldyn.experiment.calibration.measured_paths import ForceDisplacement, Shapes
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.plots import style
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 from foldyn.writing import whole
 
+WIDTH = 9.0  # inches
+MOST = 8
+"""Nodes, and shapes, that a figure shows at most."""
 POINTS = 25
 """Points of the curve that is drawn through measured forces."""
 
@@ -31,22 +34,18 @@ def write_fit(fit: Fit, folder: str | Path, title: str = "", note: str = "") -> 
     folder = Path(folder)
     sections: list[Section] = [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
     if len(fit.estimates) > 1:
-        picture = folder / "correlation.png"
-        _save(fit_figures.plot_correlation(fit), picture, note)
-        sections.append(
-            Picture(
-                picture,
-                "Correlation of the parameters: near 1 or -1 two of them can hardly be told apart, "
-                "and their intervals are long in one direction.",
-            )
+        caption = (
+            "Correlation of the parameters: where it is near 1 or -1, the data hardly tell two of "
+            "them apart, and their intervals are long in one direction."
         )
+        sections.append(_saved(plot_correlation(fit), folder / "correlation.png", caption, note))
     if not all(one.determined for one in fit.estimates):
         sections.append(Text(_blind(fit)))
     sections += [Heading("Measured and model"), _scores(fit)]
     for i, one in enumerate(fit.problem.measurements):
-        picture = _draw(fit, i, one, folder, note)
-        if picture is not None:
-            sections.append(Picture(picture, _caption(one)))
+        figure = _figure(fit, i, one)
+        if figure is not None:
+            sections.append(_saved(figure, folder / f"data-{i}.png", _caption(one), note))
     sections += [Heading("The search"), _searches(fit)]
     return write_report(
         folder / "report.html", title or f"Fit of {fit.problem.path.stem}", sections
@@ -56,7 +55,7 @@ def write_fit(fit: Fit, folder: str | Path, title: str = "", note: str = "") -> 
 def _parameters(fit: Fit) -> Table:
     percent = f"{100.0 * fit.confidence:g} %"
     rows = [
-        [one.key, one.value, *(_finite(v) for v in (one.standard_error, one.lower, one.upper)),
+        [one.key, one.value, *(cell(v) for v in (one.standard_error, one.lower, one.upper)),
          one.note] for one in fit.estimates
     ]  # fmt: skip
     changes = fit.problem.space.changes([*fit.values.values()])
@@ -68,35 +67,28 @@ def _parameters(fit: Fit) -> Table:
 
 def _quality(fit: Fit) -> str:
     given = all(one.sigma is not None for one in fit.problem.measurements if not one.held_out)
-    told = f"The intervals are from the Jacobian at the optimum and Student's t with {fit.freedom} "
-    told += "degrees of freedom; they hold where the model is right and its errors are random."
+    text = f"The intervals are from the Jacobian at the optimum and Student's t with {fit.freedom} "
+    text += "degrees of freedom; they hold if the model is right and its errors are random."
     if given and math.isfinite(fit.misfit):
-        told += (
-            f" The misfit is {fit.misfit:.3g} times what the standard errors of the data explain"
-            + (
-                ": the model is wrong somewhere, or they are too small."
-                if fit.misfit > 1.5
-                else "."
-            )
-        )
-    return told
+        text += f" The misfit is {fit.misfit:.3g} times what the data's standard errors explain"
+        wrong = ": the model is wrong somewhere, or they are too small"
+        text += f"{wrong if fit.misfit > 1.5 else ''}."
+    return text
 
 
 def _blind(fit: Fit) -> str:
     weak = [one.key for one in fit.estimates if not one.determined and not one.at_bound]
     lines = []
     for value, row in zip(fit.singular_values, fit.directions, strict=True):
-        parts = [
-            f"{part:+.2f} {key}" for part, key in zip(row, fit.values, strict=True)
-            if abs(part) > 0.1
-        ]  # fmt: skip
-        lines.append(f"{value:.3g}: {', '.join(parts)}")
+        parts = [f"{part:+.2f} {key}" for part, key in zip(row, fit.values, strict=True)
+                 if abs(part) > 0.1]  # fmt: skip
+        if parts:
+            lines.append(f"{value:.3g}: {', '.join(parts)}")
     return (
         f"The data do not determine {' and '.join(weak)}: other values fit as well. Measure "
-        "something that depends on them, or leave them as they are known otherwise. Singular "
-        "values, each with the change of the parameters (in their scales) that it belongs to: "
-        + "; ".join(line for line in lines if not line.endswith(": "))
-        + "."
+        "something that depends on them, or fix them at values known from elsewhere. Singular "
+        "values, each with its change of the parameters (in their scales): "
+        f"{'; '.join(lines)}."
     )
 
 
@@ -109,55 +101,52 @@ def _scores(fit: Fit) -> Table:
 def _searches(fit: Fit) -> Table:
     keys = [key.rsplit(".", 1)[-1] for key in fit.values]
     rows = [
-        [*one.start, *one.values, _finite(one.cost), one.evaluations, one.message]
+        [*one.start, *one.values, cell(one.cost), one.evaluations, one.message]
         for one in fit.descents
     ]
     header = [*(f"{key}, start" for key in keys), *(f"{key}, end" for key in keys),
               "cost", "steps", "why it ended"]  # fmt: skip
-    told = f"{fit.evaluations} evaluations of the model in all."
+    text = f"{fit.evaluations} evaluations of the model in all."
     if len(rows) > 1:
-        told = f"{fit.agreeing} of {len(rows)} searches ended at the smallest cost. {told}"
-    return Table(header, rows, told)
+        text = f"{fit.agreeing} of {len(rows)} searches ended at the smallest cost. {text}"
+    return Table(header, rows, text)
 
 
 def _caption(one: Measurement) -> str:
-    told = f"{one.name}: {one.label} and model."
-    if isinstance(one, History | Spectrum) and one.values.shape[1] > fit_figures.MOST:
-        told += f" The first {fit_figures.MOST} of {one.values.shape[1]} nodes."
-    return f"{told} Held out: the fit did not use it." if one.held_out else told
+    text = f"{one.name}: {one.label} and model."
+    if isinstance(one, TimeHistory | Spectrum) and one.values.shape[1] > MOST:
+        text += f" The first {MOST} of {one.values.shape[1]} nodes."
+    return f"{text} Held out: the fit did not use it." if one.held_out else text
 
 
-def _draw(fit: Fit, number: int, one: Measurement, folder: Path, note: str) -> Path | None:
-    """Draw one measurement; returns its picture's path, None where there is nothing to draw."""
+def _figure(fit: Fit, number: int, one: Measurement) -> Figure | None:
+    """Figure of one measurement; None where there is nothing to draw."""
     run = next(run for run in fit.problem.runs if number in run.members)
     values = [*fit.values.values()]
     case = fit.problem.case_file(run, values).case()
-    result = partial(fit.problem.result, run, values)
     if isinstance(one, ForceDisplacement):
-        figure = fit_figures.plot_forces(one, _curve(fit, run, one, case))
-    elif isinstance(one, Shapes):
-        if len(one.axes) < 2:
-            return None
-        figure = fit_figures.plot_shapes(one, case, one.shapes(result(), case))
-    elif isinstance(one, History):
-        figure = fit_figures.plot_histories(one, case, one.curves(result(), case))
-    elif isinstance(one, Spectrum):
-        figure = fit_figures.plot_spectra(one, case, one.spectra(result(), case))
-    else:
+        return plot_forces(one, _curve(fit, run, one, case))
+    if isinstance(one, Shapes) and len(one.axes) < 2:
         return None
-    picture = folder / f"data-{number}.png"
-    _save(figure, picture, note)
-    return picture
+    result = fit.problem.result(run, values)
+    if isinstance(one, Shapes):
+        return plot_shapes(one, case, one.shapes(result, case))
+    if isinstance(one, TimeHistory):
+        return plot_histories(one, case, one.curves(result, case))
+    if isinstance(one, Spectrum):
+        return plot_spectra(one, case, one.spectra(result, case))
+    return None
 
 
-def _save(figure: Figure, picture: Path, note: str) -> None:
+def _saved(figure: Figure, file: Path, caption: str, note: str) -> Picture:
     style.title_above(figure, note)
-    with whole(picture) as part:
+    with whole(file) as part:
         style.finish(figure).savefig(part)
+    return Picture(file, caption)
 
 
 def _curve(
-    fit: Fit, run: Run, one: ForceDisplacement, case: Case
+    fit: Fit, run: Computation, one: ForceDisplacement, case: Case
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Displacements and forces of the model from 0 to beyond the measured ones."""
     ends = min(0.0, one.displacement.min()), max(0.0, one.displacement.max())
@@ -167,5 +156,164 @@ def _curve(
     return along, dense.predicted(result, case)
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def plot_forces(
+    one: ForceDisplacement, curve: tuple[NDArray[np.float64], NDArray[np.float64]]
+) -> Figure:
+    """Draw measured forces over displacements, on the curve of the fitted model.
+
+    Parameters
+    ----------
+    one : ForceDisplacement
+    curve : (ndarray, ndarray)
+        Displacements (m) and forces (N) of the model.
+    """
+    figure = style.new_figure(6.0, 3.8)
+    axes = figure.subplots()
+    title = f"{one.name}, held out" if one.held_out else ""
+    style.frame(axes, f"{one.axis} displacement (mm)", f"{one.axis} force (N)", title)
+    axes.plot(1e3 * curve[0], curve[1], color=style.BLUE, linewidth=1.5, label="model")
+    axes.errorbar(
+        1e3 * one.displacement, one.force, yerr=one.sigma, fmt="o", markersize=5,
+        color=style.VERMILLION, capsize=3, linestyle="none", label=one.label,
+    )  # fmt: skip
+    axes.set_ylim(bottom=min(0.0, *axes.get_ylim()))
+    axes.legend(fontsize=style.TICK, frameon=False)
+    return style.finish(figure)
+
+
+def plot_shapes(one: Shapes, case: Case, model: NDArray[np.float64]) -> Figure:
+    """Draw measured points and those of the model, a frame for each load factor.
+
+    The plane is that of the two measured axes along which the nodes lie farthest apart; lines are
+    bars of the structure between measured nodes.
+
+    Parameters
+    ----------
+    one : Shapes
+        Of at least two axes.
+    case : Case
+        Of the fitted model.
+    model : ndarray, shape (s, m, a)
+        As `Shapes.shapes` gives it.
+    """
+    nodes = one.where(case)
+    across, up = _plane(one, case)
+    rest = case.structure.nodes[nodes]
+    letters = [AXES.index(axis) for axis in one.axes]
+    origin = rest[:, letters] if one.quantity == "displacement" else 0.0
+    steps = np.linspace(0, len(one.load_factor) - 1, min(MOST, len(one.load_factor))).astype(int)
+    span = [np.ptp((model + origin)[..., k]) for k in (across, up)]
+    shape = min(max(span[1] / span[0], 0.3), 1.6) if span[0] > 0.0 else 1.6
+    columns = min(len(steps), 4)
+    figure, frames = _frames(len(steps), columns, WIDTH / columns * shape + 0.6, 0.5, sharey=True)
+    place = {int(node): k for k, node in enumerate(nodes)}
+    bars = [(place[a], place[b]) for a, b in case.structure.bars.tolist()
+            if a in place and b in place]  # fmt: skip
+    for index, (frame, step) in enumerate(zip(frames, steps, strict=True)):
+        left = f"{one.axes[up]} (mm)" if index % columns == 0 else ""
+        title = f"load factor {one.load_factor[step]:.3g}"
+        style.frame(frame, f"{one.axes[across]} (mm)", left, title)
+        there, seen = 1e3 * (model[step] + origin), 1e3 * (one.values[step] + origin)
+        for a, b in bars:
+            ends = there[[a, b]]
+            frame.plot(ends[:, across], ends[:, up], color=style.SKY, linewidth=0.8, zorder=1)
+        frame.plot(there[:, across], there[:, up], ".", color=style.BLUE, label="model")
+        frame.plot(
+            seen[:, across], seen[:, up], "o", markersize=6, mfc="none", color=style.VERMILLION,
+            label=one.label,
+        )  # fmt: skip
+        frame.set_aspect("equal")
+    if one.axes[up] == "x" and not frames[0].yaxis_inverted():
+        frames[0].invert_yaxis()  # pressed along x: as it stands in a test
+    handles, _ = frames[0].get_legend_handles_labels()
+    style.legend_below(figure, handles[-2:], columns=2)
+    return style.finish(figure)
+
+
+def plot_histories(one: TimeHistory, case: Case, model: NDArray[np.float64]) -> Figure:
+    """Draw measured histories, those of the model and the differences, without trend.
+
+    Parameters
+    ----------
+    one : TimeHistory
+    case : Case
+    model : ndarray, shape (t, m)
+        As `TimeHistory.curves` gives it.
+    """
+    measured, model = one.values - one.trend(one.values), model - one.trend(model)
+    labels = "time (s)", f"{one.axis} displacement (mm)"
+    return _beside(one, one.where(case), one.time, measured, model, labels, model - measured)
+
+
+def plot_spectra(one: Spectrum, case: Case, model: NDArray[np.float64]) -> Figure:
+    """Draw measured amplitude spectra beside those of the model; arguments as `plot_histories`."""
+    labels = "frequency (Hz)", f"{one.axis} amplitude (mm)"
+    return _beside(one, one.where(case), one.frequency, one.values, model, labels)
+
+
+def plot_correlation(fit: Fit) -> Figure:
+    """Draw the correlation of the parameters of a fit."""
+    keys = [key.rsplit(".", 1)[-1] for key in fit.values]
+    size = 1.2 + 0.6 * len(keys)
+    figure = style.new_figure(size + 1.2, size)
+    axes = figure.subplots()
+    others = np.where(np.eye(len(keys)) > 0.0, 0.0, fit.correlation)
+    axes.imshow(others, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    for (i, j), value in np.ndenumerate(others):
+        text = "1" if i == j else "?" if np.isnan(value) else f"{value:.3f}"
+        color = "white" if abs(value) > 0.6 else style.BLACK
+        axes.text(j, i, text, ha="center", va="center", fontsize=style.LABEL, color=color)
+    axes.set_xticks(range(len(keys)), keys, fontsize=style.TICK, rotation=20, ha="right")
+    axes.set_yticks(range(len(keys)), keys, fontsize=style.TICK)
+    axes.tick_params(length=0)
+    return style.finish(figure)
+
+
+def _beside(
+    one: TimeHistory | Spectrum,
+    nodes: NDArray[np.int64],
+    along: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    model: NDArray[np.float64],
+    labels: Sequence[str],
+    misfit: NDArray[np.float64] | None = None,
+) -> Figure:
+    """Curves of nodes, a frame each: measured, of the model, and the misfit."""
+    shown = nodes[:MOST]
+    columns = min(len(shown), 2)
+    figure, frames = _frames(len(shown), columns, 2.9 if len(shown) <= columns else 2.2, 0.8)
+    lines = []
+    for k, (frame, node) in enumerate(zip(frames, shown, strict=True)):
+        below = labels[0] if k >= len(shown) - columns else ""
+        title = f"node {node}" + (", held out" if one.held_out else "")
+        style.frame(frame, below, labels[1] if k % columns == 0 else "", title)
+        mark = {"marker": ".", "markersize": 3.0, "linestyle": "none"}
+        lines = frame.plot(along, 1e3 * measured[:, k], color=style.VERMILLION, **mark)
+        lines[0].set_label(one.label)
+        lines += frame.plot(along, 1e3 * model[:, k], color=style.BLUE, lw=1.2, label="model")
+        if misfit is not None:
+            label = f"model minus {one.label}"
+            lines += frame.plot(along, 1e3 * misfit[:, k], color=style.GRAY, lw=0.8, label=label)
+        frame.locator_params(axis="y", nbins=6)
+    style.legend_below(figure, lines, columns=3)
+    return style.finish(figure)
+
+
+def _frames(
+    count: int, columns: int, height: float, rest: float, sharey: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """A figure of so many frames; each row has a height (inches), legend and title the rest."""
+    rows = -(-count // columns)
+    figure = style.new_figure(WIDTH, rows * height + rest)
+    frames = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=sharey).ravel()
+    for frame in frames[count:]:
+        frame.set_visible(False)
+    return figure, list(frames[:count])
+
+
+def _plane(one: Shapes, case: Case) -> tuple[int, int]:
+    """Indices in `axes` of the directions drawn across and upwards."""
+    rest = case.structure.nodes[one.where(case)]
+    spans = [np.ptp(rest[:, AXES.index(axis)]) for axis in one.axes]
+    first, second = sorted(np.argsort(spans)[-2:].tolist())
+    return (second, first) if one.axes[first] == "x" else (first, second)

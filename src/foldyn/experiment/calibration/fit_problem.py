@@ -1,4 +1,4 @@
-"""The model of a fit: from values of the parameters to what it says of every measurement."""
+"""The model of a fit: from values of the parameters to predictions of every measurement."""
 
 from __future__ import annotations
 
@@ -17,28 +17,27 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment.calibration.key_paths import replaced, value_at
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.parameters import Parameter, Space, replaced, space, value_at
 from foldyn.program import program
 from foldyn.values import show
 
 STEADY = "generalized_alpha"
-"""Integrator of a fit where the case leaves the choice to us."""
+"""Integrator of a fit where the case file leaves the choice open."""
 ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 """Fields of measurements that do not change what is predicted."""
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One computation that gives several measurements.
+class Computation:
+    """One path or motion that predicts several measurements.
 
     Attributes
     ----------
     path : Path
         Its case file.
     document : dict
-        What that says, with the changes of these measurements.
+        Its content, with the changes of these measurements.
     members : tuple of int
         Numbers of the measurements.
     """
@@ -57,20 +56,20 @@ class Problem:
     path : Path
         The case file.
     document : dict
-        What it says.
+        Its content.
     space : Space
     measurements : tuple of Measurement
-    runs : tuple of Run
+    runs : tuple of Computation
     """
 
     path: Path
     document: dict[str, Any]
     space: Space
     measurements: tuple[Measurement, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[Computation, ...]
 
     def predict(self, values: Sequence[float] | NDArray) -> list[NDArray[np.float64]]:
-        """What the model says of each measurement.
+        """Values that the model gives for each measurement.
 
         Raises
         ------
@@ -79,49 +78,47 @@ class Problem:
         ComputationError
             A path or motion cannot be computed.
         """
-        said: dict[int, NDArray[np.float64]] = {}
+        predicted: dict[int, NDArray[np.float64]] = {}
         for run in self.runs:
             case_file = self.case_file(run, values)
-            members = [self.measurements[i] for i in run.members]
-            result = _result(case_file, members)
+            result = _result(case_file, [self.measurements[i] for i in run.members])
             for i in run.members:
-                said[i] = self.measurements[i].predicted(result, case_file.case())
-        return [said[i] for i in range(len(self.measurements))]
+                predicted[i] = self.measurements[i].predicted(result, case_file.case())
+        return [predicted[i] for i in range(len(self.measurements))]
 
-    def case_file(self, run: Run, values: Sequence[float] | NDArray) -> CaseFile:
-        """Case file of a run at given values; its warnings have been told when it was checked."""
+    def case_file(self, run: Computation, values: Sequence[float] | NDArray) -> CaseFile:
+        """Case file at given values; its warnings were given when it was checked."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             return case_of_document(run.path, replaced(run.document, self.space.changes(values)))
 
     def result(
         self,
-        run: Run,
+        run: Computation,
         values: Sequence[float] | NDArray,
         members: Sequence[Measurement] | None = None,
     ) -> Any:
-        """Path or motion of a run at given values, for its measurements or others."""
-        if members is None:
-            members = [self.measurements[i] for i in run.members]
-        return _result(self.case_file(run, values), members)
+        """Path or motion at given values, for its own measurements or others."""
+        own = [self.measurements[i] for i in run.members]
+        return _result(self.case_file(run, values), members or own)
 
     def observed(self) -> list[NDArray[np.float64]]:
         """Measured values of each measurement."""
         return [one.observed() for one in self.measurements]
 
     def digest(self) -> str:
-        """Digest of all that predictions depend on but for the parameters' values."""
-        found = hashlib.sha256(program("experiment").encode())
-        told = [self.space.keys, [(tie.key, tie.expression) for tie in self.space.ties]]
-        found.update(json.dumps(told).encode())
+        """Digest of everything that predictions depend on, except the parameters' values."""
+        digest = hashlib.sha256(program("experiment").encode())
+        names = [self.space.keys, [(tie.key, tie.expression) for tie in self.space.ties]]
+        digest.update(json.dumps(names).encode())
         for run in self.runs:
-            found.update(json.dumps(run.document, sort_keys=True, default=str).encode())
+            digest.update(json.dumps(run.document, sort_keys=True, default=str).encode())
             state = self.case_file(run, self.space.column("start")).initial()
             for array in () if state is None else (state.displacement, state.velocity):
-                found.update(b"" if array is None else np.asarray(array).tobytes())
+                digest.update(b"" if array is None else np.asarray(array).tobytes())
             for file in sorted(_files(run.document)):
                 there = run.path.parent / file
-                found.update(there.read_bytes() if there.is_file() else b"")
+                digest.update(there.read_bytes() if there.is_file() else b"")
         for one in self.measurements:
             for item in fields(one):
                 if item.name in ASIDE:
@@ -130,8 +127,8 @@ class Problem:
                 if item.name == "values" and not getattr(one, "align", 0.0):
                     value = np.isfinite(value)
                 array = isinstance(value, np.ndarray)
-                found.update(value.tobytes() if array else repr(value).encode())
-        return found.hexdigest()
+                digest.update(value.tobytes() if array else repr(value).encode())
+        return digest.hexdigest()
 
 
 def problem(
@@ -140,13 +137,13 @@ def problem(
     parameters: Sequence[Parameter],
     ties: Mapping[str, str],
 ) -> Problem:
-    """Check all that a fit is told, and make its model.
+    """Check the arguments of a fit, and make its model.
 
     Raises
     ------
     InputError
-        Anything cannot be used: the case files at the values to start from, a measurement that
-        its case cannot give, a parameter that is none.
+        One cannot be used: a case file at the values to start from, a measurement that its case
+        cannot predict, a parameter that the case file does not have.
     """
     try:
         path = Path(case)
@@ -182,13 +179,10 @@ def _check_keys(
     path: Path, document: dict[str, Any], parameters: Sequence[Parameter], ties: Mapping[str, str]
 ) -> None:
     """Refuse keys that no case file has, before it is asked what the file says of them."""
-    for one in parameters:
-        if isinstance(one, Parameter) and value_at(document, one.key) is None:
-            tried = 1.0 if one.start is None else one.start
-            validated(path, replaced(document, {one.key: tried}))
-    for key in ties:
+    starts = {one.key: one.start for one in parameters if isinstance(one, Parameter)}
+    for key, start in (starts | dict.fromkeys(ties)).items():
         if value_at(document, key) is None:
-            validated(path, replaced(document, {key: 1.0}))
+            validated(path, replaced(document, {key: 1.0 if start is None else start}))
 
 
 def _check_sigmas(measurements: Sequence[Measurement]) -> None:
@@ -196,24 +190,24 @@ def _check_sigmas(measurements: Sequence[Measurement]) -> None:
     without = [one for one in fitted if one.sigma is None]
     if len(fitted) > 1 and without:
         raise InputError(
-            f"{without[0].name}: sigma: missing; several measurements are weighed by the standard "
+            f"{without[0].name}: sigma: missing; several measurements are weighted by the standard "
             "errors of their values, so each needs its own"
         )
 
 
 def _runs(
     path: Path, document: dict[str, Any], measurements: Sequence[Measurement]
-) -> list[Run]:  # fmt: skip
+) -> list[Computation]:  # fmt: skip
     """Measurements with the same case and the same changes, together."""
     groups: dict[str, tuple[Path, dict[str, Any], list[int]]] = {}
     for i, one in enumerate(measurements):
-        there = path if one.case is None else Path(one.case)
-        key = json.dumps([str(there), dict(one.changes)], sort_keys=True, default=str)
+        own = path if one.case is None else Path(one.case)
+        key = json.dumps([str(own), dict(one.changes)], sort_keys=True, default=str)
         if key not in groups:
-            said = document if one.case is None else read_document(there)
-            groups[key] = there, replaced(said, one.changes), []
+            content = document if one.case is None else read_document(own)
+            groups[key] = own, replaced(content, one.changes), []
         groups[key][2].append(i)
-    return [Run(there, said, tuple(members)) for there, said, members in groups.values()]
+    return [Computation(own, content, tuple(members)) for own, content, members in groups.values()]
 
 
 def _check(one: Measurement, case_file: CaseFile) -> None:

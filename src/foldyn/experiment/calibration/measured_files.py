@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence, Sized
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,17 @@ from numpy.typing import NDArray
 from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES
-from foldyn.errors import InputError
-from foldyn.experiment.calibration.measured_motions import History, Spectrum
-from foldyn.experiment.calibration.measured_paths import IMPOSED, ForceDisplacement, Shapes
-from foldyn.experiment.calibration.measurement import Measurement, axis_number
-from foldyn.experiment.tracking.store import load_tracks
-from foldyn.values import numbers, show
+from foldyn.errors import InputError, within
+from foldyn.experiment.calibration.measured import (
+    IMPOSED,
+    ForceDisplacement,
+    Shapes,
+    Spectrum,
+    TimeHistory,
+)
+from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.tracking.tracks_dataset import load_tracks
+from foldyn.values import choice, numbers, show
 
 
 def force_displacement(
@@ -32,17 +36,14 @@ def force_displacement(
     ----------
     file : Path
     columns : mapping, optional
-        Headings, where they are not "displacement" and "force".
+        Headings, if they are not "displacement" and "force".
     **known
         Other arguments of `ForceDisplacement`.
     """
     units = {"displacement": "m", "force": "N"}
-    headings = {name: name for name in units} if columns is None else columns
-    if (
-        not isinstance(headings, Mapping)
-        or not {*headings} <= {*units}
-        or not _texts(list(headings.values()))
-    ):
+    headings = {} if columns is None else columns
+    sound = isinstance(headings, Mapping) and {*headings} <= {*units}
+    if not sound or not _texts(list(headings.values())):
         raise InputError(
             f"columns = {show(columns)}: give the headings of displacement and force, as in "
             '{ displacement = "way", force = "load" }'
@@ -62,16 +63,16 @@ def shapes(
         CSV with the columns load_factor, node, and x, y, z as far as they were measured, empty
         where a node was lost; or tracks of photographs (``*.nc`` or ``*.csv``).
     nodes : sequence of int, optional
-        Those to take; all in the file by default.
+        Nodes to take; all in the file by default.
     load_factor : sequence of float, optional
         Of the photographs in tracks.
     **known
         Other arguments of `Shapes`.
     """
-    source = _Source.of(file)
-    names = source.names
-    if source.tracks is not None or "photo" in names:
-        return _shapes_of_tracks(source, nodes, load_factor, **known)
+    tracks, names = _opened(file)
+    if tracks is not None or "photo" in names:
+        moved = _table(file, names) if tracks is None else _moved(file, tracks, "photo")
+        return _shapes_of_tracks(file, moved, nodes, load_factor, **known)
     if load_factor is not None:
         raise InputError(f"{file}: load_factor: leave it out, the file has a column of that name")
     axes = "".join(axis for axis in AXES if axis in names)
@@ -83,22 +84,15 @@ def shapes(
     broken = np.flatnonzero(table["node"] != listed)
     if broken.size:
         raise InputError(f"{file}: node = {table['node'][broken[0]]:g}: must be a whole number")
-    chosen = np.unique(listed).tolist() if nodes is None else _listed(file, nodes)
-    missing = sorted(set(chosen) - set(listed.tolist()))
-    if missing:
-        raise InputError(f"{file}: has no line for node {missing[0]}")
-    values = np.full((len(steps), len(chosen), len(axes)), np.nan)
-    places = {node: k for k, node in enumerate(chosen)}
-    told: set[tuple[int, float]] = set()
-    for line, node in enumerate(listed.tolist()):
-        factor = table["load_factor"][line]
-        if (node, factor) in told:
-            raise InputError(f"{file}: has two lines for node {node} at the load factor {factor:g}")
-        told.add((node, factor))
-        if node in places:
-            step = np.searchsorted(steps, factor)
-            values[step, places[node]] = [table[axis][line] for axis in axes]
-    return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
+    lines, times = np.unique([listed, table["load_factor"]], axis=1, return_counts=True)
+    for node, factor in lines.T[times > 1]:
+        raise InputError(f"{file}: has two lines for node {node:g} at the load factor {factor:g}")
+    every = np.unique(listed)
+    values = np.full((len(steps), len(every), len(axes)), np.nan)
+    place = np.searchsorted(steps, table["load_factor"]), np.searchsorted(every, listed)
+    values[place] = np.stack([table[axis] for axis in axes], axis=1)
+    moved = xr.DataArray(values, {"node": every, "axis": list(axes)}, ("photo", "node", "axis"))
+    return _shapes_of_tracks(file, moved, nodes, steps, **known)
 
 
 def history(
@@ -108,7 +102,7 @@ def history(
     columns: Sequence[str] | None = None,
     window: Sequence[float] | None = None,
     **known: Any,
-) -> History:
+) -> TimeHistory:
     """Histories from a CSV file with a column of times and one for each node, or from tracks.
 
     Parameters
@@ -123,10 +117,10 @@ def history(
     window : (float, float), optional
         First and last time (s) to take.
     **known
-        Other arguments of `History`.
+        Other arguments of `TimeHistory`.
     """
     chosen = _listed(file, nodes)
-    time, values = _motions(_Source.of(file), chosen, axis, columns)
+    time, values = _motions(file, *_opened(file), chosen, axis, columns)
     if window is not None:
         first, last = _range("window", window, "times (s)")
         within = (time >= first) & (time <= last)
@@ -136,7 +130,7 @@ def history(
                 f"{time[0]:.6g} to {time[-1]:.6g} s"
             )
         time, values = time[within], values[within]
-    return _made(History, file, nodes=chosen, time=time, values=values, axis=axis, **known)
+    return _made(TimeHistory, file, nodes=chosen, time=time, values=values, axis=axis, **known)
 
 
 def spectrum(
@@ -149,22 +143,22 @@ def spectrum(
 
 
 def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
-    """Measurement in a file, of the kind that its columns tell.
+    """Measurement in a file; its columns tell the kind.
 
-    Columns displacement and force are forces on all nodes that supports move along the axis; a
-    column load_factor makes shapes; a first column of times, histories of the nodes along the
-    axis, "node 8 x"; as do the tracks of a film, of all nodes that were seen. A node that was seen
-    once only shows no motion and is left out.
+    Columns displacement and force: forces on all nodes that supports move along the axis. A column
+    load_factor: shapes. A first column of times and others such as "node 8 x": histories of the
+    nodes along the axis. Tracks of a film: histories of all nodes that were seen; one that was seen
+    only once shows no motion and is left out.
     """
-    source = _Source.of(file)
-    names = source.names
+    tracks, names = _opened(file)
     if "photo" in names:
         raise InputError(
             f"{file}: holds tracks of photographs, whose load factors only a fit file can name: "
             'kind = "shapes", load_factor = [...]'
         )
-    if source.tracks is not None:
-        moved = _along(file, source.moved("time"), [axis])[..., 0]
+    choice(f"{file}: axis", axis, AXES)
+    if tracks is not None:
+        moved = _moved(file, tracks, "time").sel(axis=axis)
         nodes = moved["node"].values[np.isfinite(moved.values).any(axis=0)].tolist()
         if not nodes:
             raise InputError(f"{file}: no node was measured along {axis}; choose another axis")
@@ -179,67 +173,52 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
                 f'{file}: the columns are {some(names)}; needed are "displacement" and '
                 f'"force", or "load_factor", "node", "x", ..., or "time", "node 8 {axis}", ...'
             )
-    time, values = _motions(source, nodes, axis)
+    time, values = _motions(file, tracks, names, nodes, axis)
     shown = np.isfinite(values).sum(axis=0) != 1
     kept = np.flatnonzero(shown if shown.any() else ~shown)
-    listed = [nodes[k] for k in kept]
-    return _made(
-        History, file, nodes=listed, time=time, values=values[:, kept], axis=axis, **known
-    )  # fmt: skip
+    known |= {"nodes": np.array(nodes)[kept].tolist(), "values": values[:, kept]}
+    return _made(TimeHistory, file, time=time, axis=axis, **known)
 
 
-@dataclass(frozen=True, eq=False)
-class _Source:
-    """A file that has been looked into once.
+def _opened(file: Path) -> tuple[xr.Dataset | None, list[str]]:
+    """Tracks and their dimensions, or None and the names of the columns of a CSV file."""
+    if file.suffix.lower() == ".nc":
+        tracks = load_tracks(file)
+        return tracks, [str(name) for name in tracks.sizes]
+    return None, [name for name, _ in read_headings(file)]
 
-    Attributes
-    ----------
-    file : Path
-    names : list of str
-        Of the columns of a CSV file, or of the dimensions of tracks.
-    tracks : xarray.Dataset or None
-        None for a CSV file.
-    """
 
-    file: Path
-    names: list[str]
-    tracks: xr.Dataset | None
-
-    @classmethod
-    def of(cls, file: Path) -> _Source:
-        if file.suffix.lower() == ".nc":
-            tracks = load_tracks(file)
-            return cls(file, [str(name) for name in tracks.sizes], tracks)
-        return cls(file, [name for name, _ in read_headings(file)], None)
-
-    def moved(self, along: str) -> xr.DataArray:
-        """Displacements of nodes in tracks."""
-        if self.tracks is None or "displacement" not in self.tracks or along not in self.names:
-            what = "a film" if along == "time" else "photographs"
-            raise InputError(
-                f"{self.file}: holds no displacements of nodes over {along}; track {what} with "
-                "--model"
-            )
-        return self.tracks["displacement"]
+def _moved(file: Path, tracks: xr.Dataset, along: str) -> xr.DataArray:
+    """Displacements of nodes in tracks."""
+    if "displacement" not in tracks or along not in tracks.sizes:
+        what = "a film" if along == "time" else "photographs"
+        raise InputError(
+            f"{file}: holds no displacements of nodes over {along}; track {what} with --model"
+        )
+    return tracks["displacement"]
 
 
 def _columns(names: Sequence[str]) -> list[tuple[int, str]]:
     """Nodes and axes of the columns "node 8 x", ..."""
-    found = [re.fullmatch(rf"node (\d+) ([{AXES}])", name) for name in names]
-    return [(int(one[1]), one[2]) for one in found if one]
+    headings = [re.fullmatch(rf"node (\d+) ([{AXES}])", name) for name in names]
+    return [(int(heading[1]), heading[2]) for heading in headings if heading]
 
 
 def _motions(
-    source: _Source, nodes: Sequence[int], axis: str, columns: Sequence[str] | None = None
+    file: Path,
+    tracks: xr.Dataset | None,
+    names: Sequence[str],
+    nodes: Sequence[int],
+    axis: str,
+    columns: Sequence[str] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times, and displacements of nodes along an axis, shape (t, m)."""
-    file, names = source.file, source.names
+    choice(f"{file}: axis", axis, AXES)
     if "photo" in names:
         raise InputError(f'{file}: holds photographs, which have no times; use kind = "shapes"')
-    if source.tracks is not None:
-        moved = _along(file, source.moved("time"), [axis], nodes)
-        return moved["time"].values, moved.values[..., 0]
-    axis_number(f"{file}: axis", axis)
+    if tracks is not None:
+        moved = _of_nodes(file, _moved(file, tracks, "time").sel(axis=axis), nodes)
+        return moved["time"].values, moved.values
     headings = [f"node {n} {axis}" for n in nodes] if columns is None else columns
     if not _texts(headings) or len(headings) != len(nodes):
         raise InputError(
@@ -253,10 +232,9 @@ def _motions(
 
 
 def _shapes_of_tracks(
-    source: _Source, nodes: Any, load_factor: Sequence[float] | None, **known: Any
+    file: Path, moved: xr.DataArray, nodes: Any, load_factor: Any, **known: Any
 ) -> Shapes:
-    file = source.file
-    moved = _table(source) if source.tracks is None else source.moved("photo")
+    """Shapes from displacements along the dimension `photo`, one for each load factor."""
     count = moved.sizes["photo"]
     if not isinstance(load_factor, Sequence | np.ndarray) or len(load_factor) != count:
         raise InputError(
@@ -265,17 +243,18 @@ def _shapes_of_tracks(
     moved = moved.dropna("node", how="all")
     if not moved.size:
         raise InputError(f"{file}: no node was measured in any photograph")
-    chosen = None if nodes is None else _listed(file, nodes)
-    moved = _along(file, moved, moved["axis"].values.tolist(), chosen).dropna("axis", how="all")
+    if nodes is not None:
+        moved = _of_nodes(file, moved, _listed(file, nodes))
+    moved = moved.dropna("axis", how="all")
     return _made(
         Shapes, file, nodes=moved["node"].values.tolist(), load_factor=load_factor,
         values=moved.values, axes="".join(moved["axis"].values), **known,
     )  # fmt: skip
 
 
-def _table(source: _Source) -> xr.DataArray:
+def _table(file: Path, names: Sequence[str]) -> xr.DataArray:
     """Displacements in a CSV file with a line for each photograph, as tracks have them."""
-    file, columns = source.file, _columns(source.names)
+    columns = _columns(names)
     if not columns:
         raise InputError(f'{file}: has no columns "node 8 x", ... of displacements')
     headings = [f"node {node} {axis}" for node, axis in columns]
@@ -288,21 +267,16 @@ def _table(source: _Source) -> xr.DataArray:
     return xr.DataArray(values, axes, ("photo", "node", "axis"))
 
 
-def _along(
-    file: Path, moved: xr.DataArray, axes: Sequence[str], nodes: Sequence[int] | None = None
-) -> xr.DataArray:
-    """Displacements in tracks of nodes, all by default, along axes."""
-    for axis in axes:
-        axis_number(f"{file}: axis", axis)
-    known = moved["node"].values.tolist()
-    missing = sorted(set(nodes or ()) - set(known))
+def _of_nodes(file: Path, moved: xr.DataArray, nodes: Sequence[int]) -> xr.DataArray:
+    """Displacements of some nodes in tracks."""
+    missing = sorted(set(nodes) - set(moved["node"].values.tolist()))
     if missing:
-        raise InputError(f"{file}: node {missing[0]} was not tracked")
-    return moved.sel(node=known if nodes is None else list(nodes), axis=list(axes))
+        raise InputError(f"{file}: node {missing[0]} was not measured")
+    return moved.sel(node=list(nodes))
 
 
 def _listed(file: Path, nodes: Any) -> list[int]:
-    """Numbers of nodes: a file knows nothing of a pattern, so that no expression can be read."""
+    """Numbers of nodes: expressions over a pattern mean nothing to a file."""
     empty = isinstance(nodes, Sized) and not len(nodes)
     chosen = "" if empty else check_nodes(nodes)
     if isinstance(chosen, str):
@@ -324,22 +298,15 @@ def _range(name: str, given: Any, what: str) -> tuple[float, float]:
 
 
 def _made(kind: Any, file: Path, **known: Any) -> Any:
-    """A measurement; what is wrong with it is told with the file."""
-    try:
+    """A measurement; messages on what is wrong with it name the file."""
+    with within("", file):
         return kind(**known)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 READERS: Mapping[str, Any] = {
     ForceDisplacement.kind: force_displacement,
     Shapes.kind: shapes,
-    History.kind: history,
+    TimeHistory.kind: history,
     Spectrum.kind: spectrum,
 }
-"""What reads each kind of measurement: ``reader(file, **arguments)`` gives it."""
-
-
-def read_measurement(kind: str, file: Path, **arguments: Any) -> Measurement:
-    """Read a measurement of one of the kinds of `READERS`."""
-    return READERS[kind](file, **arguments)
+"""Function that reads each kind of measurement: ``reader(file, **arguments)`` returns it."""

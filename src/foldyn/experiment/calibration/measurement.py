@@ -1,4 +1,4 @@
-"""What all measurements have that a case is fitted to."""
+"""What all measurements to which a case is fitted have in common."""
 
 from __future__ import annotations
 
@@ -13,33 +13,32 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.selection import check_nodes, resolve_nodes
-from foldyn.cases.supports import AXES
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.key_paths import parts
-from foldyn.values import number, numbers, show
+from foldyn.experiment.calibration.parameters import parts
+from foldyn.values import number, numbers
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Measurement(ABC):
-    """Measured values, and what the model says of them.
+    """Measured values, and the model's predictions of them.
 
     Parameters
     ----------
     nodes : sequence of int, or str
         Nodes of the structure, or an expression over the pattern's vertices.
     name : str
-        For messages and figures; the kind by default.
+        Its name in messages and figures; the kind by default.
     label : str
         What figures call the data: "measured"; "synthetic" where a model made them.
     sigma : float, optional
         Standard error of one value, in the unit of the values. A fit to several measurements needs
-        it of each: it is what they are weighed by.
+        it for each, to weight them.
     held_out : bool
-        Not fitted: only scored with what the others give.
+        Not fitted, only compared with the result of the fit to the others.
     case : path, optional
-        Case file of this measurement, where it is not that of the whole fit.
+        Case file of this measurement, where it differs from that of the whole fit.
     changes : mapping of str to object
-        Keys of the case file that have other values in this measurement, as
+        Keys of the case file that have other values in this measurement, such as
         ``{"supports[3].displacement": 0.04}``.
     """
 
@@ -53,17 +52,21 @@ class Measurement(ABC):
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     unit: ClassVar[str] = "m"
-    word: ClassVar[str] = ""  # that selects nodes in a way of its own
+    word: ClassVar[str] = ""  # for `nodes`, which only this kind understands
 
     def __post_init__(self) -> None:
         """Check what all have."""
-        object.__setattr__(self, "name", self.name or self.kind)
+        self._set(name=self.name or self.kind)
         if not (isinstance(self.nodes, str) and self.nodes == self.word):
-            object.__setattr__(self, "nodes", check_nodes(self.nodes, self._of("nodes")))
+            self._set(nodes=check_nodes(self.nodes, self._of("nodes")))
         if self.sigma is not None:
             number(self._of("sigma"), self.sigma, above=0.0)
         for key in self.changes:
             parts(key)
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def _of(self, name: str) -> str:
         """Name of a field in messages."""
@@ -83,10 +86,10 @@ class Measurement(ABC):
 
     @abstractmethod
     def predicted(self, result: Any, case: Case) -> NDArray[np.float64]:
-        """What a result says of the measured values, flat and in their order."""
+        """Values that a result gives for the measured ones, flat and in their order."""
 
     def factors(self, case: Case) -> NDArray[np.float64]:
-        """Load factors at which a path is needed; none where it is a motion."""
+        """Load factors at which a path is needed; none for a motion."""
         return np.zeros(0)
 
 
@@ -119,10 +122,3 @@ def column(name: str, values: Any, length: int | None = None) -> NDArray[np.floa
         wanted = "a list of numbers" if length is None else f"a list of {length} numbers"
         raise InputError(f"{name}: shape {array.shape}: must be {wanted}")
     return array
-
-
-def axis_number(name: str, axis: Any) -> int:
-    """Number of an axis by its letter."""
-    if not isinstance(axis, str) or len(axis) != 1 or axis not in AXES:
-        raise InputError(f'{name} = {show(axis)}: must be "x", "y" or "z"')
-    return AXES.index(axis)

@@ -1,19 +1,142 @@
-"""One picture of a moving structure: rays spread over each pixel and over the exposure."""
+"""One picture of a moving structure: its paper, the light, rays over each pixel and exposure."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
-from foldyn.experiment.camera import Camera
-from foldyn.experiment.opencv import opencv
-from foldyn.experiment.rendering.paper import Look, Paper, grain_tile, shading
+from foldyn.experiment.camera import Camera, opencv
+from foldyn.values import number, whole
 
+_TILE = 512  # texels of the grain, repeated over the paper
 _MARGIN = 6  # pixels around the structure that are drawn anew in each picture
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the specimen, the light and the background look like; reflectances from 0 to 1.
+
+    Attributes
+    ----------
+    paper, ink, background : float
+        Reflectance of the paper, of the markers and of what lies behind.
+    marker : float
+        Radius (m) of the markers: around each vertex every other panel is inked, so that the
+        vertex is where lines cross. 0 leaves the paper as it is.
+    grain : float
+        Standard deviation of the paper's reflectance, relative to it.
+    grain_size : float
+        Distance of the texels of the grain (m).
+    light : tuple of float
+        Direction towards the lamp in the camera's axes (right, down, forward).
+    ambient : float
+        Part of the light that comes from all directions.
+    vignette : float
+        Part of the brightness that is missing in the corners of the image.
+    """
+
+    paper: float = 0.85
+    ink: float = 0.3
+    background: float = 0.03
+    marker: float = 5e-3
+    grain: float = 0.02
+    grain_size: float = 1.5e-4
+    light: tuple[float, float, float] = (-0.45, -0.65, -0.6)
+    ambient: float = 0.45
+    vignette: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("paper", "ink", "background", "ambient", "vignette"):
+            number(name, getattr(self, name), least=0.0, most=1.0)
+        for name in ("marker", "grain"):
+            number(name, getattr(self, name), least=0.0)
+        number("grain_size", self.grain_size, above=0.0, unit="m")
+
+
+@dataclass(frozen=True, eq=False)
+class Paper:
+    """Triangles of a structure with what is printed on them.
+
+    Attributes
+    ----------
+    triangles : ndarray, shape (m, 3)
+    flat : ndarray, shape (m, 3, 2)
+        Corners of each triangle in the plane of its panel (m), panels apart from each other.
+    marked : ndarray of bool, shape (m, 3)
+        Corners that are vertices of the pattern.
+    dark : ndarray of bool, shape (m,)
+        Triangles of the panels that are inked around their vertices.
+    """
+
+    triangles: NDArray[np.int64]
+    flat: NDArray[np.float64]
+    marked: NDArray[np.bool_]
+    dark: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, structure: Any, rng: np.random.Generator) -> Paper:
+        """Paper of a `Structure`; the grain of each panel starts at a random place."""
+        triangles = np.asarray(structure.triangles, dtype=np.int64)
+        panels = np.asarray(structure.triangle_panel, dtype=np.int64)
+        nodes, pattern = np.asarray(structure.nodes), structure.pattern
+        flat = np.empty((*triangles.shape, 2))
+        for panel in range(len(pattern.faces)):
+            own = panels == panel
+            points = nodes[triangles[own]]
+            middle = points.mean(axis=(0, 1))
+            axes = np.linalg.svd((points - middle).reshape(-1, 3), full_matrices=False)[2]
+            flat[own] = (points - middle) @ axes[:2].T + rng.uniform(0.0, 1.0, 2)
+        marked = triangles < len(pattern.vertices)
+        return cls(triangles, flat, marked, two_colors(pattern)[panels])
+
+
+def two_colors(pattern: Any) -> NDArray[np.bool_]:
+    """Color of each panel, so that neighbors differ wherever the pattern allows it."""
+    neighbors: list[list[int]] = [[] for _ in pattern.faces]
+    for a, b in np.asarray(pattern.crease_faces).tolist():
+        neighbors[a].append(b)
+        neighbors[b].append(a)
+    color = np.full(len(neighbors), -1)
+    for start in range(len(neighbors)):
+        if color[start] >= 0:
+            continue
+        color[start], queue = 0, deque([start])
+        while queue:
+            panel = queue.popleft()
+            for other in neighbors[panel]:
+                if color[other] < 0:
+                    color[other] = 1 - color[panel]
+                    queue.append(other)
+    return color == 1
+
+
+def grain_tile(look: Look, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Reflectance of the paper on a square of texels that can be repeated."""
+    frequency = np.hypot(np.fft.fftfreq(_TILE)[:, np.newaxis], np.fft.rfftfreq(_TILE))
+    frequency[0, 0] = np.inf
+    # fibers of all lengths: more of the long ones, as in real paper
+    noise = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((_TILE, _TILE))) / frequency**0.7)
+    tile = look.paper * (1.0 + look.grain * noise / noise.std())
+    return np.clip(tile, 0.0, 1.0).astype(np.float32)
+
+
+def shading(
+    points: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    light: NDArray[np.float64],
+    ambient: float,
+) -> NDArray[np.float64]:
+    """Light on each triangle, on both faces: ambient, and by the angle to the lamp."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    cosine = np.abs(normal @ light) / np.where(length > 0.0, length, 1.0)
+    return ambient + (1.0 - ambient) * cosine
 
 
 @dataclass(frozen=True)
@@ -42,11 +165,8 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for name in ("exposure", "softness", "read_noise", "shot_noise"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"{name}: {value!r}; give 0 or a positive number")
-        if self.samples < 4:
-            raise InputError(f"samples: {self.samples}; give at least 4 rays for each pixel")
+            number(name, getattr(self, name), least=0.0)
+        whole("samples", self.samples, least=4, what="rays in each pixel")
 
     @cached_property
     def places(self) -> NDArray[np.float64]:
@@ -83,15 +203,10 @@ class Studio:
 
     @classmethod
     def of(cls, structure, camera: Camera, look: Look, sensor: Sensor, seed: int) -> Studio:
-        """Paper and grain by the seed, the same for the same one."""
+        """Draw paper and grain at random: the same seed, the same paper."""
         rng = np.random.default_rng([seed, 0])
         paper = Paper.of(structure, rng)
         return cls(camera, look, sensor, paper, grain_tile(look, rng))
-
-    @cached_property
-    def empty(self) -> NDArray[np.float32]:
-        """Light that the background sends, from 0 to 1."""
-        return np.float32(self.look.background) * self._falloff
 
     @cached_property
     def _falloff(self) -> NDArray[np.float32]:
@@ -120,27 +235,24 @@ class Studio:
         """
         cv2 = opencv()
         positions = np.broadcast_to(positions, (self.sensor.samples, *positions.shape[-2:]))
-        box, size = self._box(positions)
-        part, seen = self._rays(positions, box, size)
-        whole = self.empty.copy()
-        here = np.s_[box[1] : box[1] + size[1], box[0] : box[0] + size[0]]
-        whole[here] = part
+        image = np.float32(self.look.background) * self._falloff
+        seen = self._expose(image, positions)
         if self.sensor.softness > 0.0:
-            whole = cv2.GaussianBlur(whole, (0, 0), self.sensor.softness)
-        whole *= np.float32(255.0)
+            image = cv2.GaussianBlur(image, (0, 0), self.sensor.softness)
+        image *= np.float32(255.0)
         if self.sensor.read_noise or self.sensor.shot_noise:
-            spread = self.sensor.read_noise**2 + self.sensor.shot_noise**2 / 255.0 * whole
-            whole += np.sqrt(spread) * rng.standard_normal(whole.shape, dtype=np.float32)
-        return np.clip(np.rint(whole), 0, 255).astype(np.uint8), seen
+            spread = self.sensor.read_noise**2 + self.sensor.shot_noise**2 / 255.0 * image
+            image += np.sqrt(spread) * rng.standard_normal(image.shape, dtype=np.float32)
+        return np.clip(np.rint(image), 0, 255).astype(np.uint8), seen
 
-    def _rays(
-        self, positions: NDArray[np.float64], box: NDArray[np.int64], size: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """Mean of the rays in the part of the image that the structure may cover."""
+    def _expose(
+        self, image: NDArray[np.float32], positions: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Draw the mean of all rays where the structure may be seen; returns the visible nodes."""
         from foldyn.experiment.rendering.raster import draw
 
         camera, look, paper = self.camera, self.look, self.paper
-        shape = (int(size[1]), int(size[0]))
+        box, shape = self._box(positions)
         here = np.s_[box[1] : box[1] + shape[0], box[0] : box[0] + shape[1]]
         total = np.zeros(shape, np.float32)
         depth, bright = np.empty(shape, np.float32), np.empty(shape, np.float32)
@@ -162,14 +274,16 @@ class Studio:
             total += bright
             if k == middle:
                 seen = _unhidden(pixels - box, near, depth)
-        return total / np.float32(len(positions)) * self._falloff[here], seen
+        image[here] = total / np.float32(len(positions)) * self._falloff[here]
+        return seen
 
-    def _box(self, positions: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """First pixel and size of the part of the image around the structure."""
+    def _box(self, positions: NDArray[np.float64]) -> tuple[NDArray[np.int64], tuple[int, int]]:
+        """First pixel (u, v) of the part of the image around the structure, and its shape."""
         pixels = self.camera.project(positions).reshape(-1, 2)
         low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, np.array(self.camera.size) - 1)
         high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN, low, np.array(self.camera.size) - 1)
-        return low.astype(np.int64), (high - low + 1).astype(np.int64)
+        width, height = (high - low + 1).astype(int).tolist()
+        return low.astype(np.int64), (height, width)
 
 
 def _unhidden(

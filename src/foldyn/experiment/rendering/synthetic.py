@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from foldyn.errors import ComputationError, InputError
-from foldyn.experiment.camera import Camera
-from foldyn.experiment.opencv import opencv
-from foldyn.experiment.rendering.paper import Look
-from foldyn.experiment.rendering.picture import Sensor, Studio
+from foldyn.experiment.camera import Camera, opencv
+from foldyn.experiment.rendering.picture import Look, Sensor, Studio
+from foldyn.results import case_of
+from foldyn.values import number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 """Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""
@@ -24,7 +25,7 @@ CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 
 @dataclass(frozen=True, eq=False)
 class SyntheticFilm:
-    """A film that is made picture by picture when it is looked at.
+    """A film whose pictures are rendered one by one, when they are asked for.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class SyntheticFilm:
     dropped : tuple of int
         Frames in which the camera repeats the one before.
     seed : int
-        Of paper, noise and all else by chance: the same seed, the same film.
+        Of paper, noise and everything else that is random: the same seed, the same film.
     """
 
     studio: Studio
@@ -58,14 +59,12 @@ class SyntheticFilm:
             yield last
 
     def frame(self, k: int) -> NDArray[np.uint8]:
-        """Picture number k, were it not dropped."""
+        """Picture number k, as if it were not dropped."""
         sensor = self.studio.sensor
         times = self.time[k] + sensor.exposure * sensor.moments
-        positions = self.motion(times if sensor.exposure else self.time[k : k + 1])
-        rng = np.random.default_rng([self.seed, 1, k])
-        picture, self._seen[k] = self.studio.take(
-            positions if sensor.exposure else positions[0], rng
-        )
+        positions = self.motion(times if sensor.exposure else self.time[[k]])
+        noise = np.random.default_rng([self.seed, 1, k])
+        picture, self._seen[k] = self.studio.take(positions, noise)
         return picture
 
     def truth(self) -> xr.Dataset:
@@ -124,7 +123,7 @@ def film_of(
         Part of the motion (s) that is filmed; by default to its end. The film's time is 0 at
         `start`.
     look, sensor : Look, Sensor
-        What there is to be seen, and how it is seen.
+        What the specimen looks like, and what lens and sensor add.
     dropped : sequence of int
         Frames that repeat the one before.
     seed : int
@@ -138,15 +137,10 @@ def film_of(
     InputError
         Not a motion, a part that it does not have, or nodes behind the camera.
     """
-    from scipy.interpolate import CubicSpline
-
-    from foldyn.results import case_of
-
     structure = case_of(motion).structure
     if "time" not in motion.dims or motion.sizes["time"] < 4:
         raise InputError("motion: not a trajectory of at least four samples; use fd.simulate")
-    if not (np.isfinite(rate) and rate > 0.0):
-        raise InputError(f"rate: {rate!r}; give a positive number of frames per second")
+    number("rate", rate, above=0.0, unit="frames per second")
     time = motion["time"].values
     most = time[-1] - start
     length = most if duration is None else duration
@@ -190,23 +184,17 @@ def photos_of(
     truth : xarray.Dataset
         `position`, `position_px` and `seen` along the dimension `photo`.
     """
-    from foldyn.results import case_of
-
     structure = case_of(path).structure
     states = path["rest_position"].values + path["displacement"].values[list(steps)]
-    studio = Studio.of(structure, camera, look or Look(), sensor or Sensor(), seed)
+    sensor = replace(sensor or Sensor(), exposure=0.0)
+    studio = Studio.of(structure, camera, look or Look(), sensor, seed)
 
     def positions(times: NDArray[np.float64]) -> NDArray[np.float64]:
         return states[np.rint(times).astype(int)]
 
-    still = SyntheticFilm(
-        studio, np.arange(len(states), dtype=np.float64), positions, 1.0, (), seed
-    )
-    photos = [
-        studio.take(state, np.random.default_rng([seed, 1, k]))[0] for k, state in enumerate(states)
-    ]
-    truth = still.truth().rename(time="photo").drop_vars(["seen", "dropped"])
-    return photos, truth
+    numbers = np.arange(len(states), dtype=np.float64)
+    still = SyntheticFilm(studio, numbers, positions, 1.0, seed=seed)
+    return list(still.frames()), still.truth().rename(time="photo").drop_vars("dropped")
 
 
 def write_film(film: SyntheticFilm, path: str | os.PathLike[str]) -> None:

@@ -1,10 +1,12 @@
-"""Films and photographs from files, picture by picture: never more than one in memory."""
+"""Films and photographs from files, picture by picture: only one at a time is in memory."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.experiment.opencv import opencv
+from foldyn.experiment.camera import opencv
+from foldyn.input_files import check_file
+from foldyn.values import number
 
 PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 """Endings of photographs; all other files are films."""
@@ -35,10 +39,10 @@ class Film:
     box : tuple of int
         Region of interest: column and row of its first pixel, width and height.
     timed : bool
-        Times come from the file; else from the rate alone.
-    told : int
-        Frames that the file says it has, often the rate times the duration: an estimate. 0 where it
-        does not say.
+        Times come from the file; otherwise from the rate alone.
+    declared : int
+        Frames that the file claims to have, often the rate times the duration: an estimate. 0 where
+        it claims nothing.
     """
 
     path: Path
@@ -46,41 +50,43 @@ class Film:
     rate: float
     box: Box
     timed: bool = True
-    told: int = 0
+    declared: int = 0
 
     def frames(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         """Give the time (s) and the gray region of interest of each frame."""
-        cv2 = opencv()
-        film = cv2.VideoCapture(str(self.path))
-        try:
-            for number in range(2**62):
+        with _capture(self.path) as film:
+            for index in count():
                 read, picture = film.read()
                 if not read:
                     return
-                told = film.get(cv2.CAP_PROP_POS_MSEC) * 1e-3
-                yield self._time(number, told), _gray(cv2, picture, self.box)
-        finally:
-            film.release()
+                stamp = film.get(opencv().CAP_PROP_POS_MSEC) * 1e-3
+                yield self._time(index, stamp), _gray(picture, self.box)
 
-    def picture(self, number: int) -> NDArray[np.uint8]:
-        """Frame of a number, gray and whole."""
-        cv2 = opencv()
-        film = cv2.VideoCapture(str(self.path))
-        try:
-            film.set(cv2.CAP_PROP_POS_FRAMES, number)
+    def picture(self, index: int) -> NDArray[np.uint8]:
+        """One frame by its index, gray and whole."""
+        with _capture(self.path) as film:
+            film.set(opencv().CAP_PROP_POS_FRAMES, index)
             read, picture = film.read()
-        finally:
-            film.release()
         if read:
-            return _gray(cv2, picture, (0, 0, *self.size))
-        raise InputError(f"{self.path}: frame {number} cannot be read")
+            return _gray(picture, (0, 0, *self.size))
+        raise InputError(f"{self.path}: frame {index} cannot be read")
 
-    def _time(self, number: int, told: float) -> float:
+    def _time(self, index: int, stamp: float) -> float:
         """Time by count, unless the file's is off by more than its rounding to milliseconds."""
-        counted = number / self.rate
-        if not self.timed or not np.isfinite(told) or (number > 0 and told <= 0.0):
+        counted = index / self.rate
+        if not self.timed or not np.isfinite(stamp) or (index > 0 and stamp <= 0.0):
             return counted
-        return counted if abs(told - counted) < max(1.5e-3, 0.5 / self.rate) else told
+        return counted if abs(stamp - counted) < max(1.5e-3, 0.5 / self.rate) else stamp
+
+
+@contextmanager
+def _capture(path: Path) -> Iterator[Any]:
+    """OpenCV's reader of a film, which is closed in the end."""
+    film = opencv().VideoCapture(str(path))
+    try:
+        yield film
+    finally:
+        film.release()
 
 
 def open_film(
@@ -103,30 +109,23 @@ def open_film(
         There is no such file, its codec is unknown, or the region lies outside.
     """
     cv2 = opencv()
-    path = Path(path)
-    if not os.path.isfile(path):
-        raise InputError(f"{path}: there is no such file")
-    film = cv2.VideoCapture(str(path))
-    try:
-        opened = film.isOpened()
-        read, picture = film.read() if opened else (False, None)
-        told = film.get(cv2.CAP_PROP_FPS) if opened else 0.0
-        count = film.get(cv2.CAP_PROP_FRAME_COUNT) if opened else 0.0
-    finally:
-        film.release()
+    path = check_file(path, "a film")
+    with _capture(path) as film:
+        read, picture = film.read()  # false where it cannot be opened
+        own_rate, frames = film.get(cv2.CAP_PROP_FPS), film.get(cv2.CAP_PROP_FRAME_COUNT)
     if not read or picture is None:
         raise InputError(
             f"{path}: no frame can be read: it is not a film, or its codec is unknown here; "
             "convert it (ffmpeg -i IN -c:v ffv1 OUT.mkv)"
         )
-    if rate is not None and not (np.isfinite(rate) and rate > 0.0):
-        raise InputError(f"--rate {rate!r}: give a positive number of frames per second")
-    if rate is None and not (np.isfinite(told) and 0.1 < told < 1e6):
+    if rate is not None:
+        rate = number("--rate", rate, above=0.0, unit="frames per second")
+    elif not (np.isfinite(own_rate) and 0.1 < own_rate < 1e6):
         raise InputError(f"{path}: does not say its frames per second; give them: --rate")
     height, width = picture.shape[:2]
     box = checked_box(roi, width, height)
-    frames = round(count) if np.isfinite(count) and count > 0.0 else 0
-    return Film(path, (width, height), float(rate or told), box, rate is None, frames)
+    declared = round(frames) if np.isfinite(frames) and frames > 0.0 else 0
+    return Film(path, (width, height), float(rate or own_rate), box, rate is None, declared)
 
 
 def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[np.uint8]:
@@ -138,13 +137,11 @@ def read_photo(path: str | os.PathLike[str], roi: Box | None = None) -> NDArray[
         There is no such file, it is no picture, or the region lies outside.
     """
     cv2 = opencv()
-    path = Path(path)
-    if not os.path.isfile(path):
-        raise InputError(f"{path}: there is no such file")
+    path = check_file(path, "a photograph")
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise InputError(f"{path}: is not a picture that can be read; save it as PNG or JPEG")
-    return _gray(cv2, picture, checked_box(roi, picture.shape[1], picture.shape[0]))
+    return _gray(picture, checked_box(roi, picture.shape[1], picture.shape[0]))
 
 
 def checked_box(roi: Box | None, width: int, height: int) -> Box:
@@ -160,9 +157,9 @@ def checked_box(roi: Box | None, width: int, height: int) -> Box:
     return x, y, w, h
 
 
-def _gray(cv2: Any, picture: NDArray, box: Box) -> NDArray[np.uint8]:
+def _gray(picture: NDArray, box: Box) -> NDArray[np.uint8]:
     x, y, w, h = box
     part = picture[y : y + h, x : x + w]
     if part.ndim == 3:
-        part = cv2.cvtColor(part, cv2.COLOR_BGR2GRAY)
+        part = opencv().cvtColor(part, opencv().COLOR_BGR2GRAY)
     return np.ascontiguousarray(part)

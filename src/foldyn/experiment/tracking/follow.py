@@ -1,7 +1,7 @@
 """Corners from frame to frame: pyramidal Lucas-Kanade, there and back, then the junction.
 
-The flow tells where a corner has gone, to a few pixels; where it is, the junction of edges in the
-frame itself tells. So errors do not add up over a film, and panels may turn and change their
+The flow tells to a few pixels where a corner went; the junction of edges in the frame itself tells
+exactly where it is. So errors do not add up over a film, and panels may turn and change their
 brightness.
 """
 
@@ -13,21 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
-from foldyn.experiment.opencv import opencv
-from foldyn.experiment.tracking.junctions import refine
+from foldyn.experiment.camera import opencv
+from foldyn.experiment.tracking.corners import refine
+from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances, nearest
+from foldyn.values import number, whole
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
 _MARGIN = 220  # pixels around all points that are searched
-_NEIGHBORS = 8  # whose motion tells where a point should be
-_STRAY = 0.4  # of the reach, by which a point may miss the place that a guide tells
+_NEIGHBORS, _FIRMNESS = 8, 0.05  # whose motion tells where a point should be: `by_neighbors`
+_STRAY = 0.4  # of the reach, by which a point may miss the place where a guide puts it
 _SURE = 0.3  # the same of its neighbors, for a guide to be believed about a lost point
-_CLEAR = 0.55  # of the error that is allowed, for a corner of few edges to be found again
+_CLEAR = 0.55  # of the allowed error, for a corner of few edges to be found again
 _MOST_MISSES = 3  # frames after which a corner of two edges is not found again without a guide
 
-
-Guide = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Guide = Callable[[Array], Array]
 """From the places of points (p, 2), NaN where lost, to where each of them should be.
 
 NaN where that is not known, infinite where the point cannot be seen.
@@ -43,9 +43,9 @@ class FollowSettings:
     window : int
         Side of the square that is compared (pixels).
     levels : int
-        Of the pyramid: each doubles the motion that is found.
+        Of the pyramid: each doubles the largest motion that is found.
     back : float
-        Largest distance (pixels) by which a point may miss itself there and back.
+        Largest distance (pixels) between a point and where the flow there and back takes it.
     error : float
         Largest standard error of a junction (pixels).
     stray : float
@@ -60,11 +60,10 @@ class FollowSettings:
     stray: float = 0.3
 
     def __post_init__(self) -> None:
-        if self.window < 5 or self.levels < 0:
-            raise InputError(f"window, levels: {self.window}, {self.levels}; give 5 and 0 or more")
+        whole("window", self.window, least=5, what="pixels")
+        whole("levels", self.levels, least=0)
         for name in ("back", "error", "stray"):
-            if not getattr(self, name) > 0.0:
-                raise InputError(f"{name}: {getattr(self, name)!r}; give a positive number")
+            number(name, getattr(self, name), above=0.0)
 
 
 @dataclass(frozen=True)
@@ -86,15 +85,15 @@ class Step:
     """
 
     time: float
-    position: NDArray[np.float64]
-    error: NDArray[np.float64]
+    position: Array
+    error: Array
     status: NDArray[np.int8]
     repeated: bool
 
 
 def follow(
     frames: Iterable[tuple[float, NDArray[np.uint8]]],
-    points: NDArray[np.float64],
+    points: Array,
     reach: float,
     settings: FollowSettings | None = None,
     unseen: NDArray[np.bool_] | None = None,
@@ -114,7 +113,7 @@ def follow(
     unseen : ndarray of bool, shape (p,), optional
         Points that are not there yet: they are looked for as lost ones are.
     guide : callable, optional
-        Where points should be by the others; None: where their neighbors moved them.
+        Where points should be, given the others; None: where their neighbors moved them.
 
     Yields
     ------
@@ -126,25 +125,26 @@ def follow(
     Bouguet, Pyramidal implementation of the Lucas Kanade feature tracker, Intel, 2001; Kalal,
     Mikolajczyk and Matas, Forward-backward error, ICPR 2010.
     """
-    how = settings or FollowSettings()
+    settings = settings or FollowSettings()
     last: NDArray[np.uint8] | None = None
-    state = _State.begun(points, np.zeros(len(points), bool))
+    count = len(points)
+    state = _State.begun(points, np.zeros(count, bool))
     for time, frame in frames:
-        count = len(points)
+        if last is not None and _repeats(frame, last):
+            unknown = np.full((count, 2), np.nan)
+            yield Step(time, unknown, unknown[:, 0], np.zeros(count, np.int8), True)
+            continue
         if last is None:
             first = refine(frame, points, reach, 0.5 * reach)
             kept = np.isfinite(first.position[:, 0])
             kept &= True if unseen is None else ~unseen
             state = _State.begun(np.where(kept[:, np.newaxis], first.position, points), kept)
             error = np.where(kept, first.error, np.nan)
-            yield Step(time, state.shown(), error, (2 * kept).astype(np.int8), False)
-        elif _repeats(frame, last):
-            unknown = np.full(count, np.nan)
-            yield Step(time, np.full((count, 2), np.nan), unknown, np.zeros(count, np.int8), True)
-            continue
+            status = (TRACKED * kept).astype(np.int8)
         else:
-            state, error, status = _advance(last, frame, state, reach, how, guide)
-            yield Step(time, state.shown(), error, status, False)
+            state, error, status = _advance(last, frame, state, reach, settings, guide)
+        # a junction that was not seen in this very frame is not measured
+        yield Step(time, _only(state.misses == 0, state.here), error, status, False)
         last = frame
 
 
@@ -155,7 +155,7 @@ class _State:
     Attributes
     ----------
     here : ndarray, shape (p, 2)
-        Last known place, or the place that neighbors tell for a lost corner.
+        Last known place, or for a lost corner the one that its neighbors suggest.
     step : ndarray, shape (p, 2)
         Motion since the frame before.
     misses : ndarray of int, shape (p,)
@@ -165,29 +165,25 @@ class _State:
         there its neighbors' motion is counted, so that errors do not add up while it is lost.
     """
 
-    here: NDArray[np.float64]
-    step: NDArray[np.float64]
+    here: Array
+    step: Array
     misses: NDArray[np.int64]
-    anchor: NDArray[np.float64]
+    anchor: Array
 
     @classmethod
-    def begun(cls, here: NDArray[np.float64], kept: NDArray[np.bool_]) -> _State:
+    def begun(cls, here: Array, kept: NDArray[np.bool_]) -> _State:
         count = len(here)
         misses = np.where(kept, 0, _MOST_MISSES + 1)
-        anchor = np.repeat(np.where(kept[:, np.newaxis], here, np.nan)[np.newaxis], count, axis=0)
+        anchor = np.repeat(_only(kept, here)[np.newaxis], count, axis=0)
         anchor[np.arange(count), np.arange(count)] = here
         return cls(here, np.zeros((count, 2)), misses, anchor)
 
-    def moved(self, here: NDArray[np.float64], kept: NDArray[np.bool_]) -> _State:
+    def moved(self, here: Array, kept: NDArray[np.bool_]) -> _State:
         misses = np.where(kept, 0, self.misses + 1)
         step = np.where(kept[:, np.newaxis], here - self.here, self.step)
         anchor = self.anchor.copy()
-        anchor[kept] = np.where(kept[:, np.newaxis], here, np.nan)
+        anchor[kept] = _only(kept, here)
         return _State(here, step, misses, anchor)
-
-    def shown(self) -> NDArray[np.float64]:
-        """Measured places: NaN where the junction was not seen in this very frame."""
-        return np.where((self.misses == 0)[:, np.newaxis], self.here, np.nan)
 
 
 def _advance(
@@ -195,56 +191,49 @@ def _advance(
     frame: NDArray[np.uint8],
     state: _State,
     reach: float,
-    how: FollowSettings,
+    settings: FollowSettings,
     guide: Guide | None,
-) -> tuple[_State, NDArray[np.float64], NDArray[np.int8]]:
+) -> tuple[_State, Array, NDArray[np.int8]]:
     led = state.misses == 0
-    flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, how)
+    flown, there = _flow(last, frame, state.here, state.here + state.step, led, reach, settings)
     # a junction near the place to which the flow leads
-    moved = np.where(there[:, np.newaxis], flown, np.nan)
-    junction = refine(frame, moved, reach, 0.5 * reach)
-    good = there & np.isfinite(junction.position[:, 0]) & (junction.error < how.error)
+    junction = refine(frame, _only(there, flown), reach, 0.5 * reach)
+    good = there & np.isfinite(junction.position[:, 0]) & (junction.error < settings.error)
     place = np.where(good[:, np.newaxis], junction.position, flown)
     expected, distance = _by_neighbors(state, place, good)
-    near = np.hypot(*(place - expected).T) < np.maximum(how.stray * distance, 3.0)
+    near = np.hypot(*(place - expected).T) < np.maximum(settings.stray * distance, 3.0)
     good &= near | ~np.isfinite(expected[:, 0])
     if guide is not None:
-        told = guide(np.where(good[:, np.newaxis], place, np.nan))
-        stray, usual = _strays(place, told)
+        stray, usual = _strays(place, guide(_only(good, place)))
         good &= ~(stray > _STRAY * reach + 4.0 * usual)
     good &= ~_crowded(place, good, junction.error, 0.4 * reach)
-    error, status = junction.error.copy(), np.where(good, TRACKED, LOST).astype(np.int8)
 
     # the others: where they should be by these, if a junction is there
     expected, _ = _by_neighbors(state, place, good)
-    told, barred = np.full(place.shape, np.nan), np.zeros(len(place), bool)
+    barred = np.zeros(len(place), bool)
     if guide is not None:
-        told = guide(np.where(good[:, np.newaxis], place, np.nan))
-        _, usual = _strays(np.where(good[:, np.newaxis], place, np.nan), told)
+        guided = guide(_only(good, place))
+        _, usual = _strays(_only(good, place), guided)
         # where the guide itself has lost its way, neighbors do no better
-        barred = ~(np.isfinite(told[:, 0]) & (usual < _SURE * reach))
-        expected = np.where(barred[:, np.newaxis], expected, told)
+        barred = ~(np.isfinite(guided[:, 0]) & (usual < _SURE * reach))
+        expected = np.where(barred[:, np.newaxis], expected, guided)
     guess = np.where(np.isfinite(expected), expected, state.here)
-    again = refine(
-        frame, np.where((good | barred)[:, np.newaxis], np.nan, guess), reach, 0.35 * reach
-    )
+    again = refine(frame, _only(~(good | barred), guess), reach, 0.35 * reach)
     # where fewer edges meet, the end of a stain on an edge may be taken for the corner
-    allowed = how.error * np.where(again.edges >= 4, 1.0, _CLEAR)
+    allowed = settings.error * np.where(again.edges >= 4, 1.0, _CLEAR)
     found = ~good & np.isfinite(again.position[:, 0]) & (again.error < allowed)
-    if guide is None:  # after some frames no doubt may be left about which corner it is
+    if guide is None:  # after some frames there must be no doubt about which corner it is
         found &= (again.edges >= 3) | (state.misses < _MOST_MISSES)
-    merged = np.where(found[:, np.newaxis], again.position, place)
-    found &= ~_taken(merged, good, found, 0.6 * reach)
-    status[found], error[found] = FOUND_AGAIN, again.error[found]
-    kept = good | found
-    error[~kept] = np.nan
-    place = np.where(
-        found[:, np.newaxis], again.position, np.where(good[:, np.newaxis], place, guess)
-    )
-    return state.moved(place, kept), error, status
+    place = np.where(good[:, np.newaxis], place, guess)
+    place = np.where(found[:, np.newaxis], again.position, place)
+    found &= ~_taken(place, good, found, 0.6 * reach)
+    place = np.where((good | found)[:, np.newaxis], place, guess)
+    error = np.select([good, found], [junction.error, again.error], np.nan)
+    status = np.select([good, found], [TRACKED, FOUND_AGAIN], LOST).astype(np.int8)
+    return state.moved(place, good | found), error, status
 
 
-def _flow(last, frame, start, guess, led, reach, how):
+def _flow(last, frame, start, guess, led, reach, settings: FollowSettings):
     """Where the flow leads points, and which of them come back to where they were."""
     cv2 = opencv()
     flown, there = guess.copy(), np.zeros(len(start), bool)
@@ -256,10 +245,9 @@ def _flow(last, frame, start, guess, led, reach, how):
     high = np.minimum(np.ceil(both.max(axis=0)) + _MARGIN, frame.shape[::-1]).astype(int)
     here = np.s_[low[1] : high[1], low[0] : high[0]]
     before, after = np.ascontiguousarray(last[here]), np.ascontiguousarray(frame[here])
-    size = (how.window, how.window)
     options = {
-        "winSize": size,
-        "maxLevel": how.levels,
+        "winSize": (settings.window, settings.window),
+        "maxLevel": settings.levels,
         "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01),
         "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
     }
@@ -269,7 +257,7 @@ def _flow(last, frame, start, guess, led, reach, how):
     back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, new, old.copy(), **options)
     missed = np.hypot(*(back - old).reshape(-1, 2).T)
     flown[some] = new.reshape(-1, 2) + low
-    there[some] = (found.ravel() > 0) & (returned.ravel() > 0) & (missed < how.back)
+    there[some] = (found.ravel() > 0) & (returned.ravel() > 0) & (missed < settings.back)
     return flown, there & _within(flown, frame.shape, reach)
 
 
@@ -279,67 +267,42 @@ def _within(points, shape, margin):
     return inside.all(axis=1)
 
 
-def _by_neighbors(state: _State, place, good):
-    """Places by the affine motion of the nearest good neighbors, and how far these are.
-
-    NaN where fewer than four neighbors are good.
-    """
-    count = len(place)
-    expected, distance = np.full((count, 2), np.nan), np.full(count, np.nan)
-    known = np.flatnonzero(good)
-    if len(known) < 5:
-        return expected, distance
-    for p in range(count):
-        then = state.anchor[p]
-        others = known[(known != p) & np.isfinite(then[known, 0])]
-        if len(others) < 4:
-            continue
-        apart = np.hypot(*(then[others] - then[p]).T)
-        nearest = np.argsort(apart)[:_NEIGHBORS]
-        some = others[nearest]
-        offset = np.column_stack([np.ones(len(some)), then[some] - then[p]])
-        motion = place[some] - then[some]
-        # the mean rules, the gradient is held small: a row of neighbors leaves it open
-        normal = offset.T @ offset
-        normal[1:, 1:] += 0.05 * np.trace(normal[1:, 1:]) * np.eye(2)
-        gradient = np.linalg.solve(normal, offset.T @ motion)
-        expected[p] = then[p] + gradient[0]
-        distance[p] = np.median(apart[nearest])
-    return expected, distance
+def _by_neighbors(state: _State, place: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Places by the motion of good neighbors since each corner was last seen; their distance."""
+    asked = range(len(place)) if good.sum() > 4 else ()
+    return by_neighbors(state.anchor, _only(good, place), asked, _NEIGHBORS, _FIRMNESS)
 
 
-def _strays(place, told):
+def _strays(place: Array, guided: Array) -> tuple[Array, Array]:
     """Distance of points from where a guide puts them, and that of their nearest neighbors."""
-    stray = np.hypot(*(place - told).T)
+    stray = np.hypot(*(place - guided).T)
     known = np.flatnonzero(np.isfinite(stray))
     usual = np.full(len(place), np.inf)
-    for p in np.flatnonzero(np.isfinite(told[:, 0])):
+    for p in np.flatnonzero(np.isfinite(guided[:, 0])).tolist():
         others = known[known != p]
         if len(others):
-            apart = np.hypot(*(told[others] - told[p]).T)
-            usual[p] = np.median(stray[others[np.argsort(apart)[:_NEIGHBORS]]])
+            usual[p] = np.median(stray[nearest(guided, p, others, _NEIGHBORS)])
     return stray, usual
 
 
-def _crowded(place, good, error, apart):
+def _crowded(place: Array, good: NDArray, error: Array, apart: float) -> NDArray[np.bool_]:
     """Points that have come to the place of another one: all but the best measured of them."""
-    out = np.zeros(len(place), bool)
-    known = np.flatnonzero(good)
-    for k, p in enumerate(known):
-        close = np.hypot(*(place[known] - place[p]).T) < apart
-        close[k] = False
-        out[p] = (error[known[close]] <= error[p]).any() if close.any() else False
+    out, known = np.zeros(len(place), bool), np.flatnonzero(good)
+    better = error[known] <= error[known][:, np.newaxis]
+    out[known] = ((distances(place[known]) < apart) & better).any(axis=1)
     return out
 
 
-def _taken(place, good, found, apart):
+def _taken(place: Array, good: NDArray, found: NDArray, apart: float) -> NDArray[np.bool_]:
     """Points found again where another corner is already."""
-    out = np.zeros(len(place), bool)
-    held = np.flatnonzero(good | found)
-    for p in np.flatnonzero(found):
-        others = held[held != p]
-        out[p] = bool((np.hypot(*(place[others] - place[p]).T) < apart).any())
-    return out
+    out, held = np.zeros(len(place), bool), np.flatnonzero(good | found)
+    out[held] = (distances(place[held]) < apart).any(axis=1)
+    return out & found
+
+
+def _only(these: NDArray[np.bool_], places: Array) -> Array:
+    """Places of these points, NaN for all others."""
+    return np.where(these[:, np.newaxis], places, np.nan)
 
 
 def _repeats(frame: NDArray[np.uint8], last: NDArray[np.uint8]) -> bool:

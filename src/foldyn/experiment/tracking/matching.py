@@ -1,7 +1,7 @@
-"""Which corner is which node: the model is projected, the assignment solved, and all are looked up.
+"""Which corner is which node: project the model, assign corners to nodes, look up all nodes.
 
-A folded sheet looks much the same one cell further on. So a placement counts by the nodes that are
-really there: at each one's place in the picture edges must meet.
+A folded sheet looks much the same one cell further on. So placements are ranked by the nodes that
+are really there: edges must meet at each one's place in the picture.
 """
 
 from __future__ import annotations
@@ -10,11 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from foldyn.errors import InputError
 from foldyn.experiment.camera import axes_of_view
-from foldyn.experiment.tracking.junctions import refine
-from foldyn.experiment.tracking.view import Array, View, fit_view
+from foldyn.experiment.tracking.corners import refine
+from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances
+from foldyn.experiment.tracking.view import View, fit_view, hidden_nodes
+from foldyn.values import number
 
 _TURNS = np.radians(np.arange(-12.0, 12.1, 4.0))  # of the image about the line of sight
 _SCALES = np.exp(np.linspace(-0.35, 0.35, 15))  # about the scale by size, where it is not known
@@ -22,13 +26,13 @@ _STATES = 9  # of a path, that are tried before the best is refined
 _BEST = 6  # placements that are refined
 _FEWEST = 6  # matched nodes, without which a placement is chance
 _LEAST_SHARE = 0.5  # of the nodes that no panel hides
-_NEIGHBORS = 6  # whose places correct that of a node
-_STRAY = 0.2  # of the nodes' spacing, by which a node may miss the place its neighbors tell
+_NEIGHBORS, _FIRMNESS = 6, 0.1  # whose places correct that of a node: `by_neighbors`
+_STRAY = 0.2  # of the nodes' spacing, by which a node may miss where its neighbors put it
 
 
 @dataclass(frozen=True)
 class Placing:
-    """How the model is seen, as far as the user says.
+    """How the camera sees the model, as far as the user says.
 
     Attributes
     ----------
@@ -39,7 +43,7 @@ class Placing:
     distance : float or None
         Of that plane from the camera (m); None: fitted.
     axis : tuple of float or None
-        Pixel on the axis of the camera: the middle of the whole image.
+        Pixel on the camera's axis; None: the middle of the whole image.
     """
 
     up: str = "-x"
@@ -50,8 +54,8 @@ class Placing:
 
     def __post_init__(self) -> None:
         axes_of_view(self.up, self.facing)
-        if self.distance is not None and not (np.isfinite(self.distance) and self.distance > 0.0):
-            raise InputError(f"--distance {self.distance!r}: give a positive number of m")
+        if self.distance is not None:
+            number("--distance", self.distance, above=0.0, unit="m")
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Match:
     positions : ndarray, shape (n, 3)
         Positions of all nodes (m) in the state that fits best.
     state : float
-        Its place among the states: 2.5 is half way between numbers 2 and 3.
+        Its place among the states: 2.5 is halfway between states 2 and 3.
     rms : float
         Root mean square distance between seen and projected nodes (pixels): how far the specimen
         differs from the model.
@@ -133,14 +137,14 @@ def match_nodes(
     """
     if len(corners) < _FEWEST:
         raise InputError(
-            f"{place}: {len(corners)} corners are found in it; at least {_FEWEST} are needed to "
+            f"{place}: {len(corners)} corners found in it; at least {_FEWEST} are needed to "
             "recognize nodes of the model"
         )
-    best: Match | None = None
-    for start, number in _placements(corners, states[:, nodes], placing):
-        found = _refined(image, corners, states, number, start, triangles, nodes, placing, reach)
-        if found is not None and (best is None or _rank(found) > _rank(best)):
-            best = found
+    tried = [
+        _refined(image, corners, states, index, view, triangles, nodes, placing, reach)
+        for view, index in _placements(corners, states[:, nodes], placing)
+    ]
+    best = max(filter(None, tried), key=lambda one: (len(one.node), -one.rms), default=None)
     count = 0 if best is None else len(best.node)
     if best is None or count < max(_FEWEST, _LEAST_SHARE * best.seen[nodes].sum()):
         raise InputError(
@@ -152,20 +156,14 @@ def match_nodes(
     return best
 
 
-def _rank(match: Match) -> tuple[int, float]:
-    return len(match.node), -match.rms
-
-
 def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, int]]:
     """The best ways to lay the model over the points, by how many nodes fall on a point."""
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(uv)
     axes = axes_of_view(placing.up, placing.facing)
     chosen = np.unique(np.linspace(0, len(states) - 1, _STATES).round().astype(int))
     ranked = []
-    for number in chosen:
-        seen = (states[number] - states[number].mean(axis=0)) @ axes.T
+    for index in chosen.tolist():
+        seen = (states[index] - states[index].mean(axis=0)) @ axes.T
         spacing = _spacing(seen[:, :2])
         for scale in _scales(uv, seen, placing):
             for turn in _TURNS:
@@ -177,12 +175,12 @@ def _placements(uv: Array, states: Array, placing: Placing) -> list[tuple[View, 
                 hits = np.isfinite(distance)
                 count = len(np.unique(partner[hits]))
                 rest = float(distance[hits].mean() / tolerance) if hits.any() else 1.0
-                ranked.append((count - rest, number, scale, turn, shift))
+                ranked.append((count - rest, index, scale, turn, shift))
     ranked.sort(key=lambda one: -one[0])
-    kept = []
-    for _, number, scale, turn, shift in ranked[:_BEST]:
-        kept.append((_view_of(states[number], axes, scale, turn, shift, placing), int(number)))
-    return kept
+    return [
+        (_view_of(states[index], axes, scale, turn, shift, placing), index)
+        for _, index, scale, turn, shift in ranked[:_BEST]
+    ]
 
 
 def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
@@ -211,9 +209,7 @@ def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
 
 def _spacing(flat: Array) -> float:
     """Median distance of a node to its nearest neighbor, as seen."""
-    apart = np.hypot(*(flat[:, np.newaxis] - flat).transpose(2, 0, 1))
-    np.fill_diagonal(apart, np.inf)
-    return float(np.median(apart.min(axis=1)))
+    return float(np.median(distances(flat).min(axis=1)))
 
 
 def _view_of(
@@ -237,7 +233,7 @@ def _refined(
     image: NDArray[np.uint8],
     corners: Array,
     states: Array,
-    number: int,
+    index: int,
     view: View,
     triangles: NDArray[np.int64],
     nodes: NDArray[np.int64],
@@ -245,7 +241,7 @@ def _refined(
     reach: float,
 ) -> Match | None:
     """Assignment and fit by turns, then a look at the places of all nodes."""
-    state, positions = float(number), states[number]
+    state, positions = float(index), states[index]
     known = placing.metres_per_pixel is not None, placing.distance is not None
     for part in (0.45, 0.35, 0.3, 0.25):
         asked = nodes[~hidden_nodes(positions, triangles, view)[nodes]]
@@ -264,7 +260,7 @@ def _refined(
             return None
         view, state, positions, rms = _fitted(view, states, state, node, place[node], known)
     flat = view.project(positions)
-    expected = by_neighbors(place, flat, np.arange(len(flat)))
+    expected = by_model(place, flat, np.arange(len(flat)))
     expected = np.where(np.isfinite(expected), expected, flat)
     return Match(node, place[node], view, positions, state, rms, seen, expected)
 
@@ -279,10 +275,8 @@ def _fitted(
 ) -> tuple[View, float, Array, float]:
     """View, state, positions of all nodes in it, and what is left (pixels, rms)."""
     last = len(states) - 1
-    around = None
     ends = max(state - 3.0, 0.0), min(state + 3.0, float(last))
-    if last:
-        around = np.stack([_between(states, end)[node] for end in ends])
+    around = np.stack([_between(states, end)[node] for end in ends]) if last else None
     view, step, rms = fit_view(view, _between(states, state)[node], uv, *known, around)
     state += abs(step) * ((ends[1] if step > 0.0 else ends[0]) - state)
     return view, state, _between(states, state), rms
@@ -293,14 +287,14 @@ def _looked_up(
 ) -> Array:
     """Places of the nodes asked for: where their neighbors put them, if edges meet there."""
     kept = _without_strays(place, flat, asked)
-    expected = by_neighbors(kept, flat, asked)
+    expected = by_model(kept, flat, asked)
     missing = np.where(np.isfinite(kept), np.nan, expected)
-    found = refine(image, missing, reach, 0.6 * reach)
-    sure = np.isfinite(found.position[:, 0]) & (found.error < 0.5)
+    junctions = refine(image, missing, reach, 0.6 * reach)
+    sure = np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)
     for node in np.flatnonzero(sure):
-        apart = np.hypot(*(kept - found.position[node]).T)
+        apart = np.hypot(*(kept - junctions.position[node]).T)
         if not (apart < 0.5 * reach).any():  # or it is another node's
-            kept[node] = found.position[node]
+            kept[node] = junctions.position[node]
     return kept
 
 
@@ -313,7 +307,7 @@ def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Arra
     kept[asked] = place[asked]
     limit = max(_STRAY * _spacing(flat[asked]), 2.0)
     for _ in range(len(asked)):
-        stray = np.hypot(*(kept - by_neighbors(kept, flat, asked)).T)
+        stray = np.hypot(*(kept - by_model(kept, flat, asked)).T)
         if not np.isfinite(stray).any():
             break
         allowed = min(limit, max(6.0 * float(np.nanmedian(stray)), 1.5))
@@ -324,28 +318,13 @@ def _without_strays(place: Array, flat: Array, asked: NDArray[np.int64]) -> Arra
     return kept
 
 
-def by_neighbors(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
-    """Places (n, 2) of the nodes asked for, by the affine misfit of the model at their neighbors.
+def by_model(place: Array, flat: Array, asked: NDArray[np.int64]) -> Array:
+    """Places (n, 2) of the nodes asked for, by their neighbors' distance from the model's `flat`.
 
     NaN for all others, and where fewer than four others are known.
     """
-    expected = np.full(place.shape, np.nan)
-    misfit = place - flat
-    known = np.flatnonzero(np.isfinite(place[:, 0]))
-    for node in asked:
-        others = known[known != node]
-        if len(others) < 4:
-            continue
-        apart = np.hypot(*(flat[others] - flat[node]).T)
-        some = others[np.argsort(apart)[:_NEIGHBORS]]
-        offset = np.column_stack([np.ones(len(some)), flat[some] - flat[node]])
-        normal = offset.T @ offset
-        normal[1:, 1:] += 0.1 * np.trace(normal[1:, 1:]) * np.eye(2)
-        # the median first: one wrong neighbor must not carry all others away
-        middle = np.median(misfit[some], axis=0)
-        left = misfit[some] - middle
-        expected[node] = flat[node] + middle + np.linalg.solve(normal, offset.T @ left)[0]
-    return expected
+    reference = np.broadcast_to(flat, (len(flat), *flat.shape))
+    return by_neighbors(reference, place, asked, _NEIGHBORS, _FIRMNESS, robust=True)[0]
 
 
 def _between(states: Array, state: float) -> Array:
@@ -358,30 +337,9 @@ def _between(states: Array, state: float) -> Array:
 
 def assign(nodes: Array, points: Array, limit: float) -> tuple[NDArray, NDArray]:
     """Pairs of nodes and points (pixels) with the shortest total distance, none above a limit."""
-    from scipy.optimize import linear_sum_assignment
-
     distance = np.hypot(*(nodes[:, np.newaxis] - points).transpose(2, 0, 1))
     # a node without a partner costs the limit: it takes none that is farther away
     padded = np.concatenate([np.minimum(distance, 1e6), np.full((len(nodes),) * 2, limit)], axis=1)
     rows, columns = linear_sum_assignment(padded)
     paired = columns < len(points)
     return rows[paired], columns[paired]
-
-
-def hidden_nodes(points: Array, triangles: NDArray[np.int64], view: View) -> NDArray[np.bool_]:
-    """Nodes that lie behind a triangle as seen in a view."""
-    flat, depth = view.project(points), view.depth(points)
-    hidden = np.zeros(len(points), dtype=bool)
-    slack = 1e-3 * np.ptp(points, axis=0).max()
-    a, b, c = (flat[triangles[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    drawn = np.abs(area) > 1e-9
-    a, b, c, area, corner = a[drawn], b[drawn], c[drawn], area[drawn], triangles[drawn]
-    for node in range(len(points)):
-        d = flat[node] - a
-        s = (d[:, 0] * (c - a)[:, 1] - d[:, 1] * (c - a)[:, 0]) / area
-        t = ((b - a)[:, 0] * d[:, 1] - (b - a)[:, 1] * d[:, 0]) / area
-        inside = (s > 1e-6) & (t > 1e-6) & (s + t < 1.0 - 1e-6) & ~(corner == node).any(axis=1)
-        z = (1.0 - s - t) * depth[corner[:, 0]] + s * depth[corner[:, 1]] + t * depth[corner[:, 2]]
-        hidden[node] = bool((inside & (z < depth[node] - slack)).any())
-    return hidden

@@ -1,18 +1,76 @@
-"""How a camera sees a model: the pose that is fitted to matched corners, and the way back."""
+"""A model and how a camera sees it: the pose that is fitted to corners, and the way back."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from foldyn.errors import InputError
+from foldyn.results import case_of
+from foldyn.results.contents import check_variable
 
 Array = NDArray[np.float64]
+
+_MOST_STATES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedModel:
+    """What tracking needs to know of a model: its nodes, its panels and its possible states.
+
+    Attributes
+    ----------
+    rest : ndarray, shape (n, 3)
+        Positions of all nodes at rest (m), the vertices of the pattern first.
+    states : ndarray, shape (k, n, 3)
+        Positions (m) in the states that the specimen may take, in the order of a path.
+    triangles : ndarray, shape (m, 3)
+    vertices : int
+        Number of the pattern's vertices: only they can be seen as corners.
+    edges : ndarray, shape (e, 2)
+        Creases and boundary, for pictures.
+    """
+
+    rest: NDArray[np.float64]
+    states: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    vertices: int
+    edges: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, thing: Any) -> TrackedModel:
+        """Model of a case or structure, at rest, or of a result of `trace`, with all its states."""
+        if not isinstance(thing, xr.Dataset):
+            structure = getattr(thing, "structure", thing)
+            rest = np.asarray(structure.nodes, dtype=np.float64)
+            triangles = np.asarray(structure.triangles, dtype=np.int64)
+            edges = np.asarray(structure.pattern.edges, dtype=np.int64)
+            count = len(structure.pattern.vertices)
+            return cls(rest, rest[np.newaxis], triangles, count, edges)
+        if "displacement" not in thing or "rest_position" not in thing:
+            raise InputError("--model: the result has no displacements; give a case or a path")
+        at_rest = cls.of(case_of(thing))
+        if thing["displacement"].ndim != 3:
+            raise InputError("--model: give a path or a motion, not modes or responses")
+        place, along = ("node", "axis"), str(thing["displacement"].dims[0])
+        rest = check_variable(thing, "rest_position", place, place="--model: ").values
+        moved = check_variable(thing, "displacement", (along, *place), place="--model: ").values
+        states = rest + moved
+        if not states.size or not np.isfinite(states).all():
+            raise InputError("--model: the result holds no finite displacements; compute it again")
+        thin = np.unique(np.linspace(0, len(states) - 1, _MOST_STATES).round().astype(int))
+        return replace(at_rest, rest=rest, states=states[thin])
 
 
 @dataclass(frozen=True)
 class View:
-    """A camera far enough away to be described by the scale of one plane.
+    """A camera so far away that the scale of one plane describes it.
 
     Points are seen at center + (right, down) / (metres_per_pixel (1 + depth / distance)), all
     relative to `origin`, whose plane has the scale; right, down and depth are along the rows of
@@ -29,9 +87,9 @@ class View:
     metres_per_pixel : float
         In the plane through `origin`.
     distance : float
-        Of that plane from the camera (m); infinite: things do not shrink with depth.
+        Of that plane from the camera (m); infinite: depth does not change an object's size.
     axis : ndarray, shape (2,)
-        Pixel in which the camera's axis meets the image: towards it things shrink with depth.
+        Pixel at which the camera's axis meets the image: what is farther away appears closer to it.
     """
 
     rotation: Array
@@ -62,8 +120,6 @@ class View:
 
     def turned(self, rotvec: ArrayLike) -> View:
         """The same view with the model turned by a rotation vector (rad) in the camera's axes."""
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec(np.asarray(rotvec, dtype=np.float64)).as_matrix()
         return replace(self, rotation=turn @ self.rotation)
 
@@ -100,8 +156,6 @@ def fit_view(
     rms : float
         Root mean square of the distances between seen and projected (pixels).
     """
-    from scipy.optimize import least_squares
-
     extent = float(np.ptp(points, axis=0).max())
     size, nearness = extent / view.metres_per_pixel, extent / view.distance
 
@@ -130,3 +184,22 @@ def fit_view(
     fitted, _, state = unpack(fit.x)
     left = misfit(fit.x).reshape(-1, 2)
     return fitted, state, float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+
+
+def hidden_nodes(points: Array, triangles: NDArray[np.int64], view: View) -> NDArray[np.bool_]:
+    """Nodes that lie behind a triangle as seen in a view."""
+    flat, depth = view.project(points), view.depth(points)
+    hidden = np.zeros(len(points), dtype=bool)
+    slack = 1e-3 * np.ptp(points, axis=0).max()
+    a, b, c = (flat[triangles[:, k]] for k in range(3))
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    drawn = np.abs(area) > 1e-9
+    a, b, c, area, corner = a[drawn], b[drawn], c[drawn], area[drawn], triangles[drawn]
+    for node in range(len(points)):
+        d = flat[node] - a
+        s = (d[:, 0] * (c - a)[:, 1] - d[:, 1] * (c - a)[:, 0]) / area
+        t = ((b - a)[:, 0] * d[:, 1] - (b - a)[:, 1] * d[:, 0]) / area
+        inside = (s > 1e-6) & (t > 1e-6) & (s + t < 1.0 - 1e-6) & ~(corner == node).any(axis=1)
+        z = (1.0 - s - t) * depth[corner[:, 0]] + s * depth[corner[:, 1]] + t * depth[corner[:, 2]]
+        hidden[node] = bool((inside & (z < depth[node] - slack)).any())
+    return hidden

@@ -23,7 +23,7 @@ from foldyn import experiment
 from foldyn.analyses import CaseFile, read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.experiment.calibration.key_paths import replaced
+from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings
@@ -32,7 +32,7 @@ from foldyn.writing import write_text
 
 FOLDS = {"sheet.length_scale_ratio": 2.7, "model.fold_law.theta1": 75.0}
 DAMPING = {"damping.alpha": 14.4, "damping.beta": 4.1e-4}
-"""What the paper found, the truth of the synthetic data."""
+"""What the paper found, and the truth behind the synthetic data."""
 MIRRORED = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
 FOLD_RANGES = (
     experiment.Parameter("sheet.length_scale_ratio", 2.0, 0.5, 10.0),
@@ -47,7 +47,7 @@ WEIGHTS = (0.125, 0.226, 0.312)  # N
 TOP = tuple(range(7))
 WATCHED = 8  # the paper's node 9
 FRONT = tuple(7 * i + j for i in range(8) for j in (1, 3, 5))
-"""Nodes that a camera before the specimen sees, but for the bottom row, which stands still."""
+"""Nodes seen by a camera in front of the specimen, without the bottom row, which stands still."""
 SYNTHETIC = "synthetic"
 FORCE_ERROR = 2e-4  # N: scales read to 0.02 g
 STATIC_ERROR = 5e-5  # m: a corner in a photograph
@@ -78,7 +78,7 @@ rest, and resists the large turns of the panels.
 
 
 def pressed(factors: Sequence[float] | NDArray, changes: Mapping[str, Any] | None = None) -> Any:
-    """Path of the specimen whose top is pressed down to fractions of 56 mm."""
+    """Path of the specimen as its top is pressed down to fractions of 56 mm."""
     at = {"method": "newton", "load_factors": list(factors)}
     return shipped("specimen", changes).run(settings=Settings(stability=False), **at)
 
@@ -158,7 +158,7 @@ def released_case(
         "title": "The paper specimen released",
         "supports": SUPPORTS[support],
         "initial": {"file": "pressed.nc"},
-        "damping": {"alpha": DAMPING["damping.alpha"], "beta": DAMPING["damping.beta"]},
+        "damping": {key.removeprefix("damping."): value for key, value in DAMPING.items()},
         "analysis": {
             "kind": "dynamics",
             "method": "generalized_alpha",
@@ -173,13 +173,13 @@ def released_case(
 
 
 def release_data(case: Path) -> list[experiment.Measurement]:
-    """Histories of node 8, and of all other front nodes held out, as a film has them."""
+    """Histories of node 8 and, held out, of all other front nodes, sampled like a film."""
     motion = read_case(case).run()
     time = np.arange(0.0, SEEN, 1.0 / RATE)
     along = motion["displacement"].sel(axis="x")
     others = tuple(node for node in FRONT if node != WATCHED)
     return [
-        experiment.History(
+        experiment.TimeHistory(
             nodes=nodes, time=time, values=CubicSpline(motion["time"], along[:, list(nodes)])(time),
             axis="x", name=name, label=SYNTHETIC, sigma=FILM_ERROR, held_out=nodes == others,
         )
@@ -190,7 +190,7 @@ def release_data(case: Path) -> list[experiment.Measurement]:
 def noisy(
     data: Sequence[experiment.Measurement], draw: np.random.Generator
 ) -> list[experiment.Measurement]:
-    """Measurements with random errors of the size that they name."""
+    """Measurements with random errors of the size that they state."""
     result = []
     for one in data:
         field = "force" if isinstance(one, experiment.ForceDisplacement) else "values"
@@ -208,44 +208,23 @@ def peak(values: NDArray[np.float64], step: float = 1.0 / RATE) -> tuple[float, 
     return float(found.damped_frequency[best]), float(found.damping_ratio[best])
 
 
-def calibrate(
-    folder: Path,
-    static: Sequence[experiment.Measurement] | None = None,
-    film: Sequence[experiment.Measurement] | None = None,
-    seed: int = 1,
-    **how: Any,
-) -> tuple[experiment.Fit, experiment.Fit]:
-    """Fit the folds to the static test, then, with these folds, the damping to the release.
+def calibrate(folder: Path) -> tuple[experiment.Fit, experiment.Fit]:
+    """Fit the folds to the synthetic static test, then, with them, the damping to the release.
 
-    Parameters
-    ----------
-    folder : Path
-        Keeps the evaluations, and the case files of the release.
-    static, film : sequence of Measurement, optional
-        Measured data; synthetic ones by default.
-    seed : int
-        Of the noise of the synthetic data.
-    **how
-        Other arguments of `fit`.
-
-    Returns
-    -------
-    folds, damping : Fit
+    The folder keeps the evaluations, and the case files of the release.
     """
-    kept = folder / "evaluations"
-    draw = np.random.default_rng(seed)
-    if static is None:
-        static = noisy(static_data(), draw)
-    folds = fit_folds(static, folder=kept, **how)
-    if film is None:
-        film = noisy(release_data(released_case(folder / "truth")), draw)
+    kept, draw = folder / "evaluations", np.random.default_rng(1)
+    folds = fit_folds(noisy(static_data(), draw), folder=kept)
+    film = noisy(release_data(released_case(folder / "truth")), draw)
     model = released_case(folder / "fitted", changes_of(folds))
-    return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept, **how)
+    return folds, fit_damping(model, [*film, *spectra_of(film)], folder=kept)
 
 
-def fit_folds(static: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
+def fit_folds(static: Sequence[experiment.Measurement], **options: Any) -> experiment.Fit:
     """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
-    return experiment.fit(find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **how)
+    return experiment.fit(
+        find_case("herkal/specimen"), static, FOLD_RANGES, ties=MIRRORED, **options
+    )
 
 
 def changes_of(folds: experiment.Fit) -> dict[str, Any]:
@@ -253,9 +232,11 @@ def changes_of(folds: experiment.Fit) -> dict[str, Any]:
     return folds.problem.space.changes([*folds.values.values()])
 
 
-def fit_damping(case: Path, film: Sequence[experiment.Measurement], **how: Any) -> experiment.Fit:
+def fit_damping(
+    case: Path, film: Sequence[experiment.Measurement], **options: Any
+) -> experiment.Fit:
     """Fit alpha and beta to a release."""
-    return experiment.fit(case, film, DAMPING_RANGES, **how)
+    return experiment.fit(case, film, DAMPING_RANGES, **options)
 
 
 def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectrum]:
@@ -263,7 +244,7 @@ def spectra_of(film: Sequence[experiment.Measurement]) -> list[experiment.Spectr
     return [
         experiment.Spectrum.of(replace(one, held_out=True, name=f"{one.name}, frequencies"), BAND)
         for one in film
-        if isinstance(one, experiment.History) and np.isfinite(one.values).all()
+        if isinstance(one, experiment.TimeHistory) and np.isfinite(one.values).all()
     ]
 
 

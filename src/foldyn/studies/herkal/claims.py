@@ -12,32 +12,33 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals import find_peaks, spectrum
-from foldyn.studies.herkal.metric import UP_TO, content
-from foldyn.studies.herkal.models import REFERENCE, paper_rules
+from foldyn.studies.herkal.metric import UP_TO, content, content_of, strongest_peak
+from foldyn.studies.herkal.runs import reported
+from foldyn.studies.herkal.sheet_models import REFERENCE, paper_rules
 from foldyn.studies.herkal.study import Study, mean_ranks
 from foldyn.studies.targets import Target, Verdict, read_targets, verdicts
 
 TARGETS = Path(__file__).with_name("targets.toml")
 BAND = (1.4, 2.4)  # Hz, where second peaks are sought
+PROMINENCE = 0.01  # of a peak, as a part of the highest amplitude
 NO_VALUE = math.nan
 NO_MOTION = np.full((1, 2), math.nan)
 
 
-def _histories(study: Study, case: str, model: str) -> tuple[NDArray, float] | None:
-    """Displacement (time, nodes) of the reported nodes, and the sampling interval."""
-    motion = study.result(case, model, "motion") if case in study.plan.cases else None
-    if motion is None:
-        return None
-    nodes, axis = study.reported(case)
-    x = motion["displacement"].sel(node=nodes, axis=axis).transpose("time", "node").values
-    return x, float(motion["time"][1] - motion["time"][0])
+def _motion(study: Study, case: str, model: str) -> xarray.Dataset | None:
+    return study.result(case, model, "motion") if case in study.plan.cases else None
+
+
+def _edge(motion: xarray.Dataset) -> NDArray:
+    """Displacement (time, nodes) of the reported nodes of case 1."""
+    nodes, axis, _ = reported("case1")
+    return motion["displacement"].sel(node=nodes, axis=axis).transpose("time", "node").values
 
 
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
-    """How unlike the two nodes of case 1 move with some models, the largest."""
-    motions = [_histories(study, "case1", model) for model in models]
-    moved = [NO_MOTION if found is None else found[0] for found in motions]
+    """Largest difference, among some models, between the motions of the two nodes of case 1."""
+    motions = [_motion(study, "case1", model) for model in models]
+    moved = [NO_MOTION if motion is None else _edge(motion) for motion in motions]
     return max(
         float(np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1))) for x in moved
     )
@@ -45,34 +46,25 @@ def _asymmetry(study: Study, models: Iterable[str]) -> float:
 
 def second_peak_case1(study: Study) -> float:
     """Peak (Hz) of the spectrum of the difference of the two nodes, equi-inertial."""
-    found = _histories(study, "case1", "equi_inertial")
-    if found is None:
+    motion = _motion(study, "case1", "equi_inertial")
+    if motion is None:
         return NO_VALUE
-    x, dt = found
-    frequency, amplitude = spectrum(x[:, 0] - x[:, 1], dt)
-    kept = frequency <= UP_TO
-    return _strongest(frequency[kept], amplitude[kept], (0.0, UP_TO))
-
-
-def _strongest(frequency: NDArray, amplitude: NDArray, band: tuple[float, float]) -> float:
-    peaks = find_peaks(frequency, amplitude, prominence=0.01)
-    inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
-    if not inside.any():
-        return NO_VALUE
-    return float(peaks.frequency[inside][np.argmax(peaks.height[inside])])
+    x = _edge(motion)
+    found = content_of(motion["time"].values, x[:, 0] - x[:, 1])
+    return strongest_peak(*found, (0.0, UP_TO), PROMINENCE)
 
 
 def _second_peak(study: Study, case: str) -> float:
     """Second peak (Hz) of the shell, all reported nodes together."""
-    motion = study.result(case, REFERENCE, "motion") if case in study.plan.cases else None
+    motion = _motion(study, case, REFERENCE)
     if motion is None:
         return NO_VALUE
-    frequency, amplitude = content(motion, *study.reported(case))
-    return _strongest(frequency, np.linalg.norm(amplitude, axis=1), BAND)
+    frequency, amplitude = content(motion, *reported(case))
+    return strongest_peak(frequency, np.linalg.norm(amplitude, axis=1), BAND, PROMINENCE)
 
 
 def _mismatch(study: Study, places: list[int]) -> float:
-    """Largest size of the static deviations from the shell in case 2, of some reported nodes."""
+    """Largest static deviation from the shell in case 2 at some of the reported nodes."""
     found = study.displacements("case2") if "case2" in study.plan.cases else {}
     if "shell" not in found or "bars and hinges" not in found:
         return NO_VALUE
@@ -81,13 +73,12 @@ def _mismatch(study: Study, places: list[int]) -> float:
 
 def softer_folds_move_more(study: Study) -> float:
     """Displacement of node 7 of the shell, case 4 over case 2."""
-    paths = [study.result(c, REFERENCE, "path") for c in ("case4", "case2")]
-    soft, stiff = (math.nan if p is None else _at_seven(p) for p in paths)
-    return soft / stiff
-
-
-def _at_seven(path: xarray.Dataset) -> float:
-    return float(path["displacement"].sel(node=7, axis="x").values[-1])
+    moved = []
+    for case in ("case4", "case2"):
+        path = study.result(case, REFERENCE, "path")
+        there = None if path is None else path["displacement"].sel(node=7, axis="x").values[-1]
+        moved.append(NO_VALUE if there is None else float(there))
+    return moved[0] / moved[1]
 
 
 def softer_folds_err_less(study: Study) -> float:
@@ -97,7 +88,7 @@ def softer_folds_err_less(study: Study) -> float:
 
 
 def _over_best(study: Study, case: str, model: str) -> float:
-    """Error of a model over the smallest of the five: 1 where it is the best."""
+    """Error of a model over the smallest of the five: 1 if it is the best."""
     row = {m: study.error(case, m) for m in paper_rules()}
     known = all(0.0 < error < math.inf for error in row.values())
     return row[model] / min(row.values()) if known else NO_VALUE
@@ -131,11 +122,11 @@ CLAIMS: Mapping[str, Callable[[Study], float]] = {
     "best_case4": partial(_over_best, case="case4", model="circumcenter"),
     "best_overall": best_overall,
 }
-"""By the key of their row, each with the number that is measured; nan where it cannot be."""
+"""Claims by the key of their row, with the function that measures each; nan if it cannot."""
 
 
 def claims(study: Study) -> list[Verdict]:
-    """The paper's claims beside what was computed; those that could not be are left out."""
+    """The paper's claims next to what was computed; without those that could not be computed."""
     return _known(study, "claims", {key: _value(claim, study) for key, claim in CLAIMS.items()})
 
 
@@ -154,12 +145,12 @@ def paper_table() -> dict[str, dict[str, float]]:
 
 
 def tolerance() -> float:
-    """Deviation, as a fraction, up to which a number of Table 1 is said to agree."""
+    """Deviation, as a fraction, up to which a number of Table 1 counts as reproduced."""
     return max(target.tolerance or 0.0 for target in _table1().values())
 
 
 def table1(study: Study) -> list[Verdict]:
-    """The paper's Table 1 beside ours, a row for each number."""
+    """The paper's Table 1 next to ours, one row for each number."""
     computed = {
         f"{case}_{model}": study.error(case, model)
         for case in study.plan.cases

@@ -28,14 +28,14 @@ SEED = 20_000
 def summary(
     fitted: Callable[[np.random.Generator], Fit], draws: int, truth: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Counts of the intervals that contain the truth, and how far off the estimates are."""
+    """How many intervals contain the truth, and how far off the estimates are."""
     fits = [fitted(np.random.default_rng(SEED + number)) for number in range(draws)]
-    told = {}
+    found = {}
     for key in truth:
         some = [one[key] for one in fits]
         values = np.array([one.value for one in some])
         width = np.mean([0.5 * (one.upper - one.lower) for one in some])
-        told[key] = {
+        found[key] = {
             "truth": truth[key],
             "draws": len(some),
             "contained": sum(one.lower <= truth[key] <= one.upper for one in some),
@@ -47,7 +47,7 @@ def summary(
             "lower": [one.lower for one in some],
             "upper": [one.upper for one in some],
         }
-    return told
+    return found
 
 
 def folds(draws: int, folder: Path) -> dict[str, Any]:
@@ -82,8 +82,6 @@ if __name__ == "__main__":
     for part in (folds, damping):
         result |= part(count, place)
         STORED.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    for key, told in result.items():
-        if isinstance(told, dict):
-            print(
-                f"{key}: {told['contained']} of {told['draws']} intervals contain {told['truth']}"
-            )
+    for key, one in result.items():
+        if isinstance(one, dict):
+            print(f"{key}: {one['contained']} of {one['draws']} intervals contain {one['truth']}")

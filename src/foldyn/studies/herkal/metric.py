@@ -1,22 +1,26 @@
-"""The paper's metric: how far the frequency content of a motion is from that of the shell.
+"""How far a model is from the shell: the paper's metric, and frequencies of like modes.
 
-Per node the norm of the difference of the amplitude spectra up to a frequency, over the norm of the
-shell's spectrum; then the mean over the nodes that the case reports.
+The metric, per node: the norm of the difference of the amplitude spectra up to a frequency, over
+the norm of the shell's spectrum; then the mean over the nodes that the case reports.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
-from foldyn.signals import sampling_interval, spectrum
+from foldyn.linear import mac, pair_modes
+from foldyn.signals import find_peaks, sampling_interval, spectrum
 
 UP_TO = 5.0  # Hz
 AXES = ("x", "y", "z")
+LEAST_MAC = 0.5  # below which modes are no partners,
+FAR = 2.0  # nor where their frequencies are this many times apart
 
 
 def content(
@@ -51,6 +55,20 @@ def content_of(
     frequency, amplitude = spectrum(record, sampling_interval(time))
     kept = frequency <= up_to * (1.0 + 1e-9)
     return frequency[kept], amplitude[kept]
+
+
+def strongest_peak(
+    frequency: NDArray[np.float64],
+    amplitude: NDArray[np.float64],
+    band: tuple[float, float],
+    prominence: float,
+) -> float:
+    """Frequency (Hz) of the highest peak within a band; nan where there is none."""
+    peaks = find_peaks(frequency, amplitude, prominence)
+    inside = (peaks.frequency > band[0]) & (peaks.frequency < band[1])
+    if not inside.any():
+        return float("nan")
+    return float(peaks.frequency[inside][np.argmax(peaks.height[inside])])
 
 
 def deviation(amplitude: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
@@ -110,3 +128,44 @@ def best(values: Mapping[str, float]) -> str:
     """Name of the model with the smallest error, or ""."""
     known = {name: value for name, value in values.items() if np.isfinite(value)}
     return min(known, key=known.__getitem__) if known else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Partners:
+    """Modes of the shell and their partners in a model; nan where there is none.
+
+    Attributes
+    ----------
+    reference, frequency : (k,)
+        Hz.
+    mac : (k,)
+        How alike their shapes are at the pattern's vertices.
+    """
+
+    reference: NDArray
+    frequency: NDArray
+    mac: NDArray
+
+    @property
+    def deviation(self) -> NDArray:
+        """Frequency over that of the shell, less one."""
+        return self.frequency / self.reference - 1.0
+
+    @property
+    def mean_error(self) -> float:
+        """Mean size of the deviations of the modes that have a partner."""
+        known = self.deviation[np.isfinite(self.deviation)]
+        return float(np.abs(known).mean()) if len(known) else float("nan")
+
+
+def partners(reference: xarray.Dataset, ours: xarray.Dataset) -> Partners:
+    """Modes of `ours` that belong to those of `reference`; both at the pattern's vertices."""
+    vertices = reference["node"].values.tolist()
+    theirs = reference["frequency"].values
+    ratio = ours["frequency"].values / theirs[:, None]
+    near = (ratio > 1.0 / FAR) & (ratio < FAR)  # few vertices cannot tell waves of any length
+    pairs = pair_modes(np.where(near, mac(reference, ours, nodes=vertices), 0.0), LEAST_MAC)
+    frequency, likeness = (np.full(len(theirs), np.nan) for _ in range(2))
+    frequency[pairs.first] = ours["frequency"].values[pairs.second]
+    likeness[pairs.first] = pairs.mac
+    return Partners(theirs, frequency, likeness)

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from foldyn.errors import ComputationError, FoldynError, FoldynWarning
+from foldyn.errors import FoldynError, FoldynWarning
 from foldyn.workers import Workers
 
 
 class Task(Protocol):
-    """Something to compute; hashable, and it can be sent to another process."""
+    """Something to compute; it is hashable and can be sent to another process."""
 
     @property
     def name(self) -> str:
@@ -96,22 +95,9 @@ def run(
         for task in left:
             end(_make(task, folder))
     else:
-        _in_processes(left, folder, end, processes)
-    return ended
-
-
-def _in_processes(
-    tasks: Sequence[Task], folder: Path, end: Callable[[Done], None], processes: int
-) -> None:
-    try:
         with Workers(processes) as workers:
-            for one in as_completed([workers.submit(_make, task, folder) for task in tasks]):
-                end(one.result())
-    except BrokenProcessPool:
-        raise ComputationError(
-            "a process that computes was ended from outside, perhaps for lack of memory; the same "
-            "command goes on with what is left"
-        ) from None
+            workers.each(partial(_make, folder=folder), left, lambda _, done: end(done))
+    return ended
 
 
 def _make(task: Task, folder: Path) -> Done:

@@ -6,24 +6,27 @@ sources among it: results of another program are computed again.
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import xarray
 
-from foldyn.analyses import CaseFile, read_case
-from foldyn.cases import Case
+from foldyn import program as programs
 from foldyn.dynamics import simulate
+from foldyn.input_files import file_digest
 from foldyn.linear import modes
 from foldyn.results import load, save
 from foldyn.statics import trace
 from foldyn.store import Store
 from foldyn.studies import find_case
-from foldyn.studies.herkal.models import REFERENCE, Variant, case_with
-from foldyn.studies.herkal.program import program
+from foldyn.studies.herkal.metric import UP_TO
+from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, case_study, case_with
 
+COMPUTING = tuple(
+    f"studies/herkal/{name}.py" for name in ("sheet_models", "runs", "metric", "sensitivity")
+)
+"""Files that the results of the case studies depend on, besides the solvers."""
 SETTINGS = "study_settings"
 EVERY = 0.01  # s, between samples where the case file does not say
 STEPS = 10  # of the load of a path
@@ -59,7 +62,7 @@ class Job:
     case : str
         Name of a shipped case of a motion, "case1".
     model : str
-        One of `foldyn.studies.herkal.models.MODELS`.
+        One of `foldyn.studies.herkal.sheet_models.MODELS`.
     kind : {"path", "modes", "motion"}
     numerics : Numerics
     variant : Variant
@@ -69,7 +72,7 @@ class Job:
     model: str
     kind: Literal["path", "modes", "motion"]
     numerics: Numerics = field(default_factory=Numerics)
-    variant: Variant = field(default_factory=Variant)
+    variant: Variant = AS_FILED
 
     @property
     def name(self) -> str:
@@ -83,12 +86,10 @@ class Job:
 
     def settings(self) -> dict[str, Any]:
         """All that its result depends on."""
-        numerics = asdict(self.numerics)
-        if self.model != REFERENCE:  # neither a mesh nor steps of its own
-            numerics = {"duration": self.numerics.duration}
-        if self.kind != "motion":
-            numerics.pop("duration", None)
-            numerics.pop("dt", None)
+        numerics = {} if self.kind != "motion" else {"duration": self.numerics.duration}
+        if self.model == REFERENCE:  # others have neither a mesh nor steps of their own
+            numerics["divisions"] = self.numerics.divisions
+            numerics |= {"dt": self.numerics.dt} if self.kind == "motion" else {}
         return {
             "case": self.case,
             "case_file": case_file_digest(self.case),
@@ -108,39 +109,36 @@ class Job:
         KEPT.keep(folder / self.file, self.settings(), compute(self))
 
 
+def program() -> str:
+    """Digest of what computes the case studies."""
+    return programs.program(*COMPUTING)
+
+
 def case_file_digest(case: str) -> str:
     """Digest of a shipped case file."""
-    return hashlib.sha256(find_case(f"herkal/{case}").read_bytes()).hexdigest()[:16]
+    return file_digest(find_case(f"herkal/{case}"))
+
+
+def reported(case: str) -> tuple[list[int], str, float]:
+    """Nodes and axis that a case study reports, and where its spectra end (Hz)."""
+    output = case_study(case).output
+    return output.nodes.tolist(), output.axis or "x", output.max_frequency or UP_TO
 
 
 def compute(job: Job) -> xarray.Dataset:
-    """Run a computation; the result is that of the pattern's vertices."""
-    case_file = read_case(find_case(f"herkal/{job.case}"))
+    """Run a computation; the result covers the pattern's vertices, which all models share."""
+    case_file = case_study(job.case)
     case = case_with(case_file, job.model, job.variant, job.numerics.divisions)
-    kinds = {"path": _path, "modes": _modes, "motion": _motion}
-    return _vertices_of(kinds[job.kind](job, case_file, case), case_file)
-
-
-def _path(job: Job, case_file: CaseFile, case: Case) -> xarray.Dataset:
-    return trace(case, steps=STEPS)
-
-
-def _modes(job: Job, case_file: CaseFile, case: Case) -> xarray.Dataset:
-    unloaded = Case(case.structure, case.supports, damping=case.damping)
-    if job.model == REFERENCE:
-        return modes(unloaded, SHELL_MODES)
-    return modes(unloaded, RULE_MODES, secant=SECANT)
-
-
-def _motion(job: Job, case_file: CaseFile, case: Case) -> xarray.Dataset:
-    arguments = {"every": EVERY, **case_file.analysis.arguments, "duration": job.numerics.duration}
-    if job.model == REFERENCE:
-        arguments |= {"method": "newmark", "dt": job.numerics.dt}
-    return simulate(case, **arguments)
-
-
-def _vertices_of(found: xarray.Dataset, case_file: CaseFile) -> xarray.Dataset:
-    """Result at the pattern's vertices, which all models have."""
+    of_shell = job.model == REFERENCE
+    if job.kind == "path":
+        found = trace(case, steps=STEPS)
+    elif job.kind == "modes":
+        count, secant = (SHELL_MODES, None) if of_shell else (RULE_MODES, SECANT)
+        found = modes(replace(case, loads=()), count, secant=secant)
+    else:
+        own = {"method": "newmark", "dt": job.numerics.dt} if of_shell else {}
+        given = {"every": EVERY, **case_file.analysis.arguments, **own}
+        found = simulate(case, **{**given, "duration": job.numerics.duration})
     kept = found.drop_vars("velocity", errors="ignore")
     kept = kept.sel(node=range(len(case_file.pattern.vertices)))
     kept.attrs |= {
@@ -163,5 +161,5 @@ KEPT: Store[xarray.Dataset] = Store(_read, _write)
 
 
 def stored(folder: Path, job: Job) -> xarray.Dataset | None:
-    """Result of a job in a folder; None where there is none, or one of other settings."""
+    """Result of a job in a folder; None if there is none, or one of other settings."""
     return KEPT.find(folder / job.file, job.settings())

@@ -14,18 +14,23 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import foldyn
-from foldyn.analyses import CaseFile, read_case
+from foldyn.analyses import CaseFile
 from foldyn.input_files import from_json, read_text
 from foldyn.store import Store, stamp_of
-from foldyn.studies import find_case
-from foldyn.studies.herkal.metric import UP_TO, errors
-from foldyn.studies.herkal.models import LOADS, OTHERS, REFERENCE, Variant, rules
-from foldyn.studies.herkal.partners import partners
-from foldyn.studies.herkal.program import program
-from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute
+from foldyn.studies.herkal.metric import errors, partners
+from foldyn.studies.herkal.runs import Job, Numerics, case_file_digest, compute, program, reported
+from foldyn.studies.herkal.sheet_models import (
+    AS_FILED,
+    LOADS,
+    OTHERS,
+    REFERENCE,
+    Variant,
+    case_study,
+    rules,
+)
 from foldyn.studies.herkal.variations import Variations
 from foldyn.writing import write_text
 
@@ -39,9 +44,10 @@ MOST = 64
 """Size of a kept file (MiB)."""
 
 
-def stiffnesses(pulse: float | None = None, loads: str = "file") -> list[Variant]:
+def stiffnesses(load: Variant = AS_FILED) -> list[Variant]:
     """Variants of bars and hinges under one load."""
-    return [Variant(pulse, loads, *one) for one in product(BEND_LAWS, CALIBRATIONS)]
+    laws = product(BEND_LAWS, CALIBRATIONS)
+    return [Variant(load.pulse, load.loads, *law) for law in laws]
 
 
 def load_sets(case_file: CaseFile) -> tuple[str, ...]:
@@ -70,18 +76,26 @@ KEPT: Store[list[dict[str, Any]]] = Store(_read, _write)
 
 
 @dataclass(frozen=True)
-class _Kept:
-    """A task whose result is a JSON file with its settings."""
+class Comparison:
+    """All models beside the shell, kept as rows of a JSON file with its settings.
+
+    Attributes
+    ----------
+    case : str
+    numerics : Numerics
+    load : Variant or None
+        Under which the frequency content of motions is compared; None: first frequencies are.
+    """
 
     case: str
     numerics: Numerics = field(default_factory=Numerics)
-
-    kind: ClassVar[str]
+    load: Variant | None = None
 
     @property
     def name(self) -> str:
         """What it is called."""
-        return f"{self.case}-{self.kind}"
+        what = "frequencies" if self.load is None else f"motions-{self.load.name}"
+        return f"{self.case}-{what}"
 
     def settings(self) -> dict[str, Any]:
         """All that its result depends on."""
@@ -98,99 +112,64 @@ class _Kept:
         return self.result(folder) is not None
 
     def result(self, folder: Path) -> list[dict[str, Any]] | None:
-        """Rows that it found; None where there are none, or some of other settings."""
+        """Rows in a folder; None if there are none, or some of other settings."""
         return KEPT.find(folder / f"{self.name}.json", self.settings())
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        KEPT.keep(folder / f"{self.name}.json", self.settings(), list(self.rows()))
+        rows = self._frequencies() if self.load is None else self._errors(self.load)
+        KEPT.keep(folder / f"{self.name}.json", self.settings(), list(rows))
 
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """Compute the rows."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Motions(_Kept):
-    """Errors of the frequency content of all models under one load.
-
-    Attributes
-    ----------
-    case : str
-    numerics : Numerics
-    pulse : float
-        s.
-    loads : str
-        One of `foldyn.studies.herkal.models.LOADS`.
-    """
-
-    pulse: float = 0.5
-    loads: str = "file"
-
-    kind: ClassVar[str] = "motions"
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return f"{self.case}-{self.kind}-{Variant(self.pulse, self.loads).name}"
-
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """Compute the rows."""
-        output = read_case(find_case(f"herkal/{self.case}")).output
-        shown = output.nodes.tolist(), output.axis or "x", output.max_frequency or UP_TO
-        load = Variant(self.pulse, self.loads)
+    def _errors(self, load: Variant) -> Iterator[dict[str, Any]]:
+        """Errors of the frequency content under one load."""
+        shown = reported(self.case)
         reference = compute(Job(self.case, REFERENCE, "motion", self.numerics, load))
-        for variant in stiffnesses(self.pulse, self.loads):
+        for variant in stiffnesses(load):
             row = {"case": self.case, **asdict(variant)}
             for model in MODELS:
                 motion = compute(Job(self.case, model, "motion", self.numerics, variant))
                 row[model] = float(errors(motion, reference, *shown).mean())
             yield row
 
-
-@dataclass(frozen=True)
-class Frequencies(_Kept):
-    """First frequencies of all models beside those of the shell."""
-
-    kind: ClassVar[str] = "frequencies"
-
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """Compute the rows."""
+    def _frequencies(self) -> Iterator[dict[str, Any]]:
+        """First frequencies beside those of the shell."""
         reference = compute(Job(self.case, REFERENCE, "modes", self.numerics))
-        for variant in stiffnesses():
-            for model in MODELS:
-                ours = compute(Job(self.case, model, "modes", self.numerics, variant))
-                found = partners(reference, ours)
-                for k, shell in enumerate(found.reference):
-                    yield {
-                        "case": self.case,
-                        "bend_law": variant.bend_law,
-                        "calibration": variant.calibration,
-                        "model": model,
-                        "mode": k + 1,
-                        "shell": float(shell),
-                        "frequency": float(found.frequency[k]),
-                        "mac": float(found.mac[k]),
-                    }
+        for variant, model in product(stiffnesses(), MODELS):
+            ours = compute(Job(self.case, model, "modes", self.numerics, variant))
+            found = partners(reference, ours)
+            for k, shell in enumerate(found.reference):
+                yield {
+                    "case": self.case,
+                    "bend_law": variant.bend_law,
+                    "calibration": variant.calibration,
+                    "model": model,
+                    "mode": k + 1,
+                    "shell": float(shell),
+                    "frequency": float(found.frequency[k]),
+                    "mac": float(found.mac[k]),
+                }
 
 
-def tasks(cases: Iterable[str], numerics: Numerics) -> list[Motions | Frequencies]:
+def tasks(cases: Iterable[str], numerics: Numerics) -> list[Comparison]:
     """All that is to be computed, the longest first."""
     names = list(cases)
-    found: list[Motions | Frequencies] = []
-    for case in reversed(names):  # case 1 is the smallest
-        for loads in load_sets(read_case(find_case(f"herkal/{case}"))):
-            found += [Motions(case, numerics, pulse, loads) for pulse in PULSES]
-    return [*found, *(Frequencies(case, numerics) for case in names)]
+    loads = [(case, loaded) for case in reversed(names) for loaded in load_sets(case_study(case))]
+    found = [  # case 1 is the smallest
+        Comparison(case, numerics, Variant(pulse, loaded))
+        for (case, loaded), pulse in product(loads, PULSES)
+    ]
+    return [*found, *(Comparison(case, numerics) for case in names)]
 
 
 def variations(folder: Path, cases: Iterable[str], numerics: Numerics) -> Variations:
-    """What is in a folder of that of `tasks`."""
-    found: dict[str, list[Any]] = {Motions.kind: [], Frequencies.kind: []}
+    """Results of `tasks` that are in a folder."""
+    motions: list[dict[str, Any]] = []
+    frequencies: list[dict[str, Any]] = []
     for task in sorted(tasks(cases, numerics), key=lambda task: task.case):
-        found[task.kind] += task.result(folder) or []
+        rows = frequencies if task.load is None else motions
+        rows += task.result(folder) or []
     about = (
         f"Foldyn {foldyn.__version__}, shells of {numerics.divisions} divisions, steps of "
         f"{numerics.dt:g} s, motions of {numerics.duration:g} s"
     )
-    return Variations(about, found[Motions.kind], found[Frequencies.kind])
+    return Variations(about, motions, frequencies)

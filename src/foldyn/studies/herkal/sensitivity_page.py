@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from foldyn.plots import style
 from foldyn.report import Heading, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
-from foldyn.studies.herkal import variations
 from foldyn.studies.herkal.claims import paper_table
-from foldyn.studies.herkal.figures import plot_sensitivity
 from foldyn.studies.herkal.metric import best
-from foldyn.studies.herkal.models import OTHERS, label, paper_rules, rules
 from foldyn.studies.herkal.sensitivity import BEND_LAWS, CALIBRATIONS, PULSES
+from foldyn.studies.herkal.sheet_models import OTHERS, label, paper_rules, rules
+from foldyn.studies.herkal.variations import (
+    FILED,
+    Errors,
+    Variations,
+    frequency_errors,
+    likeness,
+    standings,
+)
 
 LOADED = {"file": "as filed", "edge": "whole edge"}
+SIDES = {"superlinear": (-0.3, style.BLUE), "linear": (0.08, style.ORANGE)}
 TURNED = next(iter(OTHERS))
+STIFFNESSES = tuple(product(BEND_LAWS, CALIBRATIONS))
 CHANGES: Mapping[str, Mapping[str, Any]] = {
     "nothing": {},
     "pulse of 0.1 s instead of 0.5 s": {"pulse": 0.1},
@@ -29,7 +42,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
 """One thing at a time."""
 
 
-def sections(found: variations.Variations, album: Album, tolerance: float) -> list[Section]:
+def sections(found: Variations, album: Album, tolerance: float) -> list[Section]:
     """Text, tables and a figure; nothing where no case was computed as filed."""
     if not found.filed():
         return []
@@ -59,7 +72,49 @@ def sections(found: variations.Variations, album: Album, tolerance: float) -> li
     ]
 
 
-def opinion(found: variations.Variations) -> str:
+def plot_sensitivity(
+    found: Variations, models: Sequence[str], paper: Mapping[str, Mapping[str, float]]
+) -> Figure:
+    """Draw the errors under all combinations, a frame a case, a row a model.
+
+    Parameters
+    ----------
+    found : Variations
+    models : sequence of str
+    paper : mapping
+        The paper's errors by case and model.
+    """
+    cases = list(found.filed())
+    figure = style.new_figure(9.0, 1.0 + 0.42 * len(models) * -(-len(cases) // 2))
+    frames = figure.subplots(-(-len(cases) // 2), 2, squeeze=False, sharey=True, sharex=True)
+    for frame, case in zip(frames.flat, cases, strict=False):
+        style.frame(frame, "error", "", f"case {case[-1]}")
+        filed = found.filed()[case]
+        for place, model in enumerate(models):
+            for law, (start, color) in SIDES.items():
+                errors = [row[model] for row in found.chosen(case=case, bend_law=law)]
+                heights = place + start + np.linspace(0.0, 0.22, len(errors))
+                frame.plot(errors, heights, ".", color=color, markersize=3.5, label=f"{law} bends")
+            ring = frame.plot(filed[model], place, "o", markersize=8, mfc="none", mec=style.BLACK)
+            cross = frame.plot([], [], "x", color=style.VERMILLION, markersize=7, mew=1.8)
+            if model in paper.get(case, {}):
+                cross[0].set_data([paper[case][model]], [place])
+            frame.axhline(place, color=style.LIGHT, linewidth=0.6, zorder=0)
+        frame.set_yticks(range(len(models)), [label(m) for m in models], fontsize=style.TICK)
+        frame.set_ylim(len(models) - 0.4, -0.6)
+        frame.grid(False, axis="y")
+    largest = max(row[model] for row in found.motions for model in models)
+    frames.flat[0].set_xlim(0.0, 1.03 * largest)
+    for spare in frames.flat[len(cases) :]:
+        spare.set_visible(False)
+    handles = [line for line in frames.flat[0].get_lines() if "bends" in str(line.get_label())][:2]
+    ring[0].set_label("case files as they are")
+    cross[0].set_label("paper")
+    style.legend_below(figure, [*handles, ring[0], cross[0]], columns=4)
+    return style.finish(figure)
+
+
+def opinion(found: Variations) -> str:
     """Say from the numbers how far a ranking reaches."""
     parts = []
     paper, names = paper_table(), paper_rules()
@@ -68,36 +123,38 @@ def opinion(found: variations.Variations) -> str:
         if not rows:
             continue
         hits = sum(best({m: r[m] for m in names}) == best(paper[r["case"]]) for r in rows)
-        told = variations.standings(rows, names)
-        first = min(told, key=lambda m: told[m].mean_rank)
-        worst = max(one.worst_rank for one in told.values())
-        spared = [label(m) for m, one in told.items() if one.worst_rank < worst]
+        ranked = standings(rows, names)
+        first = min(ranked, key=lambda m: ranked[m].mean_rank)
+        worst = max(one.worst_rank for one in ranked.values())
+        spared = [label(m) for m, one in ranked.items() if one.worst_rank < worst]
+        last = (
+            f"Never the last: {' and '.join(spared)}."
+            if spared
+            else "Each of the five comes last in some combination."
+        )
         parts.append(
             f"With {law} bends the distribution that the paper finds best for a case is the best "
             f"of the five in {hits} of {len(rows)} combinations. The best mean rank is that of "
-            f"{label(first)} ({told[first].mean_rank:.1f} of 5, between 1 and "
-            f"{told[first].worst_rank}). "
-            + (
-                f"Never the last: {' and '.join(spared)}."
-                if spared
-                else "Each of the five comes last in some combination."
-            )
+            f"{label(first)} ({ranked[first].mean_rank:.1f} of 5, between 1 and "
+            f"{ranked[first].worst_rank}). {last}"
         )
     return " ".join(parts)
 
 
-def one_at_a_time(found: variations.Variations, tolerance: float) -> Table:
+def one_at_a_time(found: Variations, tolerance: float) -> Table:
     """How near the table comes to the paper's, and how far it moves, with one thing changed."""
-    names = paper_rules()
-    filed = found.filed()
+    names, filed = paper_rules(), found.filed()
     rows: list[list[Any]] = []
     for what, change in CHANGES.items():
         table = found.filed(**change)
         if not table:
             continue
-        paper = variations.likeness(table, paper_table(), names, tolerance)
-        moved = variations.likeness(table, filed, names, tolerance)
-        rows.append([what, *_beside_paper(paper), *(_moved(moved) if change else [None, None])])
+        near = likeness(table, paper_table(), names, tolerance)
+        moved = likeness(table, filed, names, tolerance)
+        sizes = [round(100.0 * size) if change else None for size in (moved.median, moved.largest)]
+        cases = near.of // len(names)
+        rows.append([what, f"{near.within} of {near.of}", f"{near.same_best} of {cases}",
+                     f"{near.correlation:+.2f}", *sizes])  # fmt: skip
     return Table(
         ["what is changed", f"numbers within {tolerance:.0%} of the paper's",
          "cases with its best", "rank correlation with it", "median change (%)",
@@ -110,73 +167,54 @@ def one_at_a_time(found: variations.Variations, tolerance: float) -> Table:
     )  # fmt: skip
 
 
-def _beside_paper(one: variations.Likeness) -> list[Any]:
-    cases = one.of // len(paper_rules())
-    return [f"{one.within} of {one.of}", f"{one.same_best} of {cases}", f"{one.correlation:+.2f}"]
+def _best_table(
+    found: Variations, titles: list[str], tables: Iterable[tuple[Any, Any, Errors]], caption: str
+) -> Table:
+    """Which of the five is best, and its error, under two things by case."""
+    cases, rows = list(found.filed()), []
+    for first, second, table in tables:
+        row: list[Any] = [first, second]
+        for case in cases:
+            errors = {m: table[case][m] for m in paper_rules()} if case in table else {}
+            name = best(errors)
+            row.append(f"{label(name)} ({errors[name]:.2g})" if name else None)
+        rows.append(row)
+    return Table([*titles, *[f"case {case[-1]}" for case in cases]], rows, caption)
 
 
-def _moved(one: variations.Likeness) -> list[Any]:
-    return [round(100.0 * one.median), round(100.0 * one.largest)]
-
-
-def _first(row: variations.Row | None) -> str | None:
-    if row is None:
-        return None
-    name = best({m: row[m] for m in paper_rules()})
-    return f"{label(name)} ({row[name]:.2g})"
-
-
-def _cases(found: variations.Variations) -> list[str]:
-    return list(found.filed())
-
-
-def by_load(found: variations.Variations) -> Table:
+def by_load(found: Variations) -> Table:
     """Which of the five is best under which load, bars and hinges as filed."""
-    rows = []
-    for loads, told in LOADED.items():
-        for pulse in PULSES:
-            tables = {
-                row["case"]: row
-                for row in found.chosen(
-                    pulse=pulse,
-                    loads=loads,
-                    **{k: variations.FILED[k] for k in ("bend_law", "calibration")},
-                )
-            }
-            rows.append([told, pulse, *[_first(tables.get(case)) for case in _cases(found)]])
-    paper = paper_table()
-    rows.append(["paper", None, *[_first(paper[case]) for case in _cases(found)]])
-    return Table(
-        ["loaded nodes", "pulse (s)", *[f"case {case[-1]}" for case in _cases(found)]],
-        rows,
+    tables: list[tuple[Any, Any, Errors]] = []
+    for loads, pulse in product(LOADED, PULSES):
+        rows = found.chosen(**{**FILED, "loads": loads, "pulse": pulse})
+        tables.append((LOADED[loads], pulse, {row["case"]: row for row in rows}))
+    return _best_table(
+        found,
+        ["loaded nodes", "pulse (s)"],
+        [*tables, ("paper", None, paper_table())],
         "Which of the paper's five has the smallest error (and the error), by load; superlinear "
         "bends, standard calibration. In case 1 the file loads the whole edge.",
     )
 
 
-def by_stiffness(found: variations.Variations) -> Table:
+def by_stiffness(found: Variations) -> Table:
     """Which of the five is best with which bends, load as filed."""
-    rows = []
-    for law in BEND_LAWS:
-        for calibration in CALIBRATIONS:
-            table = found.filed(bend_law=law, calibration=calibration)
-            firsts = [_first(table.get(case)) for case in _cases(found)]
-            rows.append([law, calibration, *firsts])
-    return Table(
-        ["bends", "calibration", *[f"case {case[-1]}" for case in _cases(found)]],
-        rows,
+    return _best_table(
+        found,
+        ["bends", "calibration"],
+        [(law, one, found.filed(bend_law=law, calibration=one)) for law, one in STIFFNESSES],
         "The same by law and calibration of the bends; load as filed. Where all errors are large, "
         "the stiffness decides and not the mass.",
     )
 
 
-def over_all(found: variations.Variations, law: str) -> Table:
+def over_all(found: Variations, law: str) -> Table:
     """Standing of each distribution over all combinations with one law of the bends."""
     chosen = found.chosen(bend_law=law)
-    five, every = variations.standings(chosen, paper_rules()), variations.standings(chosen, rules())
+    five, every = standings(chosen, paper_rules()), standings(chosen, rules())
     rows: list[list[Any]] = []
-    for model in rules():
-        own, among = five.get(model), every[model]
+    for model, among in every.items():
+        own = five.get(model)
         ranked = [None] * 3 if own is None else [own.mean_rank, own.worst_rank, own.best]
         rows.append([label(model), *ranked, among.mean_rank, among.median, among.largest])
     return Table(
@@ -190,11 +228,10 @@ def over_all(found: variations.Variations, law: str) -> Table:
     )  # fmt: skip
 
 
-def orientations(found: variations.Variations) -> Table:
+def orientations(found: Variations) -> Table:
     """Equi-inertial both ways."""
     rows = []
-    for case in _cases(found):
-        filed = found.filed()[case]
+    for case, filed in found.filed().items():
         every = found.chosen(case=case)
         fewer = sum(row[TURNED] < row["equi_inertial"] for row in every)
         cells = [filed["equi_inertial"], filed[TURNED], paper_table()[case]["equi_inertial"]]
@@ -206,30 +243,25 @@ def orientations(found: variations.Variations) -> Table:
         "with the case files as they are, and in how many combinations the second is nearer to "
         "the shell.",
         digits=3,
-    )  # fmt: skip
+    )
 
 
-def frequencies(found: variations.Variations) -> Table:
-    """Errors of the first frequencies, which no load has a part in."""
+def frequencies(found: Variations) -> Table:
+    """Errors of the first frequencies, in which no load has a part."""
     names = (*rules(), TURNED)
-    columns: list[tuple[str, dict[str, float], int]] = []
-    for law in BEND_LAWS:
-        for calibration in CALIBRATIONS:
-            chosen = [
-                row
-                for row in found.frequencies
-                if row["bend_law"] == law and row["calibration"] == calibration
-            ]
-            means, count = variations.frequency_errors(chosen, names)
-            columns.append((f"{law}, {calibration}", means, count))
-    rows = [[label(m), *[cell(100.0 * means[m]) for _, means, _ in columns]] for m in names]
+    columns = [
+        frequency_errors(
+            [r for r in found.frequencies if (r["bend_law"], r["calibration"]) == one], names
+        )
+        for one in STIFFNESSES
+    ]
     return Table(
-        ["distribution", *[title for title, _, _ in columns]],
-        rows,
+        ["distribution", *map(", ".join, STIFFNESSES)],
+        [[label(m), *[cell(100.0 * means[m]) for means, _ in columns]] for m in names],
         "A measure without a load: mean deviation (%) of the frequencies at rest from the shell's, "
         "by law and calibration of the bends, over those of its first five modes that have a "
         "partner of like shape (MAC) with every distribution: "
-        f"{', '.join(str(count) for _, _, count in columns)} of 20. Superlinear bends, which have "
-        "no stiffness at rest, are taken for turns of 1 degree.",
+        f"{', '.join(str(count) for _, count in columns)} of 20. Superlinear bends, which have no "
+        "stiffness at rest, are taken for turns of 1 degree.",
         digits=2,
     )

@@ -1,35 +1,30 @@
-"""The four case studies: what is computed, and the tables that come of it."""
+"""The four case studies: what is computed, and the tables made from it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.analyses import CaseFile, read_case
-from foldyn.studies import find_case
 from foldyn.studies.herkal import metric
-from foldyn.studies.herkal.models import AS_FILED, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
-from foldyn.studies.herkal.partners import Partners, partners
 from foldyn.studies.herkal.pool import Done, run
-from foldyn.studies.herkal.runs import Job, Numerics, stored
+from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
+from foldyn.studies.herkal.sheet_models import AS_FILED, CASES, REFERENCE, Variant, model_of, rules
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
 
-CASES = ("case1", "case2", "case3", "case4")
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudyPlan:
     """What a study computes.
 
     Attributes
@@ -49,28 +44,31 @@ class Plan:
 
     def jobs(self) -> list[Job]:
         """All computations, the longest first."""
-        every = (REFERENCE, *self.models)
-        found = [Job(c, m, "motion", self.numerics) for m in every for c in self.cases]
-        found += [Job(c, m, "modes", self.numerics) for m in every for c in self.cases]
-        for case in self.cases:
-            found += [Job(case, m, "path", self.numerics) for m in self.statics().values()]
-            found += [
-                Job(case, m, "path", self.numerics, LINEAR)
-                for m in self.statics().values()
-                if m != REFERENCE
-            ]
+        found = [
+            Job(case, model, kind, self.numerics)
+            for kind in ("motion", "modes")
+            for model in (REFERENCE, *self.models)
+            for case in self.cases
+        ]
+        return found + [
+            Job(case, model, "path", self.numerics, variant)
+            for case in self.cases
+            for model, variant in self.paths().values()
+        ]
+
+    def paths(self) -> dict[str, tuple[str, Variant]]:
+        """Model and variant of each stiffness, by label: mass plays no part in statics."""
+        found: dict[str, tuple[str, Variant]] = {}
+        for name in (REFERENCE, *self.models):
+            stiffness = model_of(name).statics
+            found.setdefault(stiffness, (name, AS_FILED))
+            if name != REFERENCE:
+                found.setdefault(f"{stiffness}, linear bends", (name, LINEAR))
         return found
 
-    def statics(self) -> dict[str, str]:
-        """The model that is computed for each stiffness: mass plays no part in statics."""
-        first: dict[str, str] = {}
-        for name in (REFERENCE, *self.models):
-            first.setdefault(model_of(name).statics, name)
-        return first
 
-
-FULL = Plan()
-QUICK = Plan(Numerics(divisions=8, dt=0.01), shot=COARSE)
+FULL = StudyPlan()
+QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE)
 VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
 
 
@@ -80,20 +78,21 @@ class Study:
 
     Attributes
     ----------
-    plan : Plan
+    plan : StudyPlan
     folder : Path
         Of the study; results are in its folder `runs`.
     data : Data or None
         What was measured of the specimen; None leaves it out.
     """
 
-    plan: Plan
+    plan: StudyPlan
     folder: Path
     data: Data | None = None
+    _read: dict[Job, xarray.Dataset | None] = field(default_factory=dict, repr=False)
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:
-        """Computations of the specimen: those that need nothing else, and those after them."""
+        """Computations of the specimen: the independent ones, and those that follow them."""
         return ([], []) if self.data is None else parts(self.plan.shot, self.data)
 
     @property
@@ -111,10 +110,6 @@ class Study:
         ended = run([*first, *self.plan.jobs()], results, tell, processes)
         return ended + run(then, results, tell, processes=1)
 
-    @cached_property
-    def _read(self) -> dict[Job, xarray.Dataset | None]:
-        return {}
-
     def result(
         self, case: str, model: str, kind: str, variant: Variant = AS_FILED
     ) -> xarray.Dataset | None:
@@ -124,62 +119,48 @@ class Study:
             self._read[job] = stored(self.folder / RESULTS, job)
         return self._read[job]
 
-    def case_file(self, case: str) -> CaseFile:
-        """Shipped case file of a case study."""
-        return read_case(find_case(f"herkal/{case}"))
-
-    def reported(self, case: str) -> tuple[list[int], str]:
-        """Nodes and axis that a case study reports."""
-        output = self.case_file(case).output
-        return output.nodes.tolist(), output.axis or "x"
-
     # ------------------------------------------------------------------ tables
     def node_errors(self, case: str, model: str, variant: Variant = AS_FILED) -> NDArray | None:
         """Deviation of the frequency content from the shell's, per node."""
-        nodes, axis = self.reported(case)
         reference = self.result(case, REFERENCE, "motion", variant.of_shell)
         motion = self.result(case, model, "motion", variant)
         if reference is None or motion is None:
             return None
-        up_to = self.case_file(case).output.max_frequency or metric.UP_TO
-        return metric.errors(motion, reference, nodes, axis, up_to)
+        return metric.errors(motion, reference, *reported(case))
 
     def error(self, case: str, model: str, variant: Variant = AS_FILED) -> float:
         """The paper's metric, nan where a motion is missing."""
         found = self.node_errors(case, model, variant)
         return float("nan") if found is None else float(found.mean())
 
-    def table(
-        self, variant: Variant = AS_FILED, models: Iterable[str] | None = None
-    ) -> dict[str, dict[str, float]]:
+    def table(self, models: Iterable[str] | None = None) -> dict[str, dict[str, float]]:
         """The paper's Table 1: its metric by case and model."""
         names = self.plan.models if models is None else tuple(models)
-        return {c: {m: self.error(c, m, variant) for m in names} for c in self.plan.cases}
+        return {c: {m: self.error(c, m) for m in names} for c in self.plan.cases}
 
     def displacements(self, case: str) -> dict[str, NDArray]:
         """Static displacement (m) of the reported nodes at full load, by path."""
-        nodes, axis = self.reported(case)
-        found = {}
-        for label, path in self.paths(case).items():
-            found[label] = path["displacement"].sel(node=nodes, axis=axis).values[-1]
-        return found
+        nodes, axis, _ = reported(case)
+        return {
+            label: path["displacement"].sel(node=nodes, axis=axis).values[-1]
+            for label, path in self.paths(case).items()
+        }
 
     def paths(self, case: str) -> dict[str, xarray.Dataset]:
         """Equilibrium paths by stiffness; bars and hinges also with linear bends."""
-        found = {}
-        for label, model in self.plan.statics().items():
-            found[label] = self.result(case, model, "path")
-            if model != REFERENCE:
-                found[f"{label}, linear bends"] = self.result(case, model, "path", LINEAR)
+        found = {
+            label: self.result(case, model, "path", variant)
+            for label, (model, variant) in self.plan.paths().items()
+        }
         return {label: path for label, path in found.items() if path is not None}
 
-    def frequencies(self, case: str, model: str) -> Partners | None:
-        """Modes of a model that belong to the shell's."""
+    def frequencies(self, case: str, model: str) -> metric.Partners | None:
+        """Modes of a model matched with those of the shell."""
         reference = self.result(case, REFERENCE, "modes")
         ours = self.result(case, model, "modes")
         if reference is None or ours is None:
             return None
-        return partners(reference, ours)
+        return metric.partners(reference, ours)
 
 
 def mean_ranks(table: Mapping[str, Mapping[str, float]], models: Iterable[str]) -> dict[str, float]:
@@ -205,11 +186,10 @@ def second_table(study: Study) -> dict[str, tuple[int, dict[str, float]]]:
 
 
 def _second_row(study: Study, case: str, divisions: int, dt: float) -> dict[str, float]:
-    nodes, axis = study.reported(case)
+    nodes, axis, up_to = reported(case)
     theirs = read_motion(case, divisions, dt)
     if theirs.node.tolist() != nodes:
         return {}
-    up_to = study.case_file(case).output.max_frequency or metric.UP_TO
     moved = theirs.displacement[:, :, metric.AXES.index(axis)]
     reference = metric.content_of(theirs.time, moved, up_to)[1]
     row = {}

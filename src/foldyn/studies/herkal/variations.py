@@ -28,6 +28,8 @@ FILED = {
 """The case files as they are."""
 
 Row = Mapping[str, Any]
+Errors = Mapping[str, Mapping[str, Any]]
+"""Errors by case and model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +64,15 @@ class Variations:
         found = {}
         for case in sorted({row["case"] for row in self.motions}):
             asked = {**FILED, **changes}
-            rows = self.chosen(case=case, **asked) or self.chosen(
-                case=case, **{**asked, "loads": FILED["loads"]}
-            )
+            rows = self.chosen(case=case, **asked)
+            rows = rows or self.chosen(case=case, **{**asked, "loads": FILED["loads"]})
             if rows:
                 found[case] = rows[0]
         return found
 
 
 def write(folder: Path, variations: Variations) -> None:
-    """Write the tables into a folder; a first line says what they are of."""
+    """Write the tables into a folder; their first line says how they were computed."""
     for name, rows in ((METRIC, variations.motions), (FREQUENCIES, variations.frequencies)):
         with whole(folder / name) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(f"# {variations.about}\n")
@@ -88,7 +89,7 @@ def read(folder: Path) -> Variations | None:
     try:
         about, motions = _read(folder / METRIC)
         return Variations(about, motions, _read(folder / FREQUENCIES)[1])
-    except (InputError, csv.Error):
+    except (ValueError, csv.Error):
         warn_of_damage(folder / METRIC, "it is left out")
         return None
 
@@ -99,9 +100,7 @@ def _read(path: Path) -> tuple[str, list[Row]]:
     for row in csv.DictReader(lines):
         if None in row or None in row.values():
             raise InputError(f"{path}: has lines of other lengths than the first")
-        rows.append({name: _value(cell) for name, cell in row.items()})
-        if any(isinstance(value, str) != (name in WORDS) for name, value in rows[-1].items()):
-            raise InputError(f"{path}: has a text for a number, or the other way round")
+        rows.append({k: v if k in WORDS else float(v or "nan") for k, v in row.items()})
     return first.removeprefix("# ").strip(), rows
 
 
@@ -109,15 +108,6 @@ def _text(value: Any) -> Any:
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.4g}"
     return value
-
-
-def _value(text: str) -> Any:
-    if not text:
-        return math.nan
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 # ---------------------------------------------------------------------- ranks
@@ -194,10 +184,7 @@ class Likeness:
     correlation: float
 
 
-Table = Mapping[str, Mapping[str, float]]
-
-
-def likeness(ours: Table, theirs: Table, models: Sequence[str], tolerance: float) -> Likeness:
+def likeness(ours: Errors, theirs: Errors, models: Sequence[str], tolerance: float) -> Likeness:
     """Compare two tables of errors by case and model; of cases and models that both have."""
     cases = [c for c in ours if c in theirs]
     pairs = {c: ({m: ours[c][m] for m in models}, {m: theirs[c][m] for m in models}) for c in cases}

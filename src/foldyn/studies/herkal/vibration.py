@@ -6,15 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import xarray
 
-from foldyn.cases import Case, Rayleigh
-from foldyn.dynamics import simulate
-from foldyn.linear import character, frf, modes, peaks_of
+from foldyn.analyses import CaseFile
+from foldyn.cases import Rayleigh
+from foldyn.linear import character, peaks_of
 from foldyn.signals import LogDecrement, log_decrement
 from foldyn.studies.herkal.calibration import WATCHED, peak, shipped
 from foldyn.studies.targets import Verdict, read_targets, verdicts
@@ -52,28 +52,21 @@ class Response:
 
 
 def specimen(
-    name: str,
-    mass: str = "circumcenter",
-    damping: Rayleigh | None = None,
-    changes: Mapping[str, Any] | None = None,
-) -> Case:
-    """A shipped case of the specimen ("modes", "frf-published", ...), as it is or changed.
+    name: str, damping: Rayleigh | None = None, changes: Mapping[str, Any] | None = None
+) -> CaseFile:
+    """Shipped case file of the specimen ("modes", "frf-published", ...), as it is or changed.
 
     Parameters
     ----------
-    name, mass : str
+    name : str
     damping : Rayleigh, optional
         Another damping.
     changes : mapping, optional
         Other values of some keys.
     """
-    case = shipped(f"specimen-{name}", changes).case(mass)
-    return case if damping is None else replace(case, damping=damping)
-
-
-def analysis(name: str) -> dict[str, Any]:
-    """Arguments of the analysis of a shipped case."""
-    return dict(shipped(f"specimen-{name}").analysis.arguments)
+    own = {} if damping is None else asdict(damping)
+    damped = {f"damping.{key}": value for key, value in own.items()}
+    return shipped(f"specimen-{name}", {**(changes or {}), **damped})
 
 
 def response(
@@ -93,8 +86,7 @@ def response(
     """
     name = "frf-published" if published else "frf"
     damping = replace(damping, state="start" if published else "rest")
-    found = frf(specimen(name, mass, damping), **{**analysis(name), **changes})
-    return Response.of(found)
+    return Response.of(specimen(name, damping).run(mass, **changes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +109,9 @@ class Release:
     motion: xarray.Dataset
 
 
-def released(damping: Rayleigh = ALONE, **changes: Any) -> Release:
-    """Free vibration of the specimen after its weight is taken away.
-
-    Parameters
-    ----------
-    damping : Rayleigh
-    **changes
-        Other arguments of `simulate`.
-    """
-    motion = simulate(specimen("release", damping=damping), **{**analysis("release"), **changes})
+def released() -> Release:
+    """Free vibration of the specimen after its weight is taken away."""
+    motion = specimen("release").run()
     late = motion.sel(time=slice(RELEASED + SETTLED, None))
     x = late["displacement"].sel(node=WATCHED, axis="x").values
     step = float(late["time"][1] - late["time"][0])
@@ -135,9 +120,8 @@ def released(damping: Rayleigh = ALONE, **changes: Any) -> Release:
 
 
 def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Dataset:
-    """Modes of the specimen, with what they do: variables `name` and `share_of_name`."""
-    name = "modes-published" if published else "modes"
-    found = modes(specimen(name, mass), **analysis(name))
+    """Modes of the specimen with their character: variables `name` and `share_of_name`."""
+    found = specimen("modes-published" if published else "modes").run(mass)
     what = character(found, "x")
     return found.assign(name=what["name"], share_of_name=what["share"].max("kind"))
 
@@ -145,13 +129,10 @@ def shapes(published: bool = False, mass: str = "circumcenter") -> xarray.Datase
 def vibration() -> list[Verdict]:
     """The paper's values beside ours: stress-free folds, circumcenter mass."""
     pair = response()
-    computed = {
-        f"frf_{which}_peak": f for which, f in zip(ORDINALS, pair.frequencies, strict=False)
-    }
-    computed |= {
-        f"half_power_{which}": 100.0 * ratio
-        for which, ratio in zip(ORDINALS, pair.damping, strict=False)
-    }
+    computed = {}
+    for which, frequency, ratio in zip(ORDINALS, pair.frequencies, pair.damping, strict=False):
+        computed[f"frf_{which}_peak"] = frequency
+        computed[f"half_power_{which}"] = 100.0 * ratio
     decrement = released().decrement
     computed |= {
         "release_frequency": decrement.damped_frequency,

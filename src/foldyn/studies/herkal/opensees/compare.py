@@ -9,41 +9,35 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.analyses import CaseFile, read_case
-from foldyn.cases import Case
 from foldyn.dynamics import simulate
 from foldyn.linear import modes
 from foldyn.statics import trace
-from foldyn.studies import find_case
-from foldyn.studies.herkal.models import REFERENCE, case_with
+from foldyn.studies.herkal.metric import AXES
 from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.run import DT, SAMPLES
+from foldyn.studies.herkal.runs import reported
+from foldyn.studies.herkal.sheet_models import CASES, REFERENCE, case_study, case_with
 
 COUNT = 5  # frequencies
 
 
-def our_case(name: str, divisions: int) -> tuple[CaseFile, Case]:
-    """A case study with our shell."""
-    case_file = read_case(find_case(f"herkal/{name}"))
-    return case_file, case_with(case_file, REFERENCE, divisions=divisions)
-
-
 def our_still(name: str, divisions: int) -> stored.Still:
     """Statics and frequencies of a case study with our shell."""
-    case_file, case = our_case(name, divisions)
-    path = trace(case, steps=4)
-    unloaded = replace(case, loads=())
+    case_file = case_study(name)
+    case = case_with(case_file, REFERENCE, divisions=divisions)
+    path, node = trace(case, steps=4), case_file.output.nodes
     return stored.Still(
-        node=case_file.output.nodes,
+        node=node,
         load_factor=path.load_factor.values,
-        displacement=path.displacement.sel(node=case_file.output.nodes).values,
-        frequency=modes(unloaded, COUNT).frequency.values,
+        displacement=path.displacement.sel(node=node).values,
+        frequency=modes(replace(case, loads=()), COUNT).frequency.values,
         about={"case": name, "divisions": divisions},
     )
 
@@ -53,9 +47,10 @@ def our_motion(name: str, divisions: int, dt: float, duration: float | None = No
 
     Its duration (s) is by default that of the case file.
     """
-    case_file, case = our_case(name, divisions)
-    whole = case_file.analysis.arguments["duration"]
-    motion = simulate(case, duration or whole, method="newmark", dt=dt, every=SAMPLES)
+    case_file = case_study(name)
+    case = case_with(case_file, REFERENCE, divisions=divisions)
+    length = duration or case_file.analysis.arguments["duration"]
+    motion = simulate(case, length, method="newmark", dt=dt, every=SAMPLES)
     return stored.Moved(
         node=case_file.output.nodes,
         time=motion.time.values,
@@ -96,40 +91,29 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.2f}"
 
 
-def still_row(still: stored.Still, references: Sequence[stored.Still]) -> list[str]:
-    """Values and, in percent, how far they are from those of references.
-
-    Of frequencies, that is the difference of the worst of the first three and of all.
-    """
-    name = still.about["case"]
-    axis = "xyz".index(read_case(find_case(f"herkal/{name}")).output.axis or "x")
-    row = [name, str(still.about["divisions"])]
-    row.append(", ".join(f"{value:.5f}" for value in still.displacement[-1, :, axis]))
-    row.append(", ".join(f"{value:.4f}" for value in still.frequency))
-    for reference in references:
-        if reference is still:
-            row += [""] * 3
-            continue
-        moved, frequency = away(still, reference)
-        worst = [float(np.abs(frequency[:count]).max()) for count in (3, COUNT)]
-        row += map(percent, (moved, *worst))
-    return row
-
-
 def still_table(
     found: Iterable[Sequence[stored.Still]], references: Sequence[Sequence[stored.Still]]
 ) -> str:
-    """Results of each case from coarse to fine, with their distances from the references.
+    """Results of each case from coarse to fine and, in percent, how far they are from references.
 
-    A list of references has one for each case, in the same order.
+    Of frequencies, that is the difference of the worst of the first three and of all. A list of
+    references has one for each case, in the same order.
     """
     head = ["case", "divisions", "displacement, m", "frequencies, Hz"]
     head += ["static, %", "f1 to f3, %", "f1 to f5, %"] * len(references)
-    rows = [
-        still_row(still, [one[number] for one in references])
-        for number, stills in enumerate(found)
-        for still in stills
-    ]
+    rows = []
+    for number, still in _numbered(found):
+        name = still.about["case"]
+        _, axis, _ = reported(name)
+        row = [name, str(still.about["divisions"])]
+        moved = still.displacement[-1, :, AXES.index(axis)]
+        row.append(", ".join(f"{value:.5f}" for value in moved))
+        row.append(", ".join(f"{value:.4f}" for value in still.frequency))
+        for reference in (one[number] for one in references):
+            moved, frequency = away(still, reference)
+            worst = [float(np.abs(frequency[:count]).max()) for count in (3, COUNT)]
+            row += [""] * 3 if reference is still else map(percent, (moved, *worst))
+        rows.append(row)
     return table(head, rows)
 
 
@@ -138,22 +122,24 @@ def motion_table(
 ) -> str:
     """The same of motions."""
     head = ["case", "divisions", "step, s", *["off, %"] * len(references)]
-    rows = [
-        [
-            *(f"{motion.about[key]}" for key in ("case", "divisions", "dt")),
-            *("" if motion is one[number] else percent(motion_away(motion, one[number]))
-              for one in references),
-        ]
-        for number, motions in enumerate(found)
-        for motion in motions
-    ]  # fmt: skip
+    rows = []
+    for number, motion in _numbered(found):
+        row = [str(motion.about[key]) for key in ("case", "divisions", "dt")]
+        for reference in (one[number] for one in references):
+            row.append("" if reference is motion else percent(motion_away(motion, reference)))
+        rows.append(row)
     return table(head, rows)
+
+
+def _numbered(found: Iterable[Sequence[Any]]) -> Iterator[tuple[int, Any]]:
+    """Results of all cases, each with the number of its case."""
+    return ((number, one) for number, results in enumerate(found) for one in results)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Print what the command line asks for."""
     parser = argparse.ArgumentParser(description="Our shell beside OpenSees.")
-    parser.add_argument("--cases", nargs="+", choices=stored.CASES, default=stored.CASES)
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
     parser.add_argument("--divisions", type=int, nargs="*", default=[16], help="of our shell")
     parser.add_argument("--motion", type=int, nargs="*", default=[], help="the same for motions")
     parser.add_argument("--dt", type=float, default=DT, help="time step of our motions, s")

@@ -11,14 +11,15 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from foldyn.analyses import CaseFile, read_case
+from foldyn.analyses import CaseFile
 from foldyn.errors import FoldynError
-from foldyn.studies import find_case
 from foldyn.studies.herkal.opensees import stored
 from foldyn.studies.herkal.opensees.model import PanelShells
+from foldyn.studies.herkal.sheet_models import CASES, case_study
 
 DT = 0.005  # s
 SAMPLES = 0.01  # s, between those that are stored
@@ -52,7 +53,7 @@ def motion(name: str, divisions: int, dt: float) -> stored.Moved:
 
 
 def _shells(name: str, divisions: int) -> tuple[CaseFile, PanelShells]:
-    case_file = read_case(find_case(f"herkal/{name}"))
+    case_file = case_study(name)
     return case_file, PanelShells(case_file.case(), divisions)
 
 
@@ -69,24 +70,23 @@ def _about(name: str, shells: PanelShells) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> int:
     """Run what the command line says."""
     parser = argparse.ArgumentParser(description="Run cases with OpenSees.")
-    parser.add_argument("cases", nargs="+", choices=stored.CASES)
+    parser.add_argument("cases", nargs="+", choices=CASES)
     parser.add_argument("--divisions", type=int, nargs="+", default=[16])
     parser.add_argument("--motion", action="store_true", help="the motion, not statics")
     parser.add_argument("--dt", type=float, default=DT, help="time step of the motion, s")
     parser.add_argument("--out", type=Path, default=stored.RESULTS, help="folder of the results")
     chosen = parser.parse_args(arguments)
     chosen.out.mkdir(parents=True, exist_ok=True)
-    for divisions in chosen.divisions:
-        for name in chosen.cases:
-            try:
-                if chosen.motion:
-                    path = stored.write_motion(chosen.out, motion(name, divisions, chosen.dt))
-                else:
-                    path = stored.write_still(chosen.out, still(name, divisions))
-            except FoldynError as error:
-                print(error, file=sys.stderr)
-                return 1
+    try:
+        for divisions, name in product(chosen.divisions, chosen.cases):
+            if chosen.motion:
+                path = stored.write_motion(chosen.out, motion(name, divisions, chosen.dt))
+            else:
+                path = stored.write_still(chosen.out, still(name, divisions))
             print(path.name, flush=True)
+    except FoldynError as error:
+        print(error, file=sys.stderr)
+        return 1
     return 0
 
 

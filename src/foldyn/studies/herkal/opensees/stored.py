@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 RESULTS = Path(__file__).parent / "results"
-CASES = ("case1", "case2", "case3", "case4")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,25 +79,17 @@ def write_motion(folder: Path, result: Moved) -> Path:
     """Write a motion, in single precision; the file is returned."""
     about = result.about
     path = folder / f"{about['case']}-d{about['divisions']}-dt{about['dt']:g}.npz"
-    np.savez_compressed(
-        path,
-        node=result.node,
-        time=result.time,
-        displacement=result.displacement.astype(np.float32),
-        about=np.array(json.dumps(about)),
-    )
+    single = result.displacement.astype(np.float32)
+    arrays = {"node": result.node, "time": result.time, "displacement": single}
+    np.savez_compressed(path, **arrays, about=np.array(json.dumps(about)))
     return path
 
 
 def read_motion(case: str, divisions: int, dt: float, folder: Path = RESULTS) -> Moved:
     """Motion of a case."""
     with np.load(folder / f"{case}-d{divisions}-dt{dt:g}.npz") as found:
-        return Moved(
-            node=found["node"],
-            time=found["time"],
-            displacement=found["displacement"].astype(float),
-            about=json.loads(str(found["about"])),
-        )
+        moved, about = found["displacement"].astype(float), json.loads(str(found["about"]))
+        return Moved(found["node"], found["time"], moved, about)
 
 
 def stored_divisions(case: str, folder: Path = RESULTS) -> list[int]:

@@ -1,7 +1,8 @@
-"""From what was measured of the specimen to its parameters, and back to what the model says."""
+"""From measurements of the specimen to its parameters, and back to the predictions of the model."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,14 +18,19 @@ from scipy.optimize import minimize_scalar
 from foldyn.analyses import read_case
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
-from foldyn.experiment import Fit, ForceDisplacement, History, Measurement, Shapes
-from foldyn.experiment.calibration.key_paths import replaced
+from foldyn.experiment import Fit, ForceDisplacement, Measurement, Shapes, TimeHistory
+from foldyn.experiment.calibration.parameters import replaced
+from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
-from foldyn.studies.herkal.calibration import FRONT, FULL, SUPPORTS, WATCHED
+from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED
+from foldyn.studies.herkal.metric import deviation, strongest_peak
 from foldyn.studies.herkal.specimen.prepared import FreeVibration, prepare
 from foldyn.writing import write_text
 
 FILM_SUPPORT = "glued"
+PROMINENCE = 0.05  # of a peak, as a part of the highest amplitude
+NEAR = (4.0, 14.0)  # Hz, where the axial vibration is sought
+FINER = 8  # times by which the grid of frequencies is finer than the resolution
 UNLIKE = 0.2  # part of their displacement by which nodes may differ from a state of the model
 SAME = 1e-4  # m, by which positions at rest may differ
 FACTORS = np.linspace(0.0, 1.1, 34)  # of the path on which measured shapes are sought
@@ -183,17 +189,17 @@ class Released:
 
 
 def fit_release(
-    measured: History,
+    measured: TimeHistory,
     models: Path,
     changes: Mapping[str, Any],
     step: float = calibration.STEP,
-    **how: Any,
+    **options: Any,
 ) -> Released:
     """Fit the damping to node 8 alone, on the plate with node 59 glued and without the glue.
 
     Parameters
     ----------
-    measured : History
+    measured : TimeHistory
         Of the tracked nodes along x, from before the release on.
     models : Path
         Gets the case files of the models, a folder for each support.
@@ -201,30 +207,23 @@ def fit_release(
         What the static test has changed in the case, by key.
     step : float
         Of the simulations (s).
-    **how
+    **options
         Arguments of `foldyn.fit`.
     """
     free = prepare(measured)
     press = press_of(free, changes)
     duration = float(free.history.time[-1]) + 2.0 * free.history.align
-    cases = {
-        support: calibration.released_case(
-            models / support.replace(" ", "-"),
-            changes,
-            step,
-            press,
-            support,
-            duration,
-        )
-        for support in SUPPORTS
-    }
+    cases = {}
+    for support in SUPPORTS:
+        place = models / support.replace(" ", "-")
+        cases[support] = calibration.released_case(place, changes, step, press, support, duration)
     others = [node for node in free.nodes if node in FRONT and node != WATCHED]
     film = [free.of([WATCHED], "node 8")]
     if others:
         film.append(replace(free.of(others, "other front nodes"), held_out=True))
     whole = [found for one in film if (found := free.whole_of(one)) is not None]
     data = [*film, *calibration.spectra_of(whole)]
-    fits = {s: calibration.fit_damping(cases[s], data, **how) for s in (FILM_SUPPORT, "plate")}
+    fits = {s: calibration.fit_damping(cases[s], data, **options) for s in (FILM_SUPPORT, "plate")}
     return Released(free, press, cases, fits)
 
 
@@ -299,3 +298,58 @@ def compared(
     moved = truth["position"].sel(node=front, axis="x")
     true = CubicSpline(moved["time"], moved)(one.time + released.free.released)
     return found.assign(true=(("time", "node"), true - one.trend(true), {"units": "m"}))
+
+
+def content(x: NDArray[np.float64], step: float) -> tuple[NDArray, NDArray] | None:
+    """Frequencies (Hz) up to the band's end and amplitudes; None if samples are missing."""
+    if not np.isfinite(x).all():
+        return None
+    frequency, amplitude = spectrum(x, step, detrend="constant", pad=FINER)
+    inside = frequency <= BAND[1]
+    return frequency[inside], amplitude[inside]
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """Axial vibration of a record; nan where there is none.
+
+    Attributes
+    ----------
+    peak : float
+        Frequency (Hz) of the highest peak of the amplitude spectrum.
+    frequency, damping_ratio : float
+        From the maxima over time, by the logarithmic decrement (Hz).
+    """
+
+    peak: float = math.nan
+    frequency: float = math.nan
+    damping_ratio: float = math.nan
+
+
+def vibration_of(x: NDArray[np.float64], step: float) -> Vibration:
+    """Axial vibration of a record without gaps."""
+    found = content(x, step)
+    if found is None:
+        return Vibration()
+    peak = strongest_peak(*found, NEAR, PROMINENCE)
+    if math.isnan(peak):
+        return Vibration()
+    try:
+        maxima = log_decrement(x, step, rest=0.0, frequency=peak)
+    except InputError:  # fewer than two
+        return Vibration(peak)
+    return Vibration(peak, maxima.damped_frequency, maxima.damping_ratio)
+
+
+def misfit(film: NDArray[np.float64], model: NDArray[np.float64]) -> float:
+    """Root mean square of the difference, relative to that of the measured samples."""
+    known = np.isfinite(film)
+    return float(np.linalg.norm((model - film)[known]) / np.linalg.norm(film[known]))
+
+
+def content_misfit(film: NDArray[np.float64], model: NDArray[np.float64], step: float) -> float:
+    """The paper's metric; nan if the node was lost for long."""
+    measured, said = content(film, step), content(model, step)
+    if measured is None or said is None:
+        return math.nan
+    return float(deviation(said[1][:, None], measured[1][:, None])[0])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.plots import style
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import WATCHED
-from foldyn.studies.herkal.specimen.agreement import content
+from foldyn.studies.herkal.specimen.evaluation import content
 from foldyn.studies.herkal.vibration import CORNER, Response
 
 WIDTH = 9.0  # inches

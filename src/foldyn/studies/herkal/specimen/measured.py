@@ -1,22 +1,21 @@
-"""What the study of the specimen is given: measured files, or nothing and then synthetic data."""
+"""Data for the study of the specimen: measured files or, without any, synthetic data."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.experiment import ForceDisplacement, History, Measurement, load_tracks, open_film
+from foldyn.experiment import ForceDisplacement, Measurement, TimeHistory, load_tracks, open_film
 from foldyn.experiment.calibration.measured_files import recognize
 from foldyn.experiment.tracking.films import PHOTOS
-from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL
+from foldyn.input_files import check_file, file_digest
+from foldyn.studies.herkal.calibration import FOLD_RANGES, FULL, SYNTHETIC
 from foldyn.studies.herkal.specimen import evaluation
 from foldyn.studies.herkal.specimen.prepared import prepare
 
-SYNTHETIC = "synthetic"
 AXIS = "x"
 
 
@@ -42,7 +41,7 @@ class Data:
 
     @property
     def film(self) -> Path | None:
-        """The release, where it is a film that is still to be tracked."""
+        """The release, if it is a film that must still be tracked."""
         is_film = self.release is not None and self.release.suffix.lower() not in (".nc", ".csv")
         return self.release if is_film else None
 
@@ -56,11 +55,6 @@ class Data:
         """The files by what they are."""
         files = {"static": self.static, "release": self.release}
         return {what: file for what, file in files.items() if file is not None}
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the files."""
-        return [file.name for file in self.files.values()]
 
     def digests(self) -> dict[str, str]:
         """Digests of the files, by what they are."""
@@ -79,11 +73,8 @@ def data_of(names: Sequence[str]) -> Data:
     found: dict[str, Path] = {}
     for name in names:
         file = Path(name)
-        if not file.is_file():
-            what = "is a folder; name a file in it" if file.is_dir() else "there is no such file"
-            raise InputError(f"--data {name}: {what}")
         try:
-            kind = _kind(file)
+            kind = _kind(check_file(file, "a file in it"))
         except InputError as error:
             said = str(error)
             raise InputError(f"--data {said if str(file) in said else f'{file}: {said}'}") from None
@@ -119,22 +110,22 @@ def _kind(file: Path) -> str:
     elif suffix != ".csv":
         open_film(str(file))
         return "release"
-    told = measurement(file, "")
-    if isinstance(told, ForceDisplacement):
-        _check_forces(told)
+    given = measurement(file, "")
+    if isinstance(given, ForceDisplacement):
+        _check_forces(given)
         return "static"
-    if not isinstance(told, History):
+    if not isinstance(given, TimeHistory):
         raise InputError(
             "shapes without forces say nothing of the stiffness; give forces over displacements, "
             "or tracks of photographs with loads (*.nc)"
         )
-    evaluation.press_of(prepare(told))
+    evaluation.press_of(prepare(given))
     return "release"
 
 
-def _check_forces(told: ForceDisplacement) -> None:
-    """Refuse points from which the folds cannot be found."""
-    moved, most = told.displacement, FULL * evaluation.FACTORS[-1]
+def _check_forces(given: ForceDisplacement) -> None:
+    """Refuse points from which the folds cannot be determined."""
+    moved, most = given.displacement, FULL * evaluation.FACTORS[-1]
     if len(moved) < len(FOLD_RANGES):
         raise InputError(f"{len(moved)} force cannot give {len(FOLD_RANGES)} parameters")
     if not ((moved > 0.0) & (moved <= most)).all():
@@ -142,8 +133,8 @@ def _check_forces(told: ForceDisplacement) -> None:
             f"displacements are {1e3 * moved.min():.3g} to {1e3 * moved.max():.3g} mm; those of "
             f"the top must be above 0, downwards, and at most {1e3 * most:.3g} mm"
         )
-    if not (told.force > 0.0).all():
-        raise InputError(f"a force is {told.force.min():.3g} N; those that press are positive")
+    if not (given.force > 0.0).all():
+        raise InputError(f"a force is {given.force.min():.3g} N; those that press are positive")
 
 
 def _digest(file: Path) -> str:
@@ -153,6 +144,5 @@ def _digest(file: Path) -> str:
 
 @cache
 def _digest_of(file: Path, size: int, changed: int) -> str:
-    """Digest of a file; that of a long film takes seconds."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()[:16]
+    """Digest of a file of this size and time; for a long film it takes seconds."""
+    return file_digest(file)

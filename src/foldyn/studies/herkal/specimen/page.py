@@ -18,9 +18,14 @@ from foldyn.report.sections import cell
 from foldyn.results import case_of, load, netcdf
 from foldyn.signals import sampling_interval
 from foldyn.studies.herkal.calibration import BAND, DAMPING, FOLDS, WATCHED
-from foldyn.studies.herkal.case_page import NO_BREAK
-from foldyn.studies.herkal.specimen import agreement, figures, synthetic, tasks
-from foldyn.studies.herkal.specimen.evaluation import FILM_SUPPORT
+from foldyn.studies.herkal.specimen import figures, synthetic, tasks
+from foldyn.studies.herkal.specimen.evaluation import (
+    FILM_SUPPORT,
+    NEAR,
+    content_misfit,
+    misfit,
+    vibration_of,
+)
 from foldyn.studies.herkal.specimen.figures import SUPPORT_NAMES
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.tasks import Part
@@ -28,6 +33,8 @@ from foldyn.studies.herkal.vibration import ORDINALS, TARGETS, Response
 from foldyn.studies.targets import Target, read_targets
 
 TITLE = "The paper specimen: from photographs and a film to a calibrated model"
+NO_BREAK = "\N{NO-BREAK SPACE}"
+ALONE = "glue alone"
 POOR = 0.3  # misfit, as a part of what was measured, above which a fit is none
 SYMBOLS = {
     "sheet.length_scale_ratio": "length-scale ratio",
@@ -52,16 +59,16 @@ def sections(folder: Path, parts: Sequence[Part], album: Album) -> list[Section]
     fit, response = parts
     if not fit.there(folder):
         return []
-    inside, data, note = folder / tasks.FOLDER, fit.data, fit.note
+    inside = folder / tasks.FOLDER
     found = tasks.read_found(inside)
-    told: list[Section] = [Heading(TITLE), Text(_opening(data))]
+    page: list[Section] = [Heading(TITLE), Text(_opening(fit.data))]
     if "folds" in found:
-        told += _static(inside, found, data)
+        page += _static(inside, found, fit.data)
     if "damping" in found:
-        told += _release(inside, found, data, album, note)
+        page += _release(inside, found, fit, album)
     if response.there(folder):
-        told += _vibration(inside, album, note)
-    return told
+        page += _vibration(inside, album, fit.note)
+    return page
 
 
 def _opening(data: Data) -> str:
@@ -82,18 +89,23 @@ def _opening(data: Data) -> str:
 
 # ---------------------------------------------------------------------- static test
 def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
-    parts: list[Section] = [Heading("Static test: the creases", 3)]
-    if data.synthetic:
-        parts.append(
-            Picture(
-                folder / "photograph.png",
-                "The synthetic photograph under 0.312 N, the nodes that were recognized, and the "
-                "model over it.",
-            )
-        )
     weights = found["weights"]
     rows = [[1e3 * u, f] for u, f in zip(weights["displacement"], weights["force"], strict=True)]
-    parts += [
+    shapes = folder / "folds" / "data-1.png"
+    photograph = Picture(
+        folder / "photograph.png",
+        "The synthetic photograph under 0.312 N, the nodes that were recognized, and the model "
+        "over it.",
+    )
+    corners = Picture(shapes, "Deformed shapes of the model over the corners in the photographs.")
+    softer = Text(
+        "That the sheet is softer than the model, which the fit cannot know, goes into both "
+        "numbers. The intervals take what is left for random errors of single values: they need "
+        "not contain the truth."
+    )
+    return [
+        Heading("Static test: the creases", 3),
+        *([photograph] if data.synthetic else []),
         Table(
             ["displacement of the top (mm)", "weight (N)"], rows,
             "What is fitted: displacements of the top, imposed on the model, and the weights that "
@@ -102,69 +114,52 @@ def _static(folder: Path, found: dict[str, Any], data: Data) -> list[Section]:
         _estimates({"": found["folds"]}, FOLDS, data),
         *_doubt(found["folds"], "weights"),
         Picture(folder / "folds" / "data-0.png", "Forces, and the fitted model."),
+        *([corners] if shapes.is_file() else []),  # the folder is made anew by each fit
+        *([softer] if data.synthetic else []),
     ]  # fmt: skip
-    shapes = folder / "folds" / "data-1.png"
-    if shapes.is_file():  # the folder is made anew by each fit
-        parts.append(
-            Picture(shapes, "Deformed shapes of the model over the corners in the photographs.")
-        )
-    if data.synthetic:
-        parts.append(
-            Text(
-                "That the sheet is softer than the model, which the fit cannot know, goes into "
-                "both numbers. The intervals take what is left for random errors of single values: "
-                "they need not contain the truth."
-            )
-        )
-    return parts
 
 
 def _estimates(fits: Mapping[str, dict[str, Any]], truth: Mapping[str, float], data: Data) -> Table:
-    """Fitted parameters with their intervals, beside the paper's."""
-    rows = []
-    for name, fit in fits.items():
-        for one in fit["parameters"]:
-            first = [SUPPORT_NAMES[name]] if name else []
-            rows.append(
-                [*first, SYMBOLS[one["key"]], one["value"], one["lower"], one["upper"],
-                 truth[one["key"]], one["note"]]
-            )  # fmt: skip
-    beside = "paper, and truth here" if data.synthetic else "paper"
+    """Fitted parameters with their intervals, next to the paper's; by support, if it has a name."""
+    rows = [
+        [*filter(None, [SUPPORT_NAMES.get(support)]), SYMBOLS[one["key"]], one["value"],
+         one["lower"], one["upper"], truth[one["key"]], one["note"]]
+        for support, fit in fits.items()
+        for one in fit["parameters"]
+    ]  # fmt: skip
     header = ["model stands on"] if any(fits) else []
+    beside = "paper, and truth here" if data.synthetic else "paper"
     header += ["parameter", "fitted", "95 % from", "to", beside, ""]
     return Table(header, rows, "Fitted parameters.", digits=4)
 
 
 def _doubt(fit: dict[str, Any], what: str) -> list[Section]:
-    """Say in words where a fit is none."""
-    told = []
-    poor = [m for m in fit["measurements"] if m["name"] == what and m["relative"] > POOR]
-    if poor:
-        told.append(f"the misfit is {poor[0]['relative']:.0%} of what was measured")
-    told += [f"{SYMBOLS[p['key']]} is {p['note']}" for p in fit["parameters"] if p["at_bound"]]
-    told += [
+    """Say in words why a fit must not be used."""
+    doubts = [
+        f"the misfit is {one['relative']:.0%} of what was measured"
+        for one in fit["measurements"]
+        if one["name"] == what and one["relative"] > POOR
+    ]
+    doubts += [f"{SYMBOLS[p['key']]} is {p['note']}" for p in fit["parameters"] if p["at_bound"]]
+    doubts += [
         f"the data do not determine {SYMBOLS[p['key']]}"
         for p in fit["parameters"]
         if not p["determined"] and not p["at_bound"]
     ]
-    if not told:
-        return []
-    return [Text(f"DO NOT USE THESE PARAMETERS, nor what follows from them: {'; '.join(told)}.")]
+    text = f"DO NOT USE THESE PARAMETERS, nor what follows from them: {'; '.join(doubts)}."
+    return [Text(text)] if doubts else []
 
 
 # ---------------------------------------------------------------------- release
-def _release(
-    folder: Path, found: dict[str, Any], data: Data, album: Album, note: str
-) -> list[Section]:
+def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> list[Section]:
     front = netcdf.read(folder / tasks.COMPARED, "cannot be read as NetCDF")
-    parts: list[Section] = [Heading("Release: the damping", 3)]
+    data, note = fit.data, fit.note
     filmed = data.synthetic or data.film is not None
-    if filmed:
-        parts.append(
-            Picture(folder / "film.png", "The frame of the film in which the model was recognized.")
-        )
     label = f"{data.label} film" if filmed else data.label
-    parts += [
+    frame = Picture(folder / "film.png", "The frame of the film in which the model was recognized.")
+    return [
+        Heading("Release: the damping", 3),
+        *([frame] if filmed else []),
         Picture(
             folder / "steps.png",
             f"Node {WATCHED} (the paper's node 9) as it is prepared: window, first turning point, "
@@ -184,9 +179,7 @@ def _release(
             "(right). The model by the glue alone has the damping of the first.",
             lambda: figures.plot_supports(front, label, note),
         ),
-        _peaks(front, data),
-        *_tracked(front),
-        Text(_glue(front)),
+        *_vibrations(front, data),
         album.figure(
             "specimen-front",
             f"All front nodes that were tracked, the model on the {SUPPORT_NAMES[FILM_SUPPORT]}. "
@@ -200,81 +193,77 @@ def _release(
         ),
         _agreement(front),
     ]
-    return parts
 
 
-def _peaks(front: xr.Dataset, data: Data) -> Table:
-    step = sampling_interval(front["time"].values)
-    curves = {f"{data.label}, as filmed": front["whole"].sel(node=WATCHED).values}
+def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
+    """How the watched node vibrates, how well it was tracked, and what the supports do to it."""
+    step, at = sampling_interval(front["time"].values), front.sel(node=WATCHED)
+    curves = {f"{data.label}, as filmed": at["whole"]}
     if "true" in front:
-        curves[f"{data.label}, its true motion"] = front["true"].sel(node=WATCHED).values
-    for support, name in SUPPORT_NAMES.items():
-        curves[f"model: {name}"] = front["model"].sel(node=WATCHED, support=support).values
+        curves[f"{data.label}, its true motion"] = at["true"]
+    curves |= {
+        f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
+    }
+    found = {name: vibration_of(x.values, step) for name, x in curves.items()}
     paper = _targets()
     rows: list[list[Any]] = [
         ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
     ]
-    for name, x in curves.items():
-        one = agreement.vibration_of(x, step)
+    for name, one in found.items():
         rows.append([name, *map(cell, (one.peak, one.frequency, 100.0 * one.damping_ratio))])
-    return Table(
+    table = Table(
         ["", "spectrum's peak (Hz)", "maxima (Hz)", "decrement (%)"],
         rows,
         f"Vibration of node {WATCHED} along x: the highest peak of its spectrum between "
-        f"{agreement.NEAR[0]:g} and {agreement.NEAR[1]:g} Hz; the frequency of its maxima over "
-        "time, and the damping by their logarithmic decrement, as the paper has it.",
+        f"{NEAR[0]:g} and {NEAR[1]:g} Hz; the frequency of its maxima over time, and the damping "
+        "by their logarithmic decrement, as the paper has it.",
         digits=3,
-    )  # fmt: skip
+    )
+    held, alone = (found[f"model: {SUPPORT_NAMES[key]}"].peak for key in (FILM_SUPPORT, ALONE))
+    glue = Text(_glue(held, alone, paper["release_frequency"].value))
+    return [table, *_tracked(front), glue]
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:
-    """How far the film is from the motion that was filmed, where that is known."""
+    """How far the tracks are from the true motion, if it is known."""
     if "true" not in front:
         return []
     off = (front["measured"] - front["true"]).values
-    share = np.isfinite(off).mean()
     return [
         Text(
-            f"The front nodes were measured in {share:.1%} of the frames, to within "
-            f"{1e6 * math.sqrt(np.nanmean(off**2)):.0f} micrometres (root mean square; constant "
-            "and linear parts, which the preparation takes off, are not counted)."
+            f"The front nodes were measured in {np.isfinite(off).mean():.1%} of the frames, to "
+            f"within {1e6 * math.sqrt(np.nanmean(off**2)):.0f} micrometres (root mean square; "
+            "constant and linear parts, which the preparation takes off, are not counted)."
         )
     ]
 
 
-def _glue(front: xr.Dataset) -> str:
-    """What the supports do to the frequency, and whether that tells them apart."""
-    step = sampling_interval(front["time"].values)
-    held, alone = (
-        agreement.vibration_of(front["model"].sel(node=WATCHED, support=support).values, step).peak
-        for support in (FILM_SUPPORT, "glue alone")
-    )
-    paper = _targets()["release_frequency"].value
-    told = (
+def _glue(held: float, alone: float, paper: float) -> str:
+    """How the supports change the frequency (Hz), and whether that tells them apart."""
+    if not math.isfinite(held) or not math.isfinite(alone):
+        return "With one of the supports the model has no peak where it is sought."
+    text = (
         "The paper glued node 59 and let the specimen stand on the plate. The model has its peak "
         f"at {alone:.1f} Hz when it is held at node 59 alone, with nothing below the other nodes "
         f"of the bottom, and at {held:.1f} Hz with the row kept in x by the plate; the paper found "
         f"{paper:g} Hz."
     )
-    if not math.isfinite(held) or not math.isfinite(alone):
-        return "With one of the supports the model has no peak where it is sought."
     if abs(held - paper) < 0.5 * abs(alone - paper):
-        told += " So the plate held the row, whatever the glue did."
-    return told
+        text += " So the plate held the row, whatever the glue did."
+    return text
 
 
 def _agreement(front: xr.Dataset) -> Table:
     step = sampling_interval(front["time"].values)
-    shown = (FILM_SUPPORT, "plate")
     rows = []
     for node in front["node"].values.tolist():
-        film = front["measured"].sel(node=node).values
-        whole = front["whole"].sel(node=node).values
-        both = [front["model"].sel(node=node, support=support).values for support in shown]
+        at = front.sel(node=node)
+        film, whole = at["measured"].values, at["whole"].values
+        both = at["model"].sel(support=[FILM_SUPPORT, "plate"]).values
         rows.append(
             [node, "fitted" if node == WATCHED else f"held{NO_BREAK}out",
-             *[100.0 * agreement.misfit(film, x) for x in both],
-             *[cell(100.0 * agreement.content_misfit(whole, x, step)) for x in both]]
+             *[100.0 * misfit(film, x) for x in both],
+             *[cell(100.0 * content_misfit(whole, x, step)) for x in both]]
         )  # fmt: skip
     return Table(
         ["node", "", "time: glued (%)", "time: ideal (%)", "frequency: glued (%)",
@@ -320,13 +309,13 @@ def _response_table(responses: Mapping[str, xr.Dataset], paper: Mapping[str, Tar
     found = [Response.of(one) for one in responses.values()]
     rows: list[list[Any]] = []
     for k, which in enumerate(ORDINALS):
+        values = [_at(one.frequencies, k) for one in found]
         target = paper[f"frf_{which}_peak"]
-        row: list[Any] = [f"{target.what} (Hz)", target.value]
-        rows.append(row + [_at(one.frequencies, k) for one in found])
+        rows.append([f"{target.what} (Hz)", target.value, *values])
     for k, which in enumerate(ORDINALS[1:], 1):
         target = paper[f"half_power_{which}"]
-        row = [f"{target.what} (%)", target.value]
-        rows.append(row + [_at(one.damping, k, 100.0) for one in found])
+        values = [_at(one.damping, k, 100.0) for one in found]
+        rows.append([f"{target.what} (%)", target.value, *values])
     return Table(
         ["", "paper", "the paper's parameters, here", "fitted parameters"], rows,
         "Peaks of the response, and damping by the half-power points as the paper has it.",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn import signals
 from foldyn.errors import InputError
-from foldyn.experiment import History
+from foldyn.experiment import TimeHistory
 from foldyn.studies.herkal.calibration import SEEN, WATCHED
 
 GAP = 1 / 30  # s, of a gap that is filled: a third of a period
@@ -36,7 +36,7 @@ class FreeVibration:
 
     Attributes
     ----------
-    history : History
+    history : TimeHistory
         All nodes relative to their final positions, NaN where they were lost; time is 0 at the
         release, as far as it is known.
     whole : ndarray, shape (t, m)
@@ -49,7 +49,7 @@ class FreeVibration:
         The watched node after each step (s, m).
     """
 
-    history: History
+    history: TimeHistory
     whole: NDArray[np.float64]
     before: NDArray[np.float64]
     released: float
@@ -60,12 +60,12 @@ class FreeVibration:
         """Numbers of the nodes."""
         return numbers_of(self.history)
 
-    def of(self, nodes: list[int], name: str) -> History:
-        """History of some of the nodes."""
+    def of(self, nodes: list[int], name: str) -> TimeHistory:
+        """TimeHistory of some of the nodes."""
         columns = [self.nodes.index(node) for node in nodes]
         return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
 
-    def whole_of(self, one: History) -> History | None:
+    def whole_of(self, one: TimeHistory) -> TimeHistory | None:
         """The nodes of a history that were never lost for long, gaps filled; None: there are none.
 
         The model is not moved in time to fit it: spectra do not depend on that.
@@ -78,7 +78,7 @@ class FreeVibration:
         return replace(one, nodes=nodes, values=self.whole[:, kept], align=0.0)
 
 
-def numbers_of(history: History) -> list[int]:
+def numbers_of(history: TimeHistory) -> list[int]:
     """Numbers of the nodes of a history."""
     return np.ravel(history.nodes).astype(int).tolist()
 
@@ -140,15 +140,14 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 
 
-def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
+def prepare(measured: TimeHistory) -> FreeVibration:
     """Prepare the histories of a film in which a specimen is held and released.
 
     Parameters
     ----------
-    measured : History
-        Of all nodes that were tracked, along the axis; the watched one among them.
-    watched : int
-        Node by which the release is found.
+    measured : TimeHistory
+        Of all nodes that were tracked, along the axis; `WATCHED`, by which the release is found,
+        among them.
 
     Raises
     ------
@@ -156,10 +155,10 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
         The watched node was not measured, is not still before the release, was lost for long while
         it swings, or does not swing; fewer than 60 frames per second.
     """
-    nodes, name = numbers_of(measured), f"{measured.name}: node {watched}"
-    if watched not in nodes:
+    nodes, name = numbers_of(measured), f"{measured.name}: node {WATCHED}"
+    if WATCHED not in nodes:
         raise InputError(f"{name} was not measured; it tells the release")
-    column, time = nodes.index(watched), _even(measured.time)
+    column, time = nodes.index(WATCHED), _even(measured.time)
     step = float(time[1] - time[0])
     if step * SLOWEST > 1.001:
         raise InputError(
@@ -202,7 +201,7 @@ def prepare(measured: History, watched: int = WATCHED) -> FreeVibration:
 
 
 def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Times at one interval, where they differ from it by what tables round off only."""
+    """Evenly spaced times, provided that they differ from them only by the rounding of tables."""
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() > ROUNDED * (even[1] - even[0]):
         signals.sampling_interval(time)  # says what is wrong
@@ -221,7 +220,7 @@ def _turn(swing: NDArray[np.float64], name: str) -> int:
 
 
 def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np.float64]]:
-    """Record of the watched node behind its last long gap, and where that begins."""
+    """Record of the watched node after its last long gap, and where it begins."""
     known = np.flatnonzero(np.isfinite(x))
     long = np.flatnonzero(np.diff(known) - 1 > gap)
     first, last = (int(known[long[-1] + 1]) if len(long) else int(known[0])), int(known[-1])
@@ -234,7 +233,7 @@ def _known(x: NDArray[np.float64], name: str, gap: int) -> tuple[int, NDArray[np
 
 
 def _mean(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over time of what was measured, shape (m,); NaN of nodes that were not."""
+    """Mean over time of the measured samples, shape (m,); NaN for nodes without any."""
     known = np.isfinite(x)
     count = known.sum(axis=0)
     return np.where(count > 0, np.where(known, x, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

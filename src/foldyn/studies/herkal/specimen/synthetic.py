@@ -58,7 +58,7 @@ class Shot:
     seed: int = 7
 
     def camera(self, rest: NDArray[np.float64]) -> experiment.Camera:
-        """Camera before the middle of the specimen, a little turned, with a lens that distorts."""
+        """Camera in front of the specimen's middle, slightly turned, with a distorting lens."""
         middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
         middle[2] = rest[:, 2].max()
         return experiment.Camera.looking_at(
@@ -67,7 +67,7 @@ class Shot:
         )  # fmt: skip
 
     def sensor(self, exposure: float) -> experiment.Sensor:
-        """Sensor with noise, open for some time (s)."""
+        """Noisy sensor with an exposure time (s)."""
         return experiment.Sensor(exposure=exposure, read_noise=1.5, shot_noise=3.0, samples=10)
 
 

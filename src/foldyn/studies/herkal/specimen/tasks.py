@@ -1,8 +1,7 @@
-"""The computations of the specimen's study, each kept, so that it goes on where it was stopped."""
+"""The computations of the specimen's study, each kept, so that it resumes where it was stopped."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import warnings
@@ -16,31 +15,28 @@ from matplotlib.figure import Figure
 
 from foldyn import experiment, plots
 from foldyn.errors import ComputationError, FoldynWarning, InputError
-from foldyn.experiment import Fit, History, Measurement
+from foldyn.experiment import Fit, Measurement, TimeHistory
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.input_files import from_json, read_text
-from foldyn.linear import frf, modes
+from foldyn.input_files import file_digest, from_json, read_text
+from foldyn.program import program
 from foldyn.results import netcdf, save
 from foldyn.store import Store
 from foldyn.studies.herkal import calibration, vibration
-from foldyn.studies.herkal.program import specimen_program
 from foldyn.studies.herkal.specimen import evaluation, synthetic
 from foldyn.studies.herkal.specimen.measured import Data, measurement
 from foldyn.studies.herkal.specimen.synthetic import PAPERS, Shot
 from foldyn.writing import scratch, whole, write_text
 
+COMPUTING = (
+    "experiment", "studies/herkal/calibration.py", "studies/herkal/vibration.py",
+    "studies/herkal/specimen", "studies/herkal/cases",
+)  # fmt: skip
+"""Files and folders that the results depend on, besides the solvers."""
 FOLDER = "specimen"
 NOTE = "synthetic data: the specimen's own are not public"
 PHOTOS, FILM, FOUND, COMPARED = "photographs.nc", "film.nc", "found.json", "front.nc"
 TRUTH = "film-truth.nc"
 RESPONSES, MODES = {"published": "frf-published.nc", "fitted": "frf-fitted.nc"}, "modes.nc"
-WRITES: Mapping[str, tuple[str, ...]] = {
-    "photographs": (PHOTOS,),
-    "film": (FILM, TRUTH),
-    "fit": (FOUND, COMPARED),
-    "response": (*RESPONSES.values(), MODES),
-}
-"""Files that a part leaves for others, or for the page."""
 
 
 @dataclass(frozen=True)
@@ -76,18 +72,19 @@ class Part:
         data = self.data.digests()
         if self.part == "film":
             data.pop("static", None)
-        return {"program": specimen_program(), "data": data, "shot": shot}
+        return {"program": program(*COMPUTING), "data": data, "shot": shot}
 
     def there(self, folder: Path) -> bool:
         """Whether its result is in a folder."""
         files = STAMPS.find(self._stamp(folder), self.settings())
         if files is None:
             return False
-        damaged = [name for name, told in files.items() if _digest(folder / FOLDER / name) != told]
-        if damaged:
-            text = f"{folder / FOLDER / damaged[0]}: is damaged or missing; it is computed again"
-            warnings.warn(text, FoldynWarning, stacklevel=2)
-        return not damaged
+        for name, digest in files.items():
+            if _digest(folder / FOLDER / name) != digest:
+                text = f"{folder / FOLDER / name}: is damaged or missing; it is computed again"
+                warnings.warn(text, FoldynWarning, stacklevel=2)
+                return False
+        return True
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder.
@@ -103,9 +100,9 @@ class Part:
         if missing:
             raise ComputationError(f"it needs {missing[0].name}, which failed")
         self._stamp(folder).unlink(missing_ok=True)
-        PARTS[self.part](self, inside)
-        files = [inside / name for name in WRITES[self.part]]
-        kept = {file.name: _digest(file) for file in files if file.is_file()}
+        compute, names = PARTS[self.part]
+        compute(self, inside)
+        kept = {name: _digest(inside / name) for name in names if (inside / name).is_file()}
         STAMPS.keep(self._stamp(folder), self.settings(), kept)
 
     def _needed(self) -> list[Part]:
@@ -131,16 +128,13 @@ STAMPS: Store[dict[str, str]] = Store(_read, _write_stamp, warns=False)
 
 def parts(shot: Shot, data: Data) -> tuple[list[Part], list[Part]]:
     """What needs nothing else, and what comes after it, in order."""
-    seen = []
-    if data.synthetic:
-        seen.append("photographs")
-    if data.synthetic or data.film is not None:
-        seen.append("film")
-    return [Part(p, shot, data) for p in seen], [Part(p, shot, data) for p in ("fit", "response")]
+    first = ["photographs"] if data.synthetic else []
+    first += ["film"] if data.synthetic or data.film is not None else []
+    return [Part(p, shot, data) for p in first], [Part(p, shot, data) for p in ("fit", "response")]
 
 
-def _model() -> experiment.Model:
-    return experiment.Model.of(calibration.pressed(evaluation.FACTORS))
+def _model() -> experiment.TrackedModel:
+    return experiment.TrackedModel.of(calibration.pressed(evaluation.FACTORS))
 
 
 def _photographs(part: Part, folder: Path) -> None:
@@ -177,7 +171,7 @@ def _tracked(part: Part, file: Path, folder: Path) -> None:
 def _static(
     part: Part, folder: Path, changes: Mapping[str, Any] | None = None
 ) -> list[Measurement]:
-    """The static test, empty where only a release was measured."""
+    """The static test; empty if only a release was measured."""
     file = part.data.static
     if file is not None and file.suffix.lower() == ".csv":
         return [measurement(file, part.data.label)]
@@ -187,14 +181,14 @@ def _static(
     return evaluation.static_test(tracks, part.data.label, changes)
 
 
-def _history(part: Part, folder: Path) -> History | None:
-    """The release, where there is one."""
+def _history(part: Part, folder: Path) -> TimeHistory | None:
+    """The release, if there is one."""
     file = part.data.release
     if file is None and not part.data.synthetic:
         return None
     tracked = file is None or part.data.film is not None
     found = measurement(folder / FILM if tracked else file, part.data.label)  # type: ignore[arg-type]
-    assert isinstance(found, History)
+    assert isinstance(found, TimeHistory)
     return replace(found, name="film" if tracked else found.name)
 
 
@@ -249,19 +243,18 @@ def _write(one: Fit, folder: Path, note: str) -> None:
 def _response(part: Part, folder: Path) -> None:
     changes = read_found(folder)["changes"]
     for name, given in (("published", {}), ("fitted", changes)):
-        case = vibration.specimen("frf", changes=given)
-        save(frf(case, **vibration.analysis("frf")), folder / RESPONSES[name])
+        save(vibration.specimen("frf", changes=given).run(), folder / RESPONSES[name])
     folds = {key: value for key, value in changes.items() if not key.startswith("damping.")}
-    case = vibration.specimen("modes", changes=folds)
-    save(modes(case, **vibration.analysis("modes")), folder / MODES)
+    save(vibration.specimen("modes", changes=folds).run(), folder / MODES)
 
 
-PARTS: Mapping[str, Callable[[Part, Path], None]] = {
-    "photographs": _photographs,
-    "film": _film,
-    "fit": _fit,
-    "response": _response,
+PARTS: Mapping[str, tuple[Callable[[Part, Path], None], tuple[str, ...]]] = {
+    "photographs": (_photographs, (PHOTOS,)),
+    "film": (_film, (FILM, TRUTH)),
+    "fit": (_fit, (FOUND, COMPARED)),
+    "response": (_response, (*RESPONSES.values(), MODES)),
 }
+"""How each part is computed, and which files it leaves for others or for the page."""
 
 
 def read_found(folder: Path) -> dict[str, Any]:
@@ -277,7 +270,4 @@ def read_found(folder: Path) -> dict[str, Any]:
 
 def _digest(file: Path) -> str:
     """Digest of a file; "" where there is none."""
-    try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError:
-        return ""
+    return file_digest(file) if file.is_file() else ""

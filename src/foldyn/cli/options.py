@@ -1,0 +1,25 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:
+    """Add an option without a value."""
+    command.add_argument(name, action="store_true", help=text)
+
+
+def add_results(command: argparse.ArgumentParser, default: str, figures: bool = True) -> None:
+    """Add what all commands take that write a folder of results, `default` unless it is given."""
+    command.add_argument("--out", help=f"folder of the results (default: {default})")
+    flag(command, "--replace", "replace results of another file or command that the folder holds")
+    add_switches(command, figures)
+
+
+def add_switches(command: argparse.ArgumentParser, figures: bool = True) -> None:
+    """Add what all commands take that compute; `main` acts on `--force`."""
+    if figures:
+        flag(command, "--no-figures", "write data only: no figures and no report")
+    flag(command, "--quiet", "no progress bar and no summary")
+    flag(command, "--force", "go on even if more than half of the memory is needed, as estimated")

@@ -1,0 +1,189 @@
+"""The choice between explicit and implicit integration, with its reason in words.
+
+Both costs are estimated, as the steps that a method needs times what one of them takes. An explicit
+method takes steps of half its critical step, whatever moves. An implicit one takes steps that
+resolve the motion, whose pace is estimated here, with the tolerance asked for, and end at its
+samples.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.cases import Case
+from foldyn.dynamics.inertia import is_lumped
+from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
+
+AUTO = "auto"
+LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
+CONTENT = 2.0  # times the steps of the vibration itself: faster ones ride on it
+FEWEST = 50.0  # steps of an implicit run
+MOST_TIMES = 4000  # at which loads are looked at
+AT_REST = 1e-6  # of the loads: out-of-balance forces below that set nothing in motion
+SMOOTH = 1e-3  # of a vibration: the least share that is assumed
+
+
+def choose(
+    case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
+    every: int | float, tolerance: float | None, default: float,
+) -> tuple[str, str]:  # fmt: skip
+    """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
+
+    dt, every and tolerance are those of `simulate`, default what implicit methods take without.
+    """
+    conserved = case.damping.alpha == case.damping.beta == 0.0 and not any(histories(case))
+    implicit = "energy_momentum" if conserved else "generalized_alpha"
+    if massless := case.structure.massless:
+        return "generalized_alpha", f"implicit: {massless} have no mass"
+    if (case.structure.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
+        return implicit, "implicit: nodes without mass have no acceleration"
+    omega = frequency(case, u, v, duration)
+    lasting = conserved and duration * omega > 2.0 * math.pi * LONG
+    explicit = "central_difference" if lasting else "rk4"
+    if tolerance is not None:
+        explicit = "dormand_prince"
+    critical = METHODS[explicit].critical_step(case, u)
+    if dt is not None and tolerance is None:
+        fits = dt <= critical
+        word, name = ("within", explicit) if fits else ("above", implicit)
+        kind = "explicit" if fits else "implicit"
+        return name, f"{kind}: dt is {word} the critical step of {critical:.2g} s"
+    many = duration / (DEFAULT_FRACTION * critical)
+    share = vibrating_share(case, u, v, start, duration, omega)
+    few = CONTENT * duration * omega * (share / (12.0 * (tolerance or default))) ** (1.0 / 3.0)
+    few = max(few, FEWEST, duration / every if isinstance(every, float) else 0.0)
+    costs = (
+        many * _explicit_cost(case, METHODS[explicit].evaluations),
+        few * _implicit_cost(case, conserved),
+    )
+    estimate = (
+        f"about {_round(many)} explicit steps (critical step {critical:.2g} s) take "
+        f"{_seconds(costs[0])}, {_round(few)} implicit ones {_seconds(costs[1])}, by estimate"
+    )
+    if costs[0] <= costs[1]:
+        return explicit, f"explicit: {estimate}"
+    return implicit, f"implicit: {estimate}"
+
+
+def _explicit_cost(case: Case, evaluations: int) -> float:
+    """Seconds of a step, as measured from 39 to 22,000 dofs."""
+    substitution = 1.0 if is_lumped(case.structure.mass) else 2.0
+    return evaluations * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
+
+
+def _implicit_cost(case: Case, conserved: bool) -> float:
+    """Seconds of a step with its residuals, tangents and factorizations, as measured likewise.
+
+    The conserving method's forces and unsymmetric matrices cost more.
+    """
+    dofs = case.structure.nodes.size
+    factorization = 6e-5 * (dofs / 333.0) ** 1.85
+    return (2.5 if conserved else 1.0) * (1e-4 + 1.2e-6 * dofs + 1.5 * factorization)
+
+
+def _round(count: float) -> str:
+    return f"{float(f'{count:.2g}'):,.0f}"
+
+
+def _seconds(cost: float) -> str:
+    return f"{float(f'{cost:.2g}'):,g} s"
+
+
+def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
+    """Angular frequency (rad/s) of what loads, supports and the initial state set in motion.
+
+    Rayleigh's quotient of the displacements that they would cause if they acted slowly (over the
+    duration, for bodies that nothing holds) and of the deforming part of the initial velocity, or
+    the angular velocity of its rigid part. Hinges count with at least their nominal stiffness.
+    """
+    structure, free = case.structure, np.asarray(case.free_dofs)
+    stiffness = structure.body.tangent(u, 1.0)
+    force = _applied(case, u) - stiffness @ _imposed(case)
+    k = stiffness[free][:, free]
+    m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    spin, deforming, moving = _split(structure.nodes + u, v)
+    pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
+    softest = (2.0 * math.pi / duration) ** 2
+    try:
+        x = SuperLU(sparse.csc_array(k + softest * m)).solve(force[free])
+        pairs.append((x, x))
+    except SingularTangentError:
+        pass
+    for shape, whole in pairs:
+        kinetic = float(whole @ (m @ whole))
+        if kinetic > 0.0:
+            square = max(square, float(shape @ (k @ shape)) / kinetic)
+    return math.sqrt(square)
+
+
+def vibrating_share(
+    case: Case, u: NDArray, v: NDArray, start: float, duration: float, omega: float
+) -> float:
+    """Share of the displacement that vibrates: 1 after a release, less under slow loads.
+
+    For a motion from rest in balance it is how far the factors bend within half a period, relative
+    to their size.
+    """
+    if v.any() or _out_of_balance(case, u, start):
+        return 1.0
+    step = 0.5 * math.pi / omega if omega > 0.0 else duration
+    times = start + np.linspace(0.0, duration, min(MOST_TIMES, 2 + math.ceil(duration / step)))
+    share = SMOOTH
+    for _, history in histories(case):
+        turns = [t for t in history.knots() or () if start < t < start + duration]
+        if any(start < jump < start + duration for jump in history.jumps()):
+            return 1.0
+        if len(turns) and np.diff(turns, prepend=start).min() < step:  # a pulse
+            return 1.0
+        before, now, after = (history(np.maximum(times + k * step, start)) for k in (-1, 0, 1))
+        size = float(np.abs(now).max())
+        if size > 0.0:
+            share = max(share, float(np.abs(before - 2.0 * now + after).max()) / size)
+    return min(share, 1.0)
+
+
+def _applied(case: Case, u: NDArray) -> NDArray:
+    """Forces (3n,) at u that loads and actuated folds exert beside the internal ones, N."""
+    body = case.structure.body
+    force = -body.internal(u)
+    for load, _ in case.load_terms:
+        force += load.ravel()
+    change = np.zeros(len(case.structure.folds))
+    for turn, _ in case.actuation_terms:
+        change += turn
+    if change.any():
+        linear = body.nominal(u)
+        force -= linear.folded(linear.fold_rest + change).internal(u) - linear.internal(u)
+    return force
+
+
+def _imposed(case: Case) -> NDArray:
+    """Displacements (3n,) of supports at factor 1, m."""
+    moved = np.zeros(case.structure.nodes.shape)
+    for shape, _ in (*case.imposed_terms, *case.base_terms):
+        moved += shape
+    return moved.ravel()
+
+
+def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
+    """Whether forces at the start set the structure in motion at once."""
+    internal = case.structure.body.internal(u).reshape(u.shape)
+    force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
+    for load, history in case.load_terms:
+        force = force + history(start) * load
+        size = max(size, float(np.abs(load).max()))
+    return float(np.abs(force[~case.fixed]).max(initial=0.0)) > AT_REST * size
+
+
+def _split(x: NDArray, v: NDArray) -> tuple[float, NDArray, NDArray]:
+    """Angular velocity (rad/s) of velocities v at x (n, 3), v less its rigid part and its mean."""
+    arm, rest = x - x.mean(axis=0), v - v.mean(axis=0)
+    inertia = (arm**2).sum() * np.eye(3) - arm.T @ arm
+    spin = np.linalg.lstsq(inertia, np.cross(arm, rest).sum(axis=0), rcond=None)[0]
+    return float(np.linalg.norm(spin)), rest - np.cross(spin, arm), rest

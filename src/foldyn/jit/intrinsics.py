@@ -1,0 +1,189 @@
+"""What compiled code does below Python, as Numba's intrinsics: bits, addresses, views, memory.
+
+The typing context stands first among the arguments of an intrinsic as it is written; compiled code
+calls it without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import extending, types
+from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed, impl_ret_untracked
+from numba.np.arrayobj import make_array, populate_array
+
+from foldyn.jit.compiled import scalar
+
+LINE = 64  # bytes that come into the cache together
+INT32, INT64, DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
+
+
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """Numba's decorator, typed for the callers of what it makes."""
+    return extending.intrinsic(function)
+
+
+def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    """Pointer to the first number of an array."""
+    return make_array(kind)(context, builder, array).data
+
+
+# ------------------------------------------------------------------ bits of a number
+def _bitcast(kind):
+    def codegen(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], kind)
+
+    return codegen
+
+
+@intrinsic
+def bits_of(typing_context, x):
+    """The 64 bits of a float64 as an int64."""
+    return types.int64(types.float64), _bitcast(INT64)
+
+
+@intrinsic
+def float_of(typing_context, bits):
+    """The float64 with these 64 bits."""
+    return types.float64(types.int64), _bitcast(DOUBLE)
+
+
+# ------------------------------------------------------------------ functions by their address
+# the address is data, so a kernel that calls stays one and the same cached kernel for every law
+def _caller(result, *parameters):
+    def codegen(context, builder, signature, arguments):
+        kind = ir.FunctionType(result, parameters)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return codegen
+
+
+@intrinsic
+def call0(typing_context, address):
+    """Call the function int32() at `address`."""
+    return types.int32(types.int64), _caller(INT32)
+
+
+@intrinsic
+def call1(typing_context, address, x):
+    """Value of the function float64(float64) at `address`."""
+    return types.float64(types.int64, types.float64), _caller(DOUBLE, DOUBLE)
+
+
+@intrinsic
+def call2(typing_context, address, x, y):
+    """Value of the function float64(float64, float64) at `address`."""
+    kinds = types.int64, types.float64, types.float64
+    return types.float64(*kinds), _caller(DOUBLE, DOUBLE, DOUBLE)
+
+
+# ------------------------------------------------------------------ views of arrays
+@intrinsic
+def flat(typing_context, array):
+    """View of a C-contiguous array with one dimension.
+
+    `reshape(-1)` calls a run-time function of some 30 ns, which counts where a step takes 5000.
+    """
+    if not isinstance(array, types.Array) or array.layout != "C":
+        return None
+    view = types.Array(array.dtype, 1, "C", readonly=not array.mutable, aligned=array.aligned)
+
+    def codegen(context, builder, signature, arguments):
+        source = make_array(array)(context, builder, arguments[0])
+        out = make_array(view)(context, builder)
+        populate_array(
+            out,
+            data=source.data,
+            shape=[source.nitems],
+            strides=[source.itemsize],
+            itemsize=source.itemsize,
+            meminfo=source.meminfo,
+            parent=source.parent,
+        )
+        return impl_ret_borrowed(context, builder, view, out._getvalue())
+
+    return view(array), codegen
+
+
+def _without_owner(context, builder, kind, value):
+    if isinstance(kind, types.Array):
+        array = make_array(kind)(context, builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        for i, item in enumerate(kind.types):  # type: ignore[attr-defined]
+            part = builder.extract_value(value, i)
+            part = _without_owner(context, builder, item, part)
+            value = builder.insert_value(value, part, i)
+    return value
+
+
+@intrinsic
+def borrowed(typing_context, value):
+    """Return an array or a tuple of arrays, of tuples, of numbers, that owns no memory.
+
+    Compiled code counts references to the arrays of every tuple that a function gets, with atomic
+    operations, wherever the compiler cannot prove that it need not: a third of the time of a step
+    of a small sheet. The caller of a loop holds the arrays for as long as it runs, so inside they
+    can be borrowed.
+    """
+
+    def codegen(context, builder, signature, arguments):
+        (kind,) = signature.args
+        out = _without_owner(context, builder, kind, arguments[0])
+        return impl_ret_untracked(context, builder, signature.return_type, out)
+
+    return value(value), codegen
+
+
+# ------------------------------------------------------------------ memory ahead of its use
+# The processor guesses what is read next where a loop reads on and on; kernels that read a little
+# of many arrays in turn leave it behind.
+@intrinsic
+def prefetch(typing_context, array, index):
+    """Bring array[index] into the cache; an index beyond the end does no harm."""
+
+    def codegen(context, builder, signature, arguments):
+        data = data_of(context, builder, array, arguments[0])
+        place = builder.bitcast(builder.gep(data, [arguments[1]]), cgutils.voidptr_t)
+        kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t, INT32, INT32, INT32])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        read, keep, data_cache = INT32(0), INT32(3), INT32(1)
+        builder.call(function, [place, read, keep, data_cache])
+        return context.get_dummy_value()
+
+    return types.void(array, index), codegen
+
+
+@scalar
+def prefetch_range(array, first, count):
+    """Bring array[first : first + count] into the cache."""
+    for k in range(first, first + count, LINE // array.itemsize):
+        prefetch(array, k)
+
+
+# ------------------------------------------------------------------ memory that threads share
+@intrinsic
+def fetch_add(typing_context, array, index, value):
+    """array[index] += value in one piece; returns what was there before."""
+
+    def codegen(context, builder, signature, arguments):
+        place = builder.gep(data_of(context, builder, array, arguments[0]), [arguments[1]])
+        return builder.atomic_rmw("add", place, arguments[2], "acq_rel")
+
+    return types.int64(array, types.int64, types.int64), codegen
+
+
+@intrinsic
+def look(typing_context, array, index):
+    """array[index] as other threads have left it; what they wrote before is then seen too."""
+
+    def codegen(context, builder, signature, arguments):
+        place = builder.gep(data_of(context, builder, array, arguments[0]), [arguments[1]])
+        return builder.load_atomic(place, "acquire", 8)
+
+    return types.int64(array, types.int64), codegen

@@ -1,0 +1,154 @@
+"""Frequency responses of linearized cases: one solution for each frequency, or modes superposed.
+
+The static response of the modes left out completes those superposed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.complex_symmetric import solve
+from foldyn.dynamics import Progress
+from foldyn.dynamics.progress import Reporter
+from foldyn.errors import InputError
+from foldyn.linear.eigen import Pencil, Spectrum, lowest
+from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
+from foldyn.linear.linearized import Linearized
+from foldyn.linear.modes import rigid_space, unresisted
+from foldyn.values import whole
+
+DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
+BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
+RESONANCE = (
+    "there is no response at {} (nan): a resonance without damping, or 0 Hz of a body that is free "
+    "to move; give the case damping, as Rayleigh(alpha=...), or leave these frequencies out"
+)
+
+
+@dataclass(frozen=True)
+class Direct:
+    """Options of the direct method: none."""
+
+
+def direct(
+    system: Linearized, drive: Drive, frequency: NDArray, options: Direct, report: Reporter
+) -> Answer:
+    """Solve (K - w^2 M + i w C) x = f at each frequency.
+
+    The response is nan where the matrix is singular to rounding: at a resonance without damping,
+    and at 0 Hz of a body that is free to move.
+
+    Warns
+    -----
+    FoldynWarning
+        There are such frequencies.
+    """
+    shape = drive_shape(system, drive)
+    response = np.empty((len(frequency), len(shape)), np.complex128)
+    for k, f in enumerate(frequency):
+        omega = 2.0 * np.pi * f
+        solution = solve(dynamic_stiffness(system, omega), shape)
+        response[k] = solution * drive_factor(system, drive, omega)
+        report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
+    warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
+    return Answer(response, {}, {})
+
+
+def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
+    """K - w^2 M + i w C at an angular frequency (rad/s)."""
+    undamped = system.stiffness - omega**2 * system.mass
+    return sparse.csc_array(undamped + 1j * omega * system.damping)
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Options of the modal method.
+
+    Parameters
+    ----------
+    count : int, optional
+        How many modes, the lowest ones; all without it.
+    static_correction : bool
+        Whether to add the static response of the modes left out: errors then fall as the fourth
+        power of the highest frequency kept instead of as the second.
+    """
+
+    count: int | None = None
+    static_correction: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.count is not None:
+            whole("count", self.count, least=1, what="modes")
+        if not isinstance(self.static_correction, bool):
+            raise InputError(f"static_correction = {self.static_correction!r}: give True or False")
+
+
+def modal(
+    system: Linearized, drive: Drive, frequency: NDArray, options: Modal, report: Reporter
+) -> Answer:
+    """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
+
+    The matrix of the modal damping is taken whole: modes that damping couples (beta K0 about a
+    state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
+    is the response of all other modes at the squared frequency s: 0, or slightly below for a body
+    that is free to move (mode acceleration: Craig and Kurdila, Fundamentals of Structural
+    Dynamics, 2nd ed. 2006, chapter 11).
+
+    At a resonance without damping the response is nan.
+
+    Warns
+    -----
+    FoldynWarning
+        There are such resonances.
+    """
+    pencil = Pencil(system.stiffness, system.mass)
+    count = pencil.finite if options.count is None else int(options.count)
+    modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
+    shape = drive_shape(system, drive)
+    load = modes.shapes.T @ shape
+    damping = modes.shapes.T @ (system.damping @ modes.shapes)
+    left = np.zeros(pencil.size)
+    if options.static_correction and count < pencil.finite:
+        left = _residual(pencil, modes, shape, load)
+    noise = pencil.noise(modes.shapes)
+    response = np.empty((len(frequency), pencil.size), np.complex128)
+    for k, f in enumerate(frequency):
+        omega = 2.0 * np.pi * f
+        q = _amplitudes(modes.values, noise, damping, omega, load)
+        response[k] = (modes.shapes @ q + left) * drive_factor(system, drive, omega)
+        report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
+    warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
+    facts = {"modes": count, "static_correction": options.static_correction}
+    return Answer(response, {}, facts)
+
+
+def _amplitudes(
+    values: NDArray, noise: NDArray, damping: NDArray, omega: float, load: NDArray
+) -> NDArray:
+    """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values."""
+    own = damping.diagonal()
+    detuned = values - omega**2
+    scale = np.sqrt(np.outer(own, own))
+    if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
+        return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
+    resonant = (np.abs(detuned) <= noise) & (omega * own == 0.0)
+    amplitudes = load / np.where(resonant, 1.0, detuned + 1j * omega * own)
+    return np.where(resonant, np.nan, amplitudes)
+
+
+def _residual(pencil: Pencil, modes: Spectrum, shape: NDArray, load: NDArray) -> NDArray:
+    """Static response (nf,) of the modes left out."""
+    positive = modes.values[modes.values > 0.0]
+    shift = 0.0
+    if modes.values[0] <= 0.0:
+        beside = positive[0] if positive.size else pencil.scale
+        shift = float(modes.values[0] - BESIDE * beside)
+    factors = pencil.factorize(shift)
+    whole = factors.solve(shape)
+    whole = whole + factors.solve(shape - (pencil.stiffness - shift * pencil.mass) @ whole)
+    return whole - modes.shapes @ (load / (modes.values - shift))

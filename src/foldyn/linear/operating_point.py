@@ -1,0 +1,127 @@
+"""The state about which a case is linearized: found, or given and judged."""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case, State
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.body import Body
+from foldyn.statics import OrigamiProblem, trace
+from foldyn.statics.origami import drives, is_actuated, with_loads
+from foldyn.statics.problem import Balance, balance
+from foldyn.statics.rigid import free_rigid_motions
+from foldyn.statics.tracing import check_movable, displacement_of
+
+BALANCED = 1e-6  # of the forces at play: the largest residual of a state taken for an equilibrium
+PLACES = "None (the rest state), 'equilibrium' or a State, as fd.initial_state(path)"
+
+
+class OperatingPoint(NamedTuple):
+    """A state, and how far it is from an equilibrium."""
+
+    displacement: NDArray  # (n, 3) m
+    problem: OrigamiProblem
+    factor: float  # of actuated folds there
+    body: Body  # with its folds as they are actuated
+    dofs: NDArray  # (m,) the state on all dofs of the body
+    balance: Balance
+    kind: str  # "rest", "equilibrium" or "state"
+
+    @property
+    def relative(self) -> float:
+        """Residual as a fraction of the forces at play; 0 below their rounding."""
+        if self.balance.residual <= self.problem.force_rounding:
+            return 0.0
+        return self.balance.residual / max(self.balance.residual, self.balance.reference)
+
+
+def operating_point(
+    case: Case, state: State | str | None, load_factor: float = 1.0
+) -> OperatingPoint:
+    """The state that a linearization is asked for.
+
+    Warns
+    -----
+    FoldynWarning
+        It is no equilibrium, or the case has loads, which do not act at rest.
+    """
+    check_movable(case)
+    if state is None:
+        point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
+        if case.loads:
+            _warn(
+                "state = None: the loads of the case do not act in the rest state; "
+                "state = 'equilibrium' takes the equilibrium under them"
+            )
+    elif isinstance(state, str):
+        if state != "equilibrium":
+            raise InputError(f" = {state!r}: give {PLACES}", "state")
+        point = _judge(case, _equilibrium(case), 1.0, "equilibrium")
+    else:
+        point = _judge(case, displacement_of(state, case, "state", PLACES), load_factor, "state")
+    if point.relative > BALANCED:
+        _warn(_imbalance(point, case))
+    return point
+
+
+def _equilibrium(case: Case) -> NDArray:
+    """Displacement (n, 3) under the loads of a case in full, near its rest state."""
+    factors = [0.0, 1.0] if drives(case, ()) else [0.0]
+    free = free_rigid_motions(case.structure.nodes, case.fixed.ravel()).shape[1] > 0
+    with warnings.catch_warnings():  # the linearization itself warns of unstable motions
+        warnings.filterwarnings("ignore", "the path loses stability", FoldynWarning)
+        path = trace(case, "newton", factors, inertia_relief=free)
+    return path["displacement"].values[-1]
+
+
+def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
+    """A state with its residual.
+
+    Forces that keep their direction have no part in the tangent, and a state does not say by
+    which factor they act in it: each may have its own, the one that leaves the least residual.
+    """
+    problem = OrigamiProblem(case, (), displacement)
+    body = problem.actuation.body(factor)
+    u, free = body.dofs(displacement), problem.free
+    residual = body.internal(u)
+    loads = _load_vectors(case, body)
+    if kind == "equilibrium":
+        residual = residual - loads.sum(axis=1)
+    elif kind == "state" and loads.size:
+        factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
+        residual = residual - loads @ factors
+    reached = balance(problem, u, factor, residual)
+    return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
+
+
+def _load_vectors(case: Case, body: Body) -> NDArray:
+    """Forces (m, loads), N, of each load in full."""
+    alone = [with_loads(case, [i]) for i in range(len(case.loads))]
+    vectors = [vector.ravel() for one in alone for vector, _ in one.load_terms]
+    loads = np.zeros((body.size, len(vectors)))
+    for k, vector in enumerate(vectors):
+        loads[: vector.size, k] = vector
+    return loads
+
+
+def _imbalance(point: OperatingPoint, case: Case) -> str:
+    remedy = {
+        "rest": "state = 'equilibrium' finds the equilibrium that belongs to it",
+        "equilibrium": "the loads of a free body must balance, or it accelerates",
+        "state": "take it from a path of this case"
+        + (", and give the load_factor of its actuated folds" if is_actuated(case) else ""),
+    }[point.kind]
+    what = "the rest state" if point.kind == "rest" else "the state"
+    return (
+        f"{what} is no equilibrium: its residual is {point.relative:.2g} of the forces at play; "
+        f"motions about it are not free vibrations. Remedy: {remedy}"
+    )
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, FoldynWarning, stacklevel=5)

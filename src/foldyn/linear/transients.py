@@ -1,0 +1,340 @@
+"""Frequency response from motions that die away: after a pulse, or bursts of random excitation."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Table
+from foldyn.dynamics.progress import Reporter
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.excitation import Answer
+from foldyn.linear.time_domain import Integration, Rig, check_positive, overall
+from foldyn.memory import check_memory
+from foldyn.signals import exponential_window, frequency_response
+from foldyn.values import choice, number, whole
+
+MOST_LINES = 100  # of the frequencies' spacing: how fine a spacing may be that holds them all
+DECAYED = 1e-5  # what damping leaves of a motion within the default duration
+COPIES = 4  # of the samples, while their spectra are taken
+LEFT = 1e-3  # of the largest response: what may be left at the end of a record
+END = 0.05  # of the record: where that is looked for
+FEWEST = 4  # samples in a cycle of the highest frequency, and in a pulse
+PER_PULSE = 10  # samples in the pulse
+WIDTH = 0.5  # of a cycle of the highest frequency: the pulse
+WEAK = 1.5  # cycles of a frequency in a pulse, from which it has next to no strength there
+STILL = 8  # samples of rest before and after it, in which its spline dies away
+PER_CYCLE = 20  # samples in a cycle of the highest frequency, of bursts
+BAND = (0.8, 1.2)  # of the lowest and the highest frequency: what a burst excites
+TAPER = 0.1  # of the burst: how much of it rises and falls
+
+
+@dataclass(frozen=True)
+class Impulse(Integration):
+    """Options of the impulse method, beside those of the integration.
+
+    Parameters
+    ----------
+    pulse : float, optional
+        Duration (s) of the pulse (1 - cos(2 pi t / pulse)) / 2, whose height is the drive. Without
+        it half a cycle of the highest frequency, where it then still has 0.85 of its strength.
+    duration : float, optional
+        Time (s) to simulate. Without it until damping leaves 1e-5 of a motion; without alpha, the
+        inverse of the frequencies' spacing.
+    every : float, optional
+        Largest sampling interval (s); a tenth of the pulse by default, at most a 20th of a cycle
+        of the highest frequency.
+    window_rate : float
+        Decay rate (1/s) of an exponential window, for motions that have not died away at the end.
+        It adds its damping to the response, which `peaks_of` takes off again.
+    """
+
+    pulse: float | None = None
+    duration: float | None = None
+    every: float | None = None
+    window_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        check_positive(self, "pulse", "duration", "every")
+        number("window_rate", self.window_rate, least=0.0)
+
+
+@dataclass(frozen=True)
+class BurstRandom(Integration):
+    """Options of the burst random method, beside those of the integration.
+
+    Parameters
+    ----------
+    averages : int
+        Number of bursts, each from the state at rest, at least 2.
+    seed : int
+        Of the random numbers: the same seed gives the same bursts.
+    burst : float
+        Part of each record that is driven; in the rest the motion dies away.
+    estimator : {"h1", "h2"}
+        As of `signals.frequency_response`.
+    duration : float, optional
+        Time (s) to simulate for each burst. Without it damping leaves 1e-5 of a motion after the
+        burst; without alpha, it is the inverse of the frequencies' spacing.
+    every : float, optional
+        Largest sampling interval (s); a 20th of a cycle of the highest frequency by default.
+    window_rate : float
+        As of the impulse method.
+    """
+
+    averages: int = 8
+    seed: int = 0
+    burst: float = 0.5
+    estimator: str = "h1"
+    duration: float | None = None
+    every: float | None = None
+    window_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        super().__post_init__()
+        for name, least in (("averages", 2), ("seed", 0)):
+            whole(name, getattr(self, name), least=least)
+        if not 0.0 < number("burst", self.burst) < 1.0:
+            raise InputError(f"burst = {self.burst}: must be a part of the record, between 0 and 1")
+        choice("estimator", self.estimator, ("h1", "h2"))
+        check_positive(self, "duration", "every")
+        number("window_rate", self.window_rate, least=0.0)
+
+
+def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) -> Answer:
+    """Response to a pulse.
+
+    Warns
+    -----
+    FoldynWarning
+        The motion has not died away at the end.
+    """
+    width = WIDTH / float(frequency[-1])
+    pulse = width if options.pulse is None else options.pulse
+    every = min(pulse, width) / PER_PULSE if options.every is None else options.every
+    record = record_of(frequency, rig.case.damping.alpha, 1.0, every, options.duration)
+    check_records("duration", record, 1, len(rig.state))
+    factor = _pulse(float(frequency[-1]), pulse, record)
+    answer = respond(rig, [factor], record, options.window_rate, "h1", report)
+    width = (len(factor) - 1 - 2 * STILL) * record.every
+    return Answer(answer.response, {}, {"pulse": width, **answer.facts})
+
+
+def _pulse(highest: float, pulse: float, record: Record) -> NDArray:
+    """Samples of the pulse, with samples of rest on either side."""
+    if highest * pulse > WEAK:
+        raise InputError(
+            f"pulse = {pulse:g} s: has no strength left at {highest:g} Hz; take at most "
+            f"{1.0 / highest:.3g} s, or lower frequencies"
+        )
+    count = round(pulse / record.every)
+    if count < FEWEST:
+        raise InputError(
+            f" = {record.every:g} s: the pulse of {pulse:g} s has only {count} samples, and "
+            f"at least {FEWEST} are needed; sample faster, or leave every out",
+            "every",
+        )
+    if count + 2 * STILL >= record.samples:
+        raise InputError(
+            f"pulse = {pulse:g} s: does not end within the {record.duration:.3g} s of the motion; "
+            "shorten it, or give a longer duration"
+        )
+    return np.pad(0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count + 1) / count), STILL)
+
+
+def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Reporter) -> Answer:
+    """Response to random bursts, with its coherence.
+
+    Warns
+    -----
+    FoldynWarning
+        Motions have not died away at the end.
+    """
+    alpha = rig.case.damping.alpha
+    quiet = 1.0 - options.burst
+    every = 1.0 / (PER_CYCLE * float(frequency[-1])) if options.every is None else options.every
+    record = record_of(frequency, alpha, quiet, every, options.duration)
+    check_records("averages", record, options.averages, len(rig.state))
+    count = int(options.burst * record.samples)
+    random = np.random.default_rng(options.seed)
+    bursts = [_burst(random, count, record.every, frequency) for _ in range(options.averages)]
+    answer = respond(rig, bursts, record, options.window_rate, options.estimator, report)
+    held = rig.case.fixed
+    answer.response[:, held] = np.where(rig.drive.vector[held] != 0.0, 1.0, 0.0)
+    own = {name: getattr(options, name) for name in ("estimator", "averages", "seed", "burst")}
+    return answer._replace(facts={**own, **answer.facts})
+
+
+def _burst(random: np.random.Generator, count: int, every: float, frequency: NDArray) -> NDArray:
+    """Samples of random numbers within the band, of root mean square 1, tapered to 0."""
+    if count < 32:
+        raise InputError(
+            f"burst: {count} samples are too few; give a longer duration, or a larger part of it"
+        )
+    lines = np.fft.rfftfreq(count, every)
+    inside = (lines >= BAND[0] * frequency[0]) & (lines <= BAND[1] * frequency[-1]) & (lines > 0.0)
+    if inside.sum() < 4:
+        raise InputError(
+            f"burst: only {int(inside.sum())} lines of {1.0 / (count * every):.3g} Hz lie between "
+            f"{frequency[0]:g} and {frequency[-1]:g} Hz; give a longer duration, or a wider band"
+        )
+    spectrum = np.zeros(len(lines), complex)
+    spectrum[inside] = random.normal(size=inside.sum()) + 1j * random.normal(size=inside.sum())
+    factor = np.fft.irfft(spectrum, count)
+    ramp = np.minimum(np.arange(count), np.arange(count)[::-1]) / (TAPER * (count - 1))
+    factor *= np.sin(0.5 * np.pi * np.minimum(ramp, 1.0)) ** 2
+    return factor / np.sqrt(np.mean(factor**2))
+
+
+@dataclass(frozen=True)
+class Record:
+    """Sampling of transient records, the lines of which hold the frequencies asked for.
+
+    Attributes
+    ----------
+    every : float
+        Sampling interval (s).
+    samples : int
+        Samples simulated.
+    length : int
+        Samples of the record, zeros appended; its lines are 1 / (length every) apart.
+    lines : ndarray of int, shape (m,)
+        The frequencies' numbers among the lines.
+    """
+
+    every: float
+    samples: int
+    length: int
+    lines: NDArray[np.int64]
+
+    @property
+    def duration(self) -> float:
+        """Time simulated (s)."""
+        return self.samples * self.every
+
+
+def record_of(
+    frequency: NDArray, alpha: float, quiet: float, every: float, duration: float | None
+) -> Record:
+    """Choose the sampling of a transient record.
+
+    Parameters
+    ----------
+    frequency : ndarray, shape (m,)
+        Frequencies wanted (Hz).
+    alpha : float
+        Mass-proportional damping (1/s): a motion falls at least as fast as exp(-alpha t / 2).
+    quiet : float
+        Part of the record after the drive has ended.
+    every : float
+        Largest sampling interval (s).
+    duration : float, optional
+        Time to simulate (s).
+    """
+    spacing = common_spacing(frequency)
+    if duration is None:
+        decay = 2.0 * math.log(1.0 / DECAYED) / alpha if alpha > 0.0 else 0.0
+        duration = decay / quiet if decay > 0.0 else 1.0 / spacing
+    whole = math.ceil(duration * spacing * (1.0 - 1e-9)) / spacing
+    length = math.ceil(whole / every * (1.0 - 1e-9))
+    every = whole / length
+    if frequency[-1] * every * FEWEST > 1.0 + 1e-9:
+        raise InputError(
+            f" = {every:g} s: {frequency[-1]:g} Hz has only "
+            f"{1.0 / (frequency[-1] * every):.3g} samples in a cycle, and at least {FEWEST} are "
+            "needed; sample faster, or leave every out",
+            "every",
+        )
+    samples = min(math.ceil(duration / every * (1.0 - 1e-9)), length)
+    return Record(every, samples, length, np.rint(frequency * whole).astype(np.int64))
+
+
+def check_records(field: str, record: Record, count: int, nodes: int) -> None:
+    """Refuse records that memory cannot hold."""
+    what = f"{float(count):.3g} records of {float(record.length):.3g} samples of {nodes} nodes"
+    check_memory(field, what, 8.0 * COPIES * count * record.length * 3 * nodes, "take fewer")
+
+
+def common_spacing(frequency: NDArray) -> float:
+    """Largest spacing (Hz) of lines from 0 Hz on that hold all the frequencies.
+
+    Raises
+    ------
+    InputError
+        None that is coarse enough.
+    """
+    step = float(np.diff(frequency, prepend=0.0)[frequency > 0.0].min())
+    for divisor in range(1, MOST_LINES + 1):
+        multiple = frequency * divisor / step
+        if np.abs(multiple - np.rint(multiple)).max() < 1e-6 * divisor:
+            return float(frequency[-1] / np.rint(multiple[-1]))
+    near = max(float(f"{step:.1g}"), 1e-300)
+    raise InputError(
+        ": the lines of a record are multiples of one spacing, and these are of none "
+        f"above {step / MOST_LINES:.3g} Hz; give multiples, as numpy.arange({near:g}, "
+        f"{frequency[-1]:g}, {near:g})",
+        "frequencies",
+    )
+
+
+def respond(
+    rig: Rig, factors: Sequence[NDArray], record: Record, rate: float, estimator: str,
+    report: Reporter,
+) -> Answer:  # fmt: skip
+    """Response estimated from the motions under a drive, each from the state at rest.
+
+    Warns where a motion has not died away.
+
+    Parameters
+    ----------
+    factors : sequence of ndarray, shape (k,)
+        Samples of the factor on the drive in each motion, the first and the last of them 0, with a
+        cubic spline between them. Below a tenth of the sampling frequency its spectrum is that of
+        the samples to 3e-5: a cubic spline errs by (2 pi f dt)^4 / 720.
+    rate : float
+        Of the exponential window, 1/s.
+    """
+    drive = np.zeros((len(factors), record.length))
+    responses = np.zeros((*drive.shape, *rig.state.shape))
+    for k, factor in enumerate(factors):
+        history = Table(record.every * np.arange(len(factor)), factor, smooth=True)
+        ahead = overall(report, k * record.duration, len(factors) * record.duration)
+        motion = rig.run(history, record.duration, record.every, ahead)[1]
+        drive[k, : len(factor)] = rig.drive.value * factor
+        responses[k, : record.samples] = motion[: record.samples]
+    if rate > 0.0:
+        window = exponential_window(record.length, record.every, rate)
+        drive = drive * window
+        responses *= window[:, None, None]
+    size = np.abs(responses).max(axis=(2, 3))
+    end = slice(int((1.0 - END) * record.samples), record.samples)
+    whole = size.max(axis=1)
+    left = float((size[:, end].max(axis=1) / np.where(whole > 0.0, whole, 1.0)).max())
+    if left > LEFT:
+        decay = 2.0 * np.log(1.0 / LEFT) / record.duration
+        warnings.warn(
+            f"duration: {left:.1%} of the motion is left at the end of {record.duration:.3g} s, "
+            "which blurs the response; give a longer duration, more damping, or "
+            f"window_rate = {decay:.2g} (1/s)",
+            FoldynWarning,
+            stacklevel=4,
+        )
+    estimate = frequency_response(drive, responses, record.every, estimator)
+    return Answer(
+        estimate.response[record.lines],
+        {"coherence": estimate.coherence[record.lines]},
+        {
+            "record": record.duration,
+            "every": record.every,
+            "window_rate": rate,
+            "left_at_end": left,
+        },
+    )

@@ -1,0 +1,163 @@
+"""How a path is followed: the methods, where they lead, and which points belong to the path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice, pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.statics.continuation import ArcRule, Cylinder, Plane, follow
+from foldyn.statics.newton import Solver
+from foldyn.statics.stability import LostError, Section, critical_points
+from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, walk
+from foldyn.values import choice, number, numbers, show
+
+STEPS_DRIVEN = 10
+STEPS_FREE = 100
+FIRST_STEP = 0.05  # of the load, or of the way to the last load factor
+
+Until = Callable[[NDArray, float], bool]  # of all dofs (m,) and the load factor
+
+
+class PathMethod(NamedTuple):
+    """How a path is followed.
+
+    `rule` is None where the load factor drives the path; `between` says whether points between
+    the given load factors belong to the path too.
+    """
+
+    name: str
+    rule: ArcRule | None
+    between: bool
+
+
+METHODS: Mapping[str, PathMethod] = {
+    "newton": PathMethod("newton", None, False),
+    "displacement": PathMethod("displacement", None, True),
+    "mgdcm": PathMethod("mgdcm", Plane, True),
+    "arc_length": PathMethod("arc_length", Cylinder, True),
+}
+
+
+class PathPlan(NamedTuple):
+    """How a path is followed, from where to where."""
+
+    method: PathMethod
+    begin: float
+    factors: list[float]  # that drive it; empty where the factor is free
+    end: float | None  # of a free factor
+    steps: int
+    first_step: float
+
+
+def plan_path(
+    name: str, load_factors: Any, steps: int | None, first_step: float | None
+) -> PathPlan:
+    """Check the arguments that say where a path leads."""
+    method = METHODS[choice("method", name, METHODS)]
+    factors = None
+    if load_factors is not None:
+        array = numbers("load_factors", load_factors)
+        if array.ndim != 1 or not array.size:
+            raise InputError(
+                f" = {show(load_factors)}: give a list of numbers, at least one", "load_factors"
+            )
+        factors = array.tolist()
+    if first_step is not None and method.rule is None:
+        raise InputError(
+            f": method {name!r} is driven by load_factors or steps; leave it out", "first_step"
+        )
+    if method.rule is None:
+        return _driven(method, factors, steps)
+    if factors is not None and len(factors) != 2:
+        raise InputError(
+            f": method {name!r} chooses its own; give two numbers, where the "
+            f"path begins and ends, instead of {len(factors)}, or leave them out",
+            "load_factors",
+        )
+    begin, end = (0.0, None) if factors is None else factors
+    if end == begin:
+        raise InputError(f" = {factors}: begin and end must differ", "load_factors")
+    way = 1.0 if end is None else end - begin
+    step = FIRST_STEP * way if first_step is None else first_step
+    if not number("first_step", step):
+        raise InputError(f" = {show(first_step)}: give a number that is not zero", "first_step")
+    if end is not None and step * way < 0.0:
+        raise InputError(f" = {step:g} leads away from the last load factor {end:g}", "first_step")
+    if end is not None and abs(step) > abs(way):
+        step = way
+    return PathPlan(method, begin, [], end, int(steps or STEPS_FREE), float(step))
+
+
+def _driven(method: PathMethod, factors: list[float] | None, steps: int | None) -> PathPlan:
+    if factors is not None and steps is not None:
+        raise InputError(
+            " and steps: give one of them; steps counts equal steps from 0 to 1", "load_factors"
+        )
+    if factors is None:
+        count = int(steps or STEPS_DRIVEN)
+        factors = [k / count for k in range(count + 1)]
+    for i, (one, other) in enumerate(pairwise(factors)):
+        if one == other:
+            raise InputError(f": number {i + 1} repeats the one before, {one:g}", "load_factors")
+    return PathPlan(method, factors[0], factors[1:], None, len(factors) - 1, 0.0)
+
+
+def along(
+    solver: Solver, start: Station, plan: PathPlan, until: Until | None,
+    direction: NDArray | None = None,
+) -> Walk:  # fmt: skip
+    """Stations of a path after its first one; `direction` as of `continuation.follow`."""
+    method = plan.method
+    if method.rule is None:
+        way = walk(solver, start, plan.factors, method.between)
+    else:
+        way = islice(follow(solver, start, method.rule, plan.first_step, direction), plan.steps)
+    if plan.end is not None:
+        way = _up_to(solver, start, way, plan.end, plan.steps)
+    if method.between and solver.settings.stability and solver.settings.locate:
+        way = _with_critical(solver, start, way)
+    for station in way:
+        yield station
+        if until is not None and until(station.point.u, station.point.factor):
+            return
+
+
+def _with_critical(solver: Solver, start: Station, way: Walk) -> Walk:
+    before = start
+    for station in way:
+        yield from critical_points(solver, before, station)
+        yield station
+        before = station
+
+
+def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, steps: int) -> Walk:
+    """The way until the load factor first passes `end`, where it stops exactly."""
+    before = start
+    for station in way:
+        one, other = before.point.factor - end, station.point.factor - end
+        if one * other <= 0.0 and one != 0.0:
+            yield station if other == 0.0 else _landed(solver, before, station, end)
+            return
+        yield station
+        before = station
+    raise PathStoppedError(
+        f"the load factor {end:g} was not reached in {steps} steps",
+        "give more steps, or a larger first_step",
+    )
+
+
+def _landed(solver: Solver, before: Station, after: Station, end: float) -> Station:
+    """Station at the load factor `end` between two others; the one after it if none is found."""
+    section = Section(solver, before, after)
+    try:
+        near = section.zero(lambda mark: mark.station.point.factor - end, 1e-10).station
+    except LostError:
+        return after
+    attempt = solver.correct(near.point.u, end, stiffness=near.stiffness)
+    strayed = np.linalg.norm(attempt.u - near.point.u) > 1e-3 * np.sqrt(section.whole)
+    return after if attempt.failure or strayed else arrive(solver, attempt)

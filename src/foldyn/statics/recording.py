@@ -1,0 +1,221 @@
+"""The record of a path: its dataset, and where it gains and loses stability, in words.
+
+A limit point that a method with a free load factor has located is what that method is for, and is
+marked in the result. Wherever else negative eigenvalues appear, a warning says so: there a real
+structure leaves the path, although the points that follow are equilibria like all others.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import ComputationError, FoldynWarning, MotionInterrupted
+from foldyn.results import path_dataset
+from foldyn.statics.newton import Solver
+from foldyn.statics.origami import OrigamiProblem
+from foldyn.statics.path_methods import METHODS
+from foldyn.statics.stepping import PathStoppedError, Point, Walk
+from foldyn.structures.structure import hinge_angles
+
+if TYPE_CHECKING:
+    import xarray
+
+CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
+MOST_LISTED = 20  # changes that the attribute lists
+
+
+class Change(NamedTuple):
+    """Neighboring points whose counts differ; without a first one, where the path begins."""
+
+    before: Point | None
+    after: Point
+
+    @property
+    def critical(self) -> Point | None:
+        """The located critical point among them."""
+        both = (self.before, self.after)
+        return next((point for point in both if point and point.kind != "regular"), None)
+
+    @property
+    def loses(self) -> bool:
+        """Whether negative eigenvalues appear."""
+        return self.before is None or self.after.negative > self.before.negative
+
+    def __str__(self) -> str:
+        """Counts and load factors."""
+        end, at = self.after, self.critical
+        if self.before is None:
+            return f"{end.negative} from the start, the load factor {end.factor:.4g}"
+        start = self.before
+        if at is not None:
+            what = "limit point" if at.kind == "limit" else at.kind
+            where = f"the load factor {at.factor:.4g} ({what})"
+            return f"{start.negative} up to {where}, then {end.negative}"
+        return (
+            f"{start.negative} at the load factor {start.factor:.4g}, {end.negative} at "
+            f"{end.factor:.4g}"
+        )
+
+
+def stability_changes(points: Sequence[Point], from_rest: bool) -> list[Change]:
+    """Changes of the count along a path; `from_rest`, where there were none, included."""
+    counted = [point for point in points if point.negative >= 0]
+    changes = [Change(a, b) for a, b in pairwise(counted) if a.negative != b.negative]
+    if from_rest and counted and counted[0].negative:
+        changes.insert(0, Change(None, counted[0]))
+    return changes
+
+
+def stability_facts(points: Sequence[Point], from_rest: bool) -> dict[str, Any]:
+    """Attributes of a path: how many points are unstable, and where the count changes."""
+    counts = [point.negative for point in points]
+    if max(counts, default=-1) < 0:
+        return {"unstable_points": -1, "stability_changes": "not counted"}
+    listed = [str(change) for change in stability_changes(points, from_rest)]
+    more = [f"and {len(listed) - MOST_LISTED} more"] if len(listed) > MOST_LISTED else []
+    return {
+        "unstable_points": sum(count > 0 for count in counts),
+        "stability_changes": "; ".join([*listed[:MOST_LISTED], *more]) or "none",
+    }
+
+
+def stability_warning(points: Sequence[Point], from_rest: bool, free: bool) -> str:
+    """Warning of where a path loses stability; empty where it does not.
+
+    free : whether the method follows a path through limit points, by a free load factor.
+    """
+    losses = [
+        change
+        for change in stability_changes(points, from_rest)
+        if change.loses and not (free and change.critical and change.critical.kind == "limit")
+    ]
+    if not losses:
+        return ""
+    most = max(point.negative for point in points)
+    more = f", and at {len(losses) - 1} more places (up to {most})" if len(losses) > 1 else ""
+    remedy = "switch_branch follows the path that crosses there"
+    if losses[0].before is None:
+        remedy = "start from a stable state"
+    elif not any(change.critical for change in losses):
+        remedy = f"method 'arc_length' locates the point, and {remedy}"
+    return (
+        f"the path loses stability: the count of negative eigenvalues is {losses[0]}{more}. A real "
+        f"structure buckles or snaps there and leaves the path; {remedy}"
+    )
+
+
+def record(
+    stations: Walk, progress: Callable[[Point], None] | None, solver: Solver,
+    problem: OrigamiProblem, facts: dict[str, Any], adaptive: bool = False,
+) -> xarray.Dataset:  # fmt: skip
+    """Follow a path to its end and make its dataset; of what there is where it cannot go on.
+
+    facts : what was asked for, stored as attributes.
+    adaptive : whether an adaptive load acts.
+    """
+    began = time.perf_counter()
+    points: list[Point] = []
+
+    def dataset(status: str, **end: str) -> xarray.Dataset | None:
+        effort = {"wall_seconds": time.perf_counter() - began}
+        outcome = {"status": status, **end, **facts}
+        return _dataset(points, solver, problem, outcome, effort, adaptive) if points else None
+
+    try:
+        for station in stations:
+            points.append(station.point)
+            if progress is not None:
+                progress(station.point)
+    except PathStoppedError as stop:
+        remedy = _closed(problem, points) or stop.remedy
+        partial = dataset("stopped", stopped_because=stop.reason, remedy=remedy)
+        raise ComputationError(f"{stop.reason}; {remedy}", partial) from None
+    except KeyboardInterrupt:
+        partial = dataset("stopped", stopped_because="interrupted")
+        raise MotionInterrupted(f"interrupted after {len(points)} points", partial) from None
+    path = dataset("complete")
+    assert path is not None, "every path has a first point"
+    return path
+
+
+def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
+    """A remedy where the path ends because a fold is closed; empty otherwise."""
+    structure = problem.structure
+    if not points or not len(structure.folds):
+        return ""
+    state = structure.nodes + problem.displacement(points[-1].u)
+    folds = np.degrees(hinge_angles(state, structure.folds))
+    crease = int(np.argmax(np.abs(folds - 180.0)))
+    if abs(folds[crease] - 180.0) < CLOSED:
+        return ""
+    return (
+        f"crease {crease} is closed ({folds[crease]:.5g} degrees): a fold law that locks "
+        "before panels meet ('enhanced') lets the path go on"
+    )
+
+
+def _dataset(
+    points: Sequence[Point], solver: Solver, problem: OrigamiProblem, facts: dict[str, Any],
+    effort: dict[str, float], adaptive: bool,
+) -> xarray.Dataset:  # fmt: skip
+    """The points, with the case and the facts about the run."""
+    from_rest = facts["started_from"] == "rest"
+    message = stability_warning(points, from_rest, METHODS[facts["method"]].rule is not None)
+    if message:
+        warnings.warn(message, FoldynWarning, stacklevel=5)
+    residuals = [problem.residual(p.u, p.factor) for p in points]
+    energies = np.array([problem.energies(p.u, p.factor) for p in points])
+    own = "an adaptive load, a function of the user's own, acted on it"
+    return path_dataset(
+        problem.case,
+        [p.factor for p in points],
+        [problem.displacement(p.u) for p in points],
+        np.reshape([r[problem.case.supported_dofs] for r in residuals], (len(points), -1)),
+        {
+            **dict(zip(problem.groups, energies.T, strict=True)),
+            "work": _work(problem, points, residuals),
+        },
+        {
+            "negative_eigenvalues": [p.negative for p in points],
+            "point": [p.kind for p in points],
+            "iterations": [p.iterations for p in points],
+            "residual": [p.residual for p in points],
+        },
+        {
+            **facts,
+            **asdict(solver.settings),
+            "solver": solver.backend,
+            "newton_iterations": solver.tally.iterations,
+            "factorizations": solver.tally.factorizations,
+            "step_cuts": solver.tally.cuts,
+            **effort,
+            **stability_facts(points, from_rest),
+        },
+        (own,) if adaptive else (),
+    )
+
+
+def _work(
+    problem: OrigamiProblem, points: Sequence[Point], residuals: Sequence[NDArray]
+) -> NDArray:
+    """Work (J) of loads, supports and actuators since the first point, by trapezoids."""
+    forces = []
+    for point, residual in zip(points, residuals, strict=True):
+        force = problem.external(point.u, point.factor)
+        force[problem.held] += residual[problem.held]
+        forces.append(force)
+    rates = [problem.actuation_rate(p.u, p.factor) for p in points]
+    work = np.zeros(len(points))
+    for k, (one, other) in enumerate(pairwise(points)):
+        done = 0.5 * (forces[k] + forces[k + 1]) @ (other.u - one.u)
+        done += 0.5 * (rates[k] + rates[k + 1]) * (other.factor - one.factor)
+        work[k + 1] = work[k] + done
+    return work

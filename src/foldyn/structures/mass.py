@@ -1,0 +1,253 @@
+"""Mass rules: how the mass of panels is distributed to nodes.
+
+A rule takes a `Surface` and returns the nodal mass matrix (n, n), kg; one value serves the three
+axes. `MASS_RULES` is the registry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.errors import InputError
+
+LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
+
+
+class Surface(NamedTuple):
+    """Panels and triangles of a structure with their areas (SI)."""
+
+    nodes: NDArray  # (n, 3)
+    faces: tuple[tuple[int, ...], ...]  # corners of each panel
+    centers: NDArray  # (np,) center node of each panel, -1 without one
+    triangles: NDArray  # (nt, 3)
+    triangle_panel: NDArray  # (nt,)
+    triangle_area: NDArray  # (nt,) m2
+    areal_density: float  # kg/m2
+
+    @property
+    def panel_mass(self) -> NDArray:
+        """Mass of each panel (np,), kg."""
+        area = np.bincount(self.triangle_panel, self.triangle_area, minlength=len(self.faces))
+        return self.areal_density * area
+
+    def nodes_of(self, panel: int) -> list[int]:
+        """Corners of a panel, then its center node if it has one."""
+        center = int(self.centers[panel])
+        return [*self.faces[panel], center] if center >= 0 else list(self.faces[panel])
+
+
+def equi_inertial(surface: Surface) -> sparse.csr_array:
+    """Fixed shares for N5B8 quadrilaterals; the heavier corners end the shorter diagonal.
+
+    4/9 (0.444) at the center, 1/4 at two opposite corners (tie: 0 and 2), 1/36 (0.028) at the other
+    two: for a rhombus of 60 degrees these are q^2/12p^2 and p^2/12q^2, p and q the half diagonals.
+    Despite the name the in-plane second moments of that rhombus are 1/3 (0.336 with the rounded
+    0.028) and 3 times the exact ones. Source: Herkal et al., section 3.
+    """
+    return _distribute(surface, "equi_inertial", swapped=False)
+
+
+def equi_inertial_acute(surface: Surface) -> sparse.csr_array:
+    """The same, but the heavier corners end the longer diagonal."""
+    return _distribute(surface, "equi_inertial_acute", swapped=True)
+
+
+def _distribute(surface: Surface, name: str, swapped: bool) -> sparse.csr_array:
+    corners = _quads(surface, name)
+    x = surface.nodes[corners]
+    even = np.linalg.norm(x[:, 2] - x[:, 0], axis=1)
+    odd = np.linalg.norm(x[:, 3] - x[:, 1], axis=1)
+    heavy_even = (even <= odd * (1.0 + 1e-9)) != swapped
+    heavy, light = 1.0 / 4.0, 1.0 / 36.0
+    shares = np.where(
+        heavy_even[:, None], [heavy, light, heavy, light], [light, heavy, light, heavy]
+    )
+    total = surface.panel_mass
+    n = len(surface.nodes)
+    mass = np.bincount(corners.ravel(), (shares * total[:, None]).ravel(), minlength=n)
+    return lumped(mass + np.bincount(surface.centers, 4.0 / 9.0 * total, minlength=n))
+
+
+def _quads(surface: Surface, name: str) -> NDArray:
+    other = [
+        p
+        for p, (face, center) in enumerate(zip(surface.faces, surface.centers, strict=True))
+        if len(face) != 4 or center < 0
+    ]
+    if other:
+        raise InputError(
+            f'mass = "{name}" is defined for N5B8 quadrilaterals only, panel {other[0]} is '
+            'not one: use mass = "mixed_voronoi" (any panel) or "inertia_exact"'
+        )
+    return np.array(surface.faces, np.int64)
+
+
+def panel(surface: Surface) -> sparse.csr_array:
+    """Equal shares for all nodes of a panel, its center included (Herkal et al., section 3)."""
+    mass = np.zeros(len(surface.nodes))
+    for number, total in enumerate(surface.panel_mass):
+        nodes = surface.nodes_of(number)
+        mass[nodes] += total / len(nodes)
+    return lumped(mass)
+
+
+def centroid(surface: Surface) -> sparse.csr_array:
+    """A third of each triangle for each of its corners (Herkal et al., section 3)."""
+    return _from_triangle_shares(surface, np.full((len(surface.triangles), 3), 1.0 / 3.0))
+
+
+def circumcenter(surface: Surface) -> sparse.csr_array:
+    """Triangles split by the perpendicular bisectors of their sides (Herkal et al., section 3).
+
+    Raises
+    ------
+    InputError
+        A triangle is so obtuse that a share is negative (below -1e-9 of the triangle; right
+        angles pass).
+    """
+    shares, _ = _circumcentric_shares(surface)
+    worst = np.unravel_index(np.argmin(shares), shares.shape)
+    if shares[worst] < -1e-9:
+        corner = int(surface.triangles[worst])
+        number = int(surface.triangle_panel[worst[0]])
+        raise InputError(
+            f'mass = "circumcenter": panel {number} has an obtuse triangle, which would give node '
+            f"{corner} {shares[worst]:.3g} of that triangle's mass; use "
+            'mass = "mixed_voronoi": the same on other triangles, and never negative'
+        )
+    return _from_triangle_shares(surface, np.maximum(shares, 0.0))
+
+
+def mixed_voronoi(surface: Surface) -> sparse.csr_array:
+    """Shares of `circumcenter`, but 1/2, 1/4 and 1/4 in an obtuse triangle (1/2 where obtuse).
+
+    Source: Meyer et al., Discrete differential-geometry operators for triangulated
+    2-manifolds, 2003, section 3.3.
+    """
+    shares, obtuse = _circumcentric_shares(surface)
+    shares = np.where(obtuse.any(axis=1, keepdims=True), np.where(obtuse, 0.5, 0.25), shares)
+    return _from_triangle_shares(surface, shares)
+
+
+def _circumcentric_shares(surface: Surface) -> tuple[NDArray, NDArray]:
+    """Share of each triangle nearest to each corner (nt, 3), and which corners are obtuse."""
+    x = surface.nodes[surface.triangles]
+    opposite = np.roll(x, -2, axis=1) - np.roll(x, -1, axis=1)
+    squared = np.einsum("tkc,tkc->tk", opposite, opposite)
+    others = squared.sum(axis=1, keepdims=True) - 2.0 * squared
+    area = surface.triangle_area[:, None]
+    cotangent = others / (4.0 * area)
+    part = squared * cotangent / (8.0 * area)
+    return np.roll(part, -1, axis=1) + np.roll(part, -2, axis=1), cotangent < 0.0
+
+
+def consistent(surface: Surface) -> sparse.csr_array:
+    """rho A t / 12 [2 1 1; 1 2 1; 1 1 2] of each triangle, assembled.
+
+    Its rotational inertia is exact about every axis in the plane of a panel.
+    """
+    element = (np.ones((3, 3)) + np.eye(3)) / 12.0
+    values = (surface.areal_density * surface.triangle_area)[:, None, None] * element
+    rows = np.repeat(surface.triangles, 3, axis=1).ravel()
+    columns = np.tile(surface.triangles, (1, 3)).ravel()
+    n = len(surface.nodes)
+    return sparse.coo_array((values.ravel(), (rows, columns)), shape=(n, n)).tocsr()
+
+
+def inertia_exact(surface: Surface) -> sparse.csr_array:
+    """Masses with the panel's own mass, center of mass and, as far as they can, inertia.
+
+    On a parallelogram with a center node, 2/3 at the center and 1/12 at each corner have exactly
+    the second moments of the panel about every axis. On other panels the masses start from those of
+    the centroid rule, which have the exact total and center of mass, and move towards the nearest
+    ones that have the second moments too (or come as near as they can, by least squares), as far as
+    every node keeps a quarter of its start: a node without mass could not move. A triangle without
+    a center node keeps a third for each corner.
+    """
+    mass = np.zeros(len(surface.nodes))
+    total = surface.panel_mass
+    first = np.searchsorted(surface.triangle_panel, np.arange(len(surface.faces) + 1))
+    for p in range(len(surface.faces)):
+        nodes = surface.nodes_of(p)
+        x = surface.nodes[nodes]
+        if len(nodes) == 3:
+            share = np.full(3, 1.0 / 3.0)
+        elif len(nodes) == 5 and _is_parallelogram(x):
+            share = np.array([1.0, 1.0, 1.0, 1.0, 8.0]) / 12.0
+        else:
+            inside = slice(first[p], first[p + 1])
+            place = {node: k for k, node in enumerate(nodes)}
+            corners = np.array([[place[v] for v in t] for t in surface.triangles[inside].tolist()])
+            area = surface.triangle_area[inside]
+            share = _shares(x, corners, area / area.sum())
+        mass[nodes] += total[p] * share
+    return lumped(mass)
+
+
+def _is_parallelogram(x: NDArray) -> bool:
+    """Whether corners x[:4] are those of a parallelogram and x[4] is its middle."""
+    off = np.abs([x[0] + x[2] - x[1] - x[3], x[0] + x[2] - 2.0 * x[4]])
+    return bool(off.max() < 1e-9 * np.ptp(x, axis=0).max())
+
+
+def _shares(x: NDArray, triangles: NDArray, part: NDArray) -> NDArray:
+    """Shares of nodes x (m, 3) of a panel's mass, `part` of which lies in each triangle."""
+    start = np.bincount(triangles.ravel(), np.repeat(part / 3.0, 3), minlength=len(x))
+    x = x - start @ x
+    x = x / np.abs(x).max()
+    # integral of x x^T over a triangle: A/12 (sum of v v^T + s s^T), s the sum of its corners
+    corners = x[triangles]
+    s = corners.sum(axis=1)
+    wanted = np.einsum("t,tka,tkb->ab", part / 12.0, corners, corners)
+    wanted += np.einsum("t,ta,tb->ab", part / 12.0, s, s)
+    missing = (wanted - np.einsum("k,ka,kb->ab", start, x, x)).ravel()
+    # changes of the shares that leave total and center of mass alone
+    kept = np.column_stack([np.ones(len(x)), x])
+    left, singular, _ = np.linalg.svd(kept)
+    free = left[:, int((singular > 1e-9 * singular[0]).sum()) :]
+    products = np.einsum("ka,kb->abk", x, x).reshape(9, -1)
+    change = free @ np.linalg.lstsq(products @ free, missing, rcond=1e-9)[0]
+    down = change < 0.0
+    allowed = (1.0 - LEAST) * start[down] / -change[down]
+    return start + min(1.0, allowed.min(initial=1.0)) * change
+
+
+def lumped(mass: NDArray) -> sparse.csr_array:
+    """Diagonal mass matrix of nodal masses (n,)."""
+    return sparse.csr_array(sparse.diags_array(mass))
+
+
+def _from_triangle_shares(surface: Surface, shares: NDArray) -> sparse.csr_array:
+    """Lumped matrix from shares (nt, 3) of each triangle's mass for its corners."""
+    mass = shares * (surface.areal_density * surface.triangle_area)[:, None]
+    total = np.bincount(surface.triangles.ravel(), mass.ravel(), minlength=len(surface.nodes))
+    return lumped(total)
+
+
+MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
+    rule.__name__: rule
+    for rule in (
+        equi_inertial,
+        equi_inertial_acute,
+        panel,
+        centroid,
+        circumcenter,
+        consistent,
+        mixed_voronoi,
+        inertia_exact,
+    )
+}
+
+
+def rotational_inertia(mass: sparse.csr_array, nodes: NDArray, start: int, end: int) -> float:
+    """Moment of inertia (kg m2) of a mass matrix about the line through two nodes."""
+    axis = nodes[end] - nodes[start]
+    axis = axis / np.linalg.norm(axis)
+    arm = nodes - nodes[start]
+    arm = arm - np.outer(arm @ axis, axis)
+    return float(sum(arm[:, c] @ (mass @ arm[:, c]) for c in range(3)))
