@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.analyses.provenance import mesh_error
 from foldyn.linear import refinement
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01)  # without density: the ratios do not need it
@@ -42,3 +43,34 @@ def test_where_there_is_nothing_to_compare_with():
     assert refinement(fd.Case(fd.discretize(fd.patterns.miura(), SHEET))) is None
     only_there = [fd.Fix([0, 1, 2, 20], "xyz")]  # no vertex
     assert refinement(miura(3, only_there)) is None
+
+
+def test_results_of_case_files_say_it(tmp_path):
+    """As attributes, on the page, and by the command; not of bars and hinges."""
+    text = """
+[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+[[supports]]
+nodes = "xmin"
+[[loads]]
+nodes = [7]
+force = [1e-3, 0, 0]
+[analysis]
+kind = "statics"
+load_factors = [1.0]
+"""
+    (tmp_path / "case.toml").write_text(text)
+    assert "mesh_error" not in fd.read_case(tmp_path / "case.toml").run().attrs
+    (tmp_path / "case.toml").write_text(text + '[model]\nkind = "shell"\ndivisions = 4\n')
+    path = fd.read_case(tmp_path / "case.toml").run()
+    found = refinement(fd.case_of(path))
+    assert found is not None and path.attrs["mesh_error"] == pytest.approx(found.error)
+    assert path.attrs["extrapolated"] == pytest.approx(found.extrapolated)
+    fd.save(path, tmp_path / "path.nc")
+    assert fd.load(tmp_path / "path.nc").attrs["mesh_error"] == path.attrs["mesh_error"]
+    percent = f"{-100 * found.error:.2g} % too low with this mesh"
+    assert percent in mesh_error(path)

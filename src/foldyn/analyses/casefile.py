@@ -20,6 +20,7 @@ from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
+from foldyn.linear import refinement
 from foldyn.patterns import Pattern
 from foldyn.report.album import Album, ByRule
 from foldyn.report.page import write_report
@@ -318,4 +319,6 @@ class Computation:
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
         """Compute it; `begun` is called once all input has been accepted."""
         with self.case_file.placing(self.mass):
-            return self.compute(progress, begun)
+            result = self.compute(progress, begun)
+        judged = refinement(self.case_file.case(self.mass))
+        return result if judged is None else result.assign_attrs(judged.facts())

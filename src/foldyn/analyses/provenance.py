@@ -12,6 +12,8 @@ from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.values import plain
 
 if TYPE_CHECKING:
+    import xarray
+
     from foldyn.analyses.casefile import CaseFile
 
 UNITS: Mapping[str, str] = {"youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3"}
@@ -26,10 +28,11 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     first = next(iter(results))
     case, path = case_file.case(first), case_file.path
     model = _given(case.structure.options) | {"mass": ", ".join(results)}
-    version = results[first].attrs["foldyn_version"]
+    mesh, version = mesh_error(results[first]), results[first].attrs["foldyn_version"]
     rows = [
         ["sheet", _listed(_given(case_file.sheet))],
         ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
+        *([["mesh", mesh]] if mesh else []),
         ["damping", _listed(_given(case.damping))],
         ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
     ]
@@ -40,6 +43,17 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
         Table(["part", "as computed"], rows),
         Listing(f"The case file {path.name}", path.read_text("utf-8")),
     ]
+
+
+def mesh_error(result: xarray.Dataset) -> str:
+    """What a result says of its mesh, in words; empty where there is nothing to say."""
+    if "mesh_error" not in result.attrs:
+        return ""
+    percent = 100.0 * float(result.attrs["mesh_error"])
+    return (
+        f"the lowest frequencies are {abs(percent):.2g} % too {'low' if percent < 0.0 else 'high'} "
+        "with this mesh, by extrapolation from it and one half as fine"
+    )
 
 
 def _given(choices: Any) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
+from foldyn.analyses.provenance import mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.stamp import Owner
@@ -101,6 +102,8 @@ def _computed(
         result = done[one.mass]
         results.keep(one.file, partial(save, result))
         say(one.case_file.analysis.line(one.mass, result))
+        if mesh := mesh_error(result):
+            say(f"  {one.mass}: {mesh}")
         _tell_missing(one.place, result, say)
     return done
 

@@ -18,6 +18,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.modes import modes
 
 MODES = 3
+FINE = 16  # pieces: beyond, errors are below 0.5 % and the judgement is dear
 
 
 class Refinement(NamedTuple):
@@ -32,6 +33,14 @@ class Refinement(NamedTuple):
         """The largest error of these frequencies; negative where the mesh is too soft."""
         errors = self.frequency / self.extrapolated - 1.0
         return float(errors[np.abs(errors).argmax()])
+
+    def facts(self) -> dict[str, Any]:
+        """What a result says of its mesh: attributes."""
+        return {
+            "mesh_error": self.error,
+            "mesh_frequencies": self.frequency,
+            "extrapolated": self.extrapolated,
+        }
 
 
 def refinement(case: Case, count: int = MODES) -> Refinement | None:
@@ -48,11 +57,12 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
     -------
     Refinement or None
         None where the structure has no mesh that could be finer, where its mesh is the coarsest
-        there is, or where supports are given by nodes that a coarser mesh does not have.
+        there is or is fine enough (more than 16 pieces of every edge), or where supports are given
+        by nodes that a coarser mesh does not have.
     """
     structure = case.structure
     coarser = structure.coarser
-    if coarser is None:
+    if coarser is None or structure.options.divisions > FINE:
         return None
     try:
         fine, coarse = (_frequencies(case, one, count) for one in (structure, coarser))
