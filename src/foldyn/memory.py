@@ -33,6 +33,16 @@ def at_most(share: float) -> Iterator[None]:
         _share.reset(before)
 
 
+def share() -> float:
+    """Share of the memory beyond which what needs more is refused; see `at_most`."""
+    return _share.get()
+
+
+def allow(share: float) -> None:
+    """Set this share for the rest of the process."""
+    _share.set(share)
+
+
 def memory() -> float:
     """Bytes of the machine, or of its container or the shell's limit if they allow fewer."""
     known = [_machine(), *map(_limit, _LIMITS)]

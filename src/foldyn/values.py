@@ -10,8 +10,9 @@ import difflib
 import math
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import fields
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ MOST = 2**63 - 1
 """Largest whole number: what arrays of them hold."""
 SHOWN = 60
 """Characters of a value in a message."""
+SOME = 6
+"""Items of a list, and of an array, that a repr shows."""
+T = TypeVar("T")
 
 
 def show(value: Any) -> str:
@@ -67,6 +71,32 @@ def shortened(text: str) -> str:
     """Text for a message in one line; only the beginning of a long one."""
     text = " ".join(text.splitlines())
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
+
+
+def brief(cls: type[T]) -> type[T]:
+    """Give a data class a repr of one short line: arrays by their shape, lists by their ends."""
+
+    def shown(self: Any) -> str:
+        given = (
+            f"{item.name}={_brief(getattr(self, item.name))}" for item in fields(self) if item.repr
+        )
+        return f"{type(self).__name__}({', '.join(given)})"
+
+    cls.__repr__ = shown  # type: ignore[method-assign]
+    return cls
+
+
+def _brief(value: Any) -> str:
+    if type(value).__name__ == "Dataset":
+        return f"<Dataset {dict(value.sizes)}>"
+    if isinstance(value, np.ndarray) and value.size > SOME:
+        return f"<{value.dtype.name} {value.shape}>"
+    if type(value) in (list, tuple):
+        items = [_brief(item) for item in value[:SOME]]
+        more = [f"... {len(value)} in all"] if len(value) > SOME else []
+        inside = ", ".join([*items, *more])
+        return f"({inside})" if isinstance(value, tuple) else f"[{inside}]"
+    return " ".join(repr(plain(value)).split())
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:

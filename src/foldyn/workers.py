@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, Self, TypeVar
 
+from foldyn import memory
 from foldyn.errors import ComputationError
 
 Item = TypeVar("Item")
@@ -30,13 +31,19 @@ class Workers:
     ----------
     count : int
         Of processes.
+    begin : callable, optional
+        Called in each process at its beginning, with the arguments that follow.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(
+        self, count: int, begin: Callable[..., object] | None = None, *given: object
+    ) -> None:
         context = get_context("spawn")
         line, self._end = context.Pipe(duplex=False)
         self._line = line  # open here too: a process that starts later gets it
-        self._pool = ProcessPoolExecutor(count, context, initializer=_live, initargs=(line,))
+        self._pool = ProcessPoolExecutor(
+            count, context, initializer=_live, initargs=(line, memory.share(), begin, *given)
+        )
 
     def submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
         """Have something computed.
@@ -67,12 +74,13 @@ class Workers:
         try:
             waiting = {self.submit(do, item): item for item in items}
             for future in as_completed(list(waiting)):
-                keep(waiting.pop(future), future.result())
+                keep(waiting[future], future.result())
+                del waiting[future]
         except BrokenProcessPool:
             raise ComputationError(
                 "a process that computes was ended from outside: perhaps for lack of memory, then "
-                "the same command goes on with what is left; or, in a script, because this was not "
-                'called below if __name__ == "__main__":'
+                "what was kept need not be computed again; or, in a script, because this was not "
+                'called below if __name__ == "__main__" (processes=1 needs no other process)'
             ) from None
         except KeyboardInterrupt:
             for future, item in waiting.items():
@@ -95,12 +103,17 @@ class Workers:
         self._line.close()
 
 
-def _live(line: Connection) -> None:
-    """Begin a process that ends when the line does."""
+def _live(
+    line: Connection, share: float, begin: Callable[..., object] | None, *given: object
+) -> None:
+    """Begin a process that ends when the line does, and has its parent's share of the memory."""
     Thread(target=_follow, args=(line,), daemon=True).start()
     _arm(line)
     if line.poll():  # it ended before that
         os._exit(1)
+    memory.allow(share)
+    if begin is not None:
+        begin(*given)
 
 
 def _follow(line: Connection) -> None:

@@ -111,7 +111,7 @@ def test_without_a_model_there_are_pixels(inside):
         (["film.mkv", "film.mkv"], "one film at a time"),
         (["missing.mp4"], "no such file"),
         (["case.toml"], "codec is unknown"),
-        (["film.mkv", "--scale", "0"], "--scale 0.0: give a positive number"),
+        (["film.mkv", "--scale", "0"], "--scale = 0.0: must be greater than 0"),
         (["film.mkv", "--scale", "wide"], "give numbers"),
         (["film.mkv", "--scale", "1", "--reference", "0,0,1,1,1"], "give one or the other"),
         (["film.mkv", "--reference", "0,0,1,1"], "4 numbers; 5 are needed"),

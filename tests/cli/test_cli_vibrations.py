@@ -63,7 +63,8 @@ def short_films(monkeypatch):
 
 
 def cells_of(page: str) -> list[list[str]]:
-    rows = re.findall(r"<tr>(.*?)</tr>", page)
+    seen = re.sub(r'<span class="unseen".*?</span>', "", page)
+    rows = re.findall(r"<tr>(.*?)</tr>", seen)
     return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
 
 

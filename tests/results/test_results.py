@@ -372,6 +372,8 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch) -> None:
         InputError, match=r"run\.csv: only NetCDF is written; name the file run\.nc"
     ):
         save(ds, tmp_path / "run.csv")
+    save(ds, tmp_path / "damping-0.05")
+    (tmp_path / "damping-0.05").unlink()
     with pytest.raises(InputError, match="is not a Foldyn result"):
         save(xr.Dataset(), tmp_path / "run.nc")
     save(ds, tmp_path / "run.nc")

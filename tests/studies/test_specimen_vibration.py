@@ -69,17 +69,22 @@ def test_alpha_alone_damps_the_axial_mode_as_measured():
 def test_modes_are_wobble_axial_wobble(published):
     """What the paper calls wobbles is bending along y, in the plane of the sheet."""
     found = vibration.shapes(published)
-    by_name = dict(zip(found["name"].values.tolist(), found["frequency"].values, strict=True))
-    wobble, axial = by_name["first bending along y"], by_name["first axial"]
-    second = by_name["second bending along y"]
-    assert wobble < axial < second
+    names = found["name"].values.tolist()
+    by_name = dict(zip(names, found["frequency"].values, strict=True))
+    axial = by_name["first axial"]
     assert axial == pytest.approx(9.3, rel=0.1)
-    share = dict(zip(found["name"].values.tolist(), found["share_of_name"].values, strict=True))
-    if not published:  # as published two pairs of modes are so close that they mix
-        assert wobble == pytest.approx(4.6, rel=0.05)
-        assert share["first bending along y"] > 0.95
-        assert share["first axial"] > 0.9
-        assert share["second bending along y"] > 0.8
+    if published:  # the first two are so close that they mix
+        mixed = [name for name in names if name.startswith("mixed: ")]
+        assert mixed[:2] == names[:2] and all("bending along y" in name for name in names[:2])
+        assert by_name[names[1]] < axial < by_name["first bending along y"]
+        return
+    wobble, second = by_name["first bending along y"], by_name["second bending along y"]
+    assert wobble < axial < second
+    share = dict(zip(names, found["share_of_name"].values, strict=True))
+    assert wobble == pytest.approx(4.6, rel=0.05)
+    assert share["first bending along y"] > 0.95
+    assert share["first axial"] > 0.9
+    assert share["second bending along y"] > 0.8
 
 
 def test_the_first_wobble_is_driven_at_a_corner_not_in_the_middle():

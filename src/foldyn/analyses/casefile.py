@@ -158,7 +158,7 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CaseFile:
     """A case file that has been read and checked.
 
@@ -177,6 +177,8 @@ class CaseFile:
     analysis : Analysis
         What to compute; its `arguments` are those of `simulate`, `trace`, `modes` or `frf`.
     output : Output
+    text : str
+        What the file said when it was read.
     """
 
     path: Path
@@ -190,6 +192,12 @@ class CaseFile:
     _schema: CaseSchema = field(repr=False)
     _make: Callable[[str], Case] = field(repr=False)
     _cases: dict[str, Case] = field(repr=False)
+    text: str = field(default="", repr=False)
+
+    def __repr__(self) -> str:
+        """One line: the file, what it asks for, of what."""
+        model = self.model.replace("_", " ")
+        return f"<CaseFile {self.path}: {self.analysis.kind} of {model}, mass {self.masses}>"
 
     @property
     def heading(self) -> str:
@@ -317,7 +325,7 @@ class Computation:
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
     def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
-        """Compute it; `begun` is called once all input has been accepted."""
+        """Compute it; `begun` is called, at least once, when all input has been accepted."""
         with self.case_file.placing(self.mass):
             result = self.compute(progress, begun)
         judged = refinement(self.case_file.case(self.mass))

@@ -93,7 +93,9 @@ def _shown(output: Document, kind: str) -> Document:
     if kind == "modes":  # axis and nodes mean something else there
         return {key: output[key] for key in ("animation",) if key in output}
     shown = {key: output[key] for key in ("nodes", "axis") if key in output}
-    return {**shown, "axis": shown["axis"][-1]} if "axis" in shown else shown
+    if "axis" in shown and kind != "frf":  # which reads along directions, too
+        shown["axis"] = shown["axis"][-1]
+    return shown
 
 
 def _without(table: Document, *keys: str) -> Document:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
+from foldyn.materials.law import Law
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.values import plain
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 
     from foldyn.analyses.casefile import CaseFile
 
-UNITS: Mapping[str, str] = {"youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3"}
+UNITS: Mapping[str, str] = {
+    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
+    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
+}  # fmt: skip
 MOST = 200  # characters of a value
 
 
@@ -41,7 +45,7 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     return [
         Heading("How it was computed"),
         Table(["part", "as computed"], rows),
-        Listing(f"The case file {path.name}", path.read_text("utf-8")),
+        Listing(f"The case file {path.name}", case_file.text),
     ]
 
 
@@ -71,5 +75,9 @@ def _listed(values: Mapping[str, Any]) -> str:
 
 
 def _written(value: Any) -> str:
+    if isinstance(value, Law):
+        given = _given(value) if is_dataclass(value) else {}
+        given.pop("name", None)
+        return f"{value.name} ({_listed(given)})" if given else value.name
     text = f"{value:.6g}" if isinstance(value, float) else str(plain(value))
     return text if len(text) <= MOST else f"{text[: MOST - 4]} ..."

@@ -158,7 +158,7 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
-        Output(nodes, chosen is not None, **shown), schema, make, cases,
+        Output(nodes, chosen is not None, **shown), schema, make, cases, read_document_text(path),
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:
@@ -169,13 +169,18 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
 
 def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
-    text = read_text(
-        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
-    )
+    text = read_document_text(path)
     with within("", path):
         document = from_toml(text)
         check_values(document)
     return document
+
+
+def read_document_text(path: Path) -> str:
+    """The text of a case file."""
+    return read_text(
+        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
+    )
 
 
 def check_values(document: Mapping[str, Any]) -> None:

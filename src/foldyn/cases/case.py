@@ -16,7 +16,7 @@ from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
 from foldyn.errors import Faults, InputError
 from foldyn.structures.discretized import read_only
-from foldyn.values import choice, number, numbers, show
+from foldyn.values import brief, choice, number, numbers, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
 Summands = Iterable[tuple[NDArray[np.float64], Any]]
@@ -62,6 +62,7 @@ class Rayleigh:
         return self.alpha + self.beta * omega**2
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class State:
     """Displacement and velocity of every node, for example to start a motion from.
@@ -93,6 +94,7 @@ class State:
             raise InputError("displacement and velocity: must have the same shape")
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Case:
     """A structure with supports, loads and damping.

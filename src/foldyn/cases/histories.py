@@ -20,7 +20,7 @@ from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
 from foldyn.cases.history import Constant, Formula, History, check_flag, set_field
 from foldyn.errors import InputError
-from foldyn.values import SMALLEST, number, numbers, show
+from foldyn.values import SMALLEST, brief, number, numbers, show
 
 __all__ = [
     "HISTORIES", "Chirp", "Constant", "HalfSine", "Harmonic", "History", "Pulse", "Ramp", "Step",
@@ -231,6 +231,7 @@ class Chirp(Formula):
         return 0.0, self.duration
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Table(Formula):
     """Factors given at times, linear between them, the first and the last held outside.

@@ -15,7 +15,7 @@ from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.values import number_or_list, show, vector
+from foldyn.values import brief, number_or_list, show, vector
 
 __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
 
@@ -59,6 +59,7 @@ class Load(Part):
         """Refuse what the structure or its held dofs (n, 3) do not allow."""
 
 
+@brief
 @dataclass(frozen=True)
 class Force(Load):
     """The same force on each of some nodes, times a history.
@@ -163,6 +164,7 @@ class Gravity(Load):
             _ = structure.mass
 
 
+@brief
 @dataclass(frozen=True)
 class Actuate(Load):
     """Creases that fold or unfold by themselves.

@@ -11,12 +11,13 @@ from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
-from foldyn.values import choice, number, number_or_list, show
+from foldyn.values import brief, choice, number, number_or_list, show
 
 AXES = "xyz"
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 
 
+@brief
 @dataclass(frozen=True)
 class Fix(Part):
     """Nodes held along some axes.
@@ -44,6 +45,7 @@ class Fix(Part):
             raise InputError(f" = {show(axes)}: an axis is listed twice", "axes")
 
 
+@brief
 @dataclass(frozen=True)
 class Impose(Part):
     """Nodes moved along one axis as prescribed, whatever force that takes.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from foldyn.errors import InputError
-from foldyn.values import choice, number
+from foldyn.values import brief, choice, number
 
 _TERMS = 6  # of the polynomial in r^2 that inverts the distortion
 _REACH = 1.08  # part of the half diagonal, up to which it is fitted
@@ -71,6 +71,7 @@ def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:
     return np.array([np.cross(top, toward), -top, -toward])
 
 
+@brief
 @dataclass(frozen=True)
 class Camera:
     """Pinhole with radial distortion; pixel (0, 0) is the center of the upper left one.

@@ -35,7 +35,7 @@ from foldyn.errors import FoldynWarning
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
-from foldyn.values import number
+from foldyn.values import brief, number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
 # (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
@@ -43,6 +43,7 @@ POWER = 4.0 / 3.0
 AT_REST = float(2.0 / np.sqrt(np.pi) * gamma(0.5 * POWER + 1.0) / gamma(0.5 * POWER + 1.5))
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Linearized:
     """Matrices of small motions about a state, on the free dofs (3 node + axis).

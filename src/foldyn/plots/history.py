@@ -45,7 +45,8 @@ def plot_history(
         length one serves all). None: the direction in which each node moves most.
     max_frequency : float or None
         Upper end of the frequency axis (Hz). None: a round number above the last frequency at
-        which a curve has 2 % of its height, at most half the smallest sampling frequency.
+        which a curve has 2 % of the height of the highest one of its node, at most half the
+        smallest sampling frequency.
     title : str
         Title of the figure.
     window, detrend : str or None
@@ -74,6 +75,7 @@ def plot_history(
     intervals = {label: sampling_interval(time) for label, time in times.items()}
     if max_frequency is not None:
         number("max_frequency", max_frequency, above=0.0, unit="Hz")
+    rows = len(numbers)
     contents = {
         (label, row): spectrum(
             moved[label][:, row, AXES.index(direction)], intervals[label], window=window,
@@ -83,9 +85,10 @@ def plot_history(
         for row, direction in enumerate(chosen)
     }  # fmt: skip
     nyquist = 0.5 / max(intervals.values())
-    highest = max_frequency or min(nyquist, max(map(_reach, contents.values()))) or nyquist
+    largest = [max(contents[label, row][1][1:].max() for label in times) for row in range(rows)]
+    reach = max(_reach(*content, largest[row]) for (_, row), content in contents.items())
+    highest = max_frequency or min(nyquist, reach) or nyquist
 
-    rows = len(numbers)
     figure = style.new_figure(9.0, 1.15 + 1.75 * rows, title)
     grid = figure.subplots(
         rows, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [1.45, 1.0]}
@@ -116,11 +119,14 @@ def plot_history(
     return style.finish(figure, handles, columns=5)
 
 
-def _reach(content: tuple[NDArray[np.float64], NDArray[np.float64]]) -> float:
+def _reach(
+    frequencies: NDArray[np.float64], amplitude: NDArray[np.float64], largest: float
+) -> float:
     """A round number (Hz) above the frequencies at which an amplitude can be seen; or 0."""
-    frequencies, amplitude = (part[1:] for part in content)
-    if not amplitude.any():
+    visible = (amplitude >= VISIBLE * largest) & (amplitude > 0.0) & (frequencies > 0.0)
+    seen = np.flatnonzero(visible)
+    if not seen.size:
         return 0.0
-    end = frequencies[np.flatnonzero(amplitude >= VISIBLE * amplitude.max())[-1]]
+    end = frequencies[seen[-1]]
     decade = 10.0 ** np.floor(np.log10(end))
     return float(decade * next(step for step in ROUND if step * decade >= end))

@@ -130,4 +130,5 @@ def _legend_below(axes: Axes, note: str) -> None:
 def _distinct(stiffness: np.ndarray, rest: np.ndarray) -> list[tuple[int, int]]:
     """Return (first index, count) of hinges with equal stiffness and rest, most frequent first."""
     looks = [f"{k:.6e} {theta0:.6f}" for k, theta0 in zip(stiffness, rest, strict=True)]
-    return [(looks.index(look), count) for look, count in Counter(looks).most_common()]
+    first = {look: k for k, look in reversed(list(enumerate(looks)))}
+    return [(first[look], count) for look, count in Counter(looks).most_common()]

@@ -137,8 +137,8 @@ def _base_curves(case: Case) -> list[_Curve]:
 def _angle_curves(case: Case) -> list[_Curve]:
     """Curves of rest angles (degrees), one for each history and pair of first and last angle."""
     curves = []
-    first = np.degrees(case.structure.fold_rest)
     for change, history in case.actuation_terms:
+        first = np.degrees(case.structure.fold_rest)
         last = first + np.degrees(change)
         groups: dict[tuple[float, float], list[int]] = {}
         for load in case.loads:

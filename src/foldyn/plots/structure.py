@@ -214,7 +214,7 @@ def _arrows(
     ]
     hidden = len(terms) - _MOST_LOADS_LISTED
     if hidden > 0:
-        keys.append(style.key(f"and {hidden} more loads", linestyle="none"))
+        keys.append(style.key(f"and {hidden} more", linestyle="none"))
     shafts, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     return [_Arrows(shafts, heads, color, keys)]
 

@@ -31,7 +31,11 @@ from foldyn.results.dataset import FORMAT
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
-SUFFIXES = ("", ".nc", ".nc4", ".netcdf", ".cdf", ".h5", ".hdf5")
+OTHERS = (
+    ".csv", ".dat", ".fold", ".gif", ".html", ".json", ".mat", ".mp4", ".npy", ".npz", ".obj",
+    ".parquet", ".pkl", ".png", ".toml", ".tsv", ".txt", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
+)  # fmt: skip
+"""Suffixes that promise another kind of file."""
 _PARTS = ("real", "imag")
 _WHOLE = "part_of_complex"  # attribute of both parts: the name of the variable
 MOST_PACKED = 1100
@@ -119,10 +123,10 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file")
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() in OTHERS:
         raise InputError(
             f"{path}: only NetCDF is written; name the file {path.stem}.nc, or write a table "
-            'yourself, as ds["displacement"].to_series().to_csv(path)'
+            "yourself, as ds[variable].to_series().to_csv(path)"
         )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals import records
-from foldyn.values import choice, whole
+from foldyn.values import brief, choice, whole
 
 ESTIMATORS = ("h1", "h2")
 _FEWEST = 4  # samples of a segment
@@ -22,6 +22,7 @@ _FEWEST = 4  # samples of a segment
 _SILENCE = 1e-12
 
 
+@brief
 @dataclass(frozen=True)
 class FrequencyResponse:
     """A frequency response estimated from records.

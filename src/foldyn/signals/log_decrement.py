@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_interval, checked_number, checked_record
 from foldyn.signals.spectrum import spectrum
+from foldyn.values import brief
 
 _FEWEST = 16
 _PADDING = 8  # the period need only be known to a tenth
@@ -17,6 +18,7 @@ _FEWEST_PER_CYCLE = 8.0
 _DEGREE = 6  # of the polynomial through the samples around a maximum
 
 
+@brief
 @dataclass(frozen=True)
 class LogDecrement:
     """Decay of a free vibration per cycle.

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_interval, checked_number, real_array
-from foldyn.values import whole
+from foldyn.values import brief, whole
 
 _FEWEST = 8
 _WIDEST = 500  # of a window: the singular value decomposition costs n width^2
@@ -19,6 +19,7 @@ _ROWS = 4096  # windows taken into the factorization at a time
 _ABOVE_NOISE = 4.5
 
 
+@brief
 @dataclass(frozen=True)
 class DecayingModes:
     """A record as a sum of decaying cosines, by increasing natural frequency.

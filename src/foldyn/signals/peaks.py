@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.signals import records
-from foldyn.values import choice, whole
+from foldyn.values import brief, choice, whole
 
 _LOPSIDED = 0.1
 LOWEST = 1e-4  # of the maximum: what lies below may be the error of a simulation
 
 
+@brief
 @dataclass(frozen=True)
 class Peaks:
     """Peaks of a magnitude curve, by increasing frequency.

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.signals.records import checked_number, real_array
-from foldyn.values import whole
+from foldyn.values import brief, whole
 
 
+@brief
 @dataclass(frozen=True)
 class SineFit:
     """The sine of a known frequency in a record, with its harmonics.

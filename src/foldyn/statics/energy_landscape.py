@@ -25,6 +25,7 @@ from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
+from foldyn.values import brief
 
 if TYPE_CHECKING:
     import xarray
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 NO_FORCE = 1e-9  # of the largest driving force: counts as none at the ends of a path
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A state without driving force.
@@ -54,7 +56,7 @@ class Equilibrium:
     stable: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Landscape:
     """Energy and force along the stroke of a path.
 
@@ -74,6 +76,21 @@ class Landscape:
     energy: NDArray
     states: tuple[Equilibrium, ...]
     negative_stiffness: tuple[tuple[float, float], ...]
+
+    def __repr__(self) -> str:
+        """One line: the states, their heights and the barriers between neighboring stable ones."""
+        states = ", ".join(
+            f"{'stable' if one.stable else 'unstable'} at {one.stroke:.4g} m ({one.energy:.3g} J)"
+            for one in self.states
+        )
+        pairs = [(k, k + 1) for k in range(len(self.stable) - 1)]
+        barriers = ", ".join(
+            f"{self.barrier(a, b):.3g} J there and {self.barrier(b, a):.3g} J back"
+            for a, b in pairs
+        )
+        ends = f"stroke {self.stroke[0]:.4g} to {self.stroke[-1]:.4g} m"
+        over = f"; barriers {barriers}" if barriers else ""
+        return f"<Landscape, {ends}: {states or 'no state without force'}{over}>"
 
     @property
     def stable(self) -> tuple[Equilibrium, ...]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
 from foldyn.statics.problem import Problem, balance
+from foldyn.values import brief
 
 NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
 SNAPS = "the structure snaps to a state off its path"
@@ -33,6 +34,7 @@ REMEDY_LIMIT = (
 REMEDY_COLLISION = "let the folds lock before panels meet (fold_law 'enhanced')"
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Point:
     """An equilibrium on a path.

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from threading import Lock
 
@@ -134,7 +133,7 @@ def fit(
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
-    pool = Workers(processes) if processes > 1 else None
+    pool = Workers(processes, _begin, made) if processes > 1 else None
     with pool or nullcontext():
         evaluations = Evaluations(made, pool, folder, progress)
         search = _Search(made, evaluations)
@@ -191,8 +190,8 @@ class _Search:
     def descend(self, start: NDArray[np.float64]) -> Descent:
         """Search from a start."""
         begin = tuple(start.tolist())
+        (first,) = self.evaluations.at([start])
         try:
-            (first,) = self.evaluations.at([start])
             if isinstance(first, str):
                 raise ComputationError(first)
             end = least_squares(
@@ -294,12 +293,11 @@ class Evaluations:
         """Predictions at several points, at the same time where there is a pool."""
         wanted = [tuple(map(float, point)) for point in points]
         new = [values for values in dict.fromkeys(wanted) if not self._look(values)]
-        evaluate = partial(_evaluate, self.problem)
         if self.pool is None:
             for values in new:
-                self._keep(values, evaluate(values))
+                self._keep(values, _evaluate(self.problem, values))
         else:
-            self.pool.each(evaluate, new, self._keep)
+            self.pool.each(_evaluate_own, new, self._keep)
         return [self._known[values] for values in wanted]
 
     def _look(self, values: Values) -> bool:
@@ -342,6 +340,17 @@ def _write(file: Path, stamp: str, outcome: Outcome) -> None:
 
 
 KEPT: Store[Outcome] = Store(_read, _write, warns=False)
+
+
+_own: list[Problem] = []  # the one problem of a process that evaluates
+
+
+def _begin(problem: Problem) -> None:
+    _own[:] = [problem]
+
+
+def _evaluate_own(values: Values) -> Outcome:
+    return _evaluate(_own[0], values)
 
 
 def _evaluate(problem: Problem, values: Values) -> Outcome:

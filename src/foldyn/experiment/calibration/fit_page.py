@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.supports import AXES
-from foldyn.experiment.calibration.fit_problem import Computation
+from foldyn.experiment.calibration.fit_problem import PredictedRun
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.measurement import Measurement
@@ -146,7 +146,7 @@ def _saved(figure: Figure, file: Path, caption: str, note: str) -> Picture:
 
 
 def _curve(
-    fit: Fit, run: Computation, one: ForceDisplacement, case: Case
+    fit: Fit, run: PredictedRun, one: ForceDisplacement, case: Case
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Displacements and forces of the model from 0 to beyond the measured ones."""
     ends = min(0.0, one.displacement.min()), max(0.0, one.displacement.max())

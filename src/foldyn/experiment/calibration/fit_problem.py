@@ -29,7 +29,7 @@ ASIDE = ("name", "label", "sigma", "held_out", "case", "force")
 
 
 @dataclass(frozen=True, eq=False)
-class Computation:
+class PredictedRun:
     """One path or motion that predicts several measurements.
 
     Attributes
@@ -59,14 +59,14 @@ class Problem:
         Its content.
     space : Space
     measurements : tuple of Measurement
-    runs : tuple of Computation
+    runs : tuple of PredictedRun
     """
 
     path: Path
     document: dict[str, Any]
     space: Space
     measurements: tuple[Measurement, ...]
-    runs: tuple[Computation, ...]
+    runs: tuple[PredictedRun, ...]
 
     def predict(self, values: Sequence[float] | NDArray) -> list[NDArray[np.float64]]:
         """Values that the model gives for each measurement.
@@ -86,7 +86,7 @@ class Problem:
                 predicted[i] = self.measurements[i].predicted(result, case_file.case())
         return [predicted[i] for i in range(len(self.measurements))]
 
-    def case_file(self, run: Computation, values: Sequence[float] | NDArray) -> CaseFile:
+    def case_file(self, run: PredictedRun, values: Sequence[float] | NDArray) -> CaseFile:
         """Case file at given values; its warnings were given when it was checked."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
@@ -94,7 +94,7 @@ class Problem:
 
     def result(
         self,
-        run: Computation,
+        run: PredictedRun,
         values: Sequence[float] | NDArray,
         members: Sequence[Measurement] | None = None,
     ) -> Any:
@@ -197,7 +197,7 @@ def _check_sigmas(measurements: Sequence[Measurement]) -> None:
 
 def _runs(
     path: Path, document: dict[str, Any], measurements: Sequence[Measurement]
-) -> list[Computation]:  # fmt: skip
+) -> list[PredictedRun]:  # fmt: skip
     """Measurements with the same case and the same changes, together."""
     groups: dict[str, tuple[Path, dict[str, Any], list[int]]] = {}
     for i, one in enumerate(measurements):
@@ -207,7 +207,7 @@ def _runs(
             content = document if one.case is None else read_document(own)
             groups[key] = own, replaced(content, one.changes), []
         groups[key][2].append(i)
-    return [Computation(own, content, tuple(members)) for own, content, members in groups.values()]
+    return [PredictedRun(own, content, tuple(members)) for own, content, members in groups.values()]
 
 
 def _check(one: Measurement, case_file: CaseFile) -> None:

@@ -21,6 +21,7 @@ from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import netcdf
+from foldyn.values import brief
 from foldyn.writing import write_text
 
 WEAK = 1e-5
@@ -63,6 +64,7 @@ class Estimate:
         return "" if self.determined else "the data do not determine it"
 
 
+@brief
 @dataclass(frozen=True)
 class Descent:
     """A search from one start.
@@ -113,6 +115,7 @@ class Score:
     relative: float
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Parameters of a case fitted to measurements.
@@ -248,6 +251,7 @@ class Fit:
             raise InputError(f"{path}: a fit is written as .json or .nc; choose one of them")
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Standard errors, intervals and correlation of p parameters.

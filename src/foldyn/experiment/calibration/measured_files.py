@@ -91,8 +91,12 @@ def shapes(
     values = np.full((len(steps), len(every), len(axes)), np.nan)
     place = np.searchsorted(steps, table["load_factor"]), np.searchsorted(every, listed)
     values[place] = np.stack([table[axis] for axis in axes], axis=1)
-    moved = xr.DataArray(values, {"node": every, "axis": list(axes)}, ("photo", "node", "axis"))
-    return _shapes_of_tracks(file, moved, nodes, steps, **known)
+    chosen = every.tolist() if nodes is None else _listed(file, nodes)
+    missing = sorted(set(chosen) - set(every.tolist()))
+    if missing:
+        raise InputError(f"{file}: has no line for node {missing[0]}")
+    values = values[:, np.searchsorted(every, chosen)]
+    return _made(Shapes, file, nodes=chosen, load_factor=steps, values=values, axes=axes, **known)
 
 
 def history(

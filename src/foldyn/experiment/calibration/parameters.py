@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError
-from foldyn.values import number, shortened, show, suggest, whole
+from foldyn.values import brief, number, shortened, show, suggest, whole
 
 MOST_STARTS = 100_000
 """Searches: a larger number is a typing error."""
@@ -218,6 +218,7 @@ class Parameter:
             )
 
 
+@brief
 @dataclass(frozen=True)
 class Space:
     """All parameters of a fit and the keys tied to them.

@@ -17,12 +17,13 @@ from foldyn.errors import ComputationError, InputError
 from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
 from foldyn.results import case_of
-from foldyn.values import number
+from foldyn.values import brief, number
 
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
 """Codec by the end of the file's name: FFV1 loses nothing, mp4v does."""
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class SyntheticFilm:
     """A film whose pictures are rendered one by one, when they are asked for.

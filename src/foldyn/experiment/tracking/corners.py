@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.experiment.camera import opencv
 from foldyn.jit.compiled import strict
-from foldyn.values import number
+from foldyn.values import brief, number
 
 _CANDIDATES = 5  # of Harris's measure for each corner that is asked for
 _DIRECTIONS = 120  # around a point, in which edges are looked for
@@ -132,6 +132,7 @@ def _first_of_each(points: NDArray[np.float64], apart: float) -> NDArray[np.bool
     return kept
 
 
+@brief
 @dataclass(frozen=True)
 class Junctions:
     """Refined corners.

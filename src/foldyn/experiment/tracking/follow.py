@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from foldyn.experiment.camera import opencv
 from foldyn.experiment.tracking.corners import refine
 from foldyn.experiment.tracking.neighbors import Array, by_neighbors, distances, nearest
-from foldyn.values import number, whole
+from foldyn.values import brief, number, whole
 
 LOST, FOUND_AGAIN, TRACKED = 0, 1, 2
 
@@ -66,6 +66,7 @@ class FollowSettings:
             number(name, getattr(self, name), above=0.0)
 
 
+@brief
 @dataclass(frozen=True)
 class Step:
     """Corners in one frame.

@@ -14,12 +14,14 @@ from scipy.spatial.transform import Rotation
 from foldyn.errors import InputError
 from foldyn.results import case_of
 from foldyn.results.contents import check_variable
+from foldyn.values import brief
 
 Array = NDArray[np.float64]
 
 _MOST_STATES = 200
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class TrackedModel:
     """What tracking needs to know of a model: its nodes, its panels and its possible states.
@@ -68,6 +70,7 @@ class TrackedModel:
         return replace(at_rest, rest=rest, states=states[thin])
 
 
+@brief
 @dataclass(frozen=True)
 class View:
     """A camera so far away that the scale of one plane describes it.

@@ -88,7 +88,7 @@ class Study:
     plan: StudyPlan
     folder: Path
     data: Data | None = None
-    _read: dict[Job, xarray.Dataset | None] = field(default_factory=dict, repr=False)
+    _read: dict[Job, xarray.Dataset | None] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def parts(self) -> tuple[list[Part], list[Part]]:

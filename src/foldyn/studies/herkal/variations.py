@@ -101,7 +101,17 @@ def _read(path: Path) -> tuple[str, list[Row]]:
         if None in row or None in row.values():
             raise InputError(f"{path}: has lines of other lengths than the first")
         rows.append({k: v if k in WORDS else float(v or "nan") for k, v in row.items()})
+        if any(k in WORDS and not _is_word(v) for k, v in rows[-1].items()):
+            raise InputError(f"{path}: has a number for a text, or none")
     return first.removeprefix("# ").strip(), rows
+
+
+def _is_word(text: str) -> bool:
+    try:
+        float(text or "nan")
+    except ValueError:
+        return True
+    return False
 
 
 def _text(value: Any) -> Any:

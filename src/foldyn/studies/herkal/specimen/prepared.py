@@ -61,7 +61,7 @@ class FreeVibration:
         return numbers_of(self.history)
 
     def of(self, nodes: list[int], name: str) -> TimeHistory:
-        """TimeHistory of some of the nodes."""
+        """History of some of the nodes."""
         columns = [self.nodes.index(node) for node in nodes]
         return replace(self.history, nodes=nodes, values=self.history.values[:, columns], name=name)
 

@@ -269,5 +269,8 @@ def read_found(folder: Path) -> dict[str, Any]:
 
 
 def _digest(file: Path) -> str:
-    """Digest of a file; "" where there is none."""
-    return file_digest(file) if file.is_file() else ""
+    """Digest of a file; "" where there is none that can be read."""
+    try:
+        return file_digest(file) if file.is_file() else ""
+    except OSError:
+        return ""
