@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -67,8 +68,12 @@ def remove_leftovers(*folders: Path) -> None:
 
 
 def _beside(target: Path, suffix: str = "") -> Path:
-    """Name of a temporary file, with the process in it; the suffix tells writers the format."""
-    return target.with_name(f".{target.name[:40]}.{os.getpid()}.tmp{suffix}")
+    """Name of a temporary file, with the process in it; the suffix tells writers the format.
+
+    The letters before it tell processes of other machines apart that share the folder.
+    """
+    letters = secrets.token_hex(4)
+    return target.with_name(f".{target.name[:40]}.{letters}.{os.getpid()}.tmp{suffix}")
 
 
 def _remove(path: Path) -> None:

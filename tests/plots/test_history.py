@@ -52,7 +52,10 @@ def test_frequencies_are_shown_as_far_as_there_is_content(two_rules):
     (line,) = figure.axes[1].get_lines()
     assert line.get_ydata()[-1] < 0.05 * line.get_ydata().max()
     noise = 1e-15 * np.random.default_rng(0).normal(size=release["displacement"].shape)
-    both = {"release": release, "at rest": release.assign(displacement=release["displacement"] * 0.0 + noise)}
+    both = {
+        "release": release,
+        "at rest": release.assign(displacement=release["displacement"] * 0.0 + noise),
+    }
     assert plot_history(both, [6], "x", window="hann").axes[1].get_xlim()[1] == top
     still = release.assign(displacement=0.0 * release["displacement"])
     assert plot_history({"still": still}, [6], "x").axes[1].get_xlim()[1] == pytest.approx(500.0)

@@ -67,7 +67,10 @@ class SuperLU:
     def __init__(self, matrix: sparse.csc_array) -> None:
         if not np.isfinite(matrix.data).all():
             raise SingularTangentError("the tangent is not finite")
-        self._lu, self._matrix = factorize(matrix), matrix
+        try:
+            self._lu, self._matrix = factorize(matrix), matrix
+        except SingularTangentError as error:
+            raise SingularTangentError("the tangent is singular") from error
         self._pivots: NDArray | None = None
 
     def solve(self, b: NDArray) -> NDArray:

@@ -342,7 +342,7 @@ class Table(Formula):
         return hash(self._key())
 
     def _key(self) -> tuple[bytes, bytes, bool]:
-        return self.times.tobytes(), self.values.tobytes(), self.smooth
+        return (self.times + 0.0).tobytes(), (self.values + 0.0).tobytes(), self.smooth  # no -0
 
 
 HISTORIES: Mapping[str, type[History]] = {

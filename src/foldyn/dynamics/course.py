@@ -132,7 +132,7 @@ def tell(team, work_in, work_out, wrong):
 
 @scalar
 def observe(model, system, mass, course, a, step, plan, out, work, s):
-    """Look at a fixed step after `acceleration` at its end; every member of a team calls it.
+    """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
 
     Adds up the work that the members have noted. The motion ends where it is no longer finite and
     where panels pass through each other; every plan.every steps a sample is written. Returns

@@ -92,12 +92,12 @@ class Motion:
         """Advance in stretches; after each, report the progress and audit the motion."""
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
         plan, course = self.plan, self._course
-        engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
         memory = scratch(system)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
         began = None
         try:
+            engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
             while True:
                 done = int(course.tally.steps)
                 stretch = min(length, recheck - done % recheck)

@@ -17,7 +17,11 @@ UNREADABLE = "could not be parsed"  # Numba's words for a value that it ignores
 def start() -> None:
     """Import Numba; refuse an environment in which kernels cannot run."""
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
-    if not threads.strip().isdecimal() or int(threads) < 1:
+    try:
+        enough = int(threads) >= 1
+    except ValueError:
+        enough = False
+    if not enough:
         raise InputError(
             f"NUMBA_NUM_THREADS = {threads!r}: must be a whole number from 1 on; unset it for as "
             "many threads as there are processors"

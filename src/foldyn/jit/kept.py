@@ -7,7 +7,7 @@ what was compiled: from which sources (`sources.digest`), for which arguments, w
 the named tuples among them, and for which processor. So what is found is what would be compiled,
 whoever wrote it, and a check sum tells whether it is whole.
 
-They go to the first folder that can be written, in Numba's own order: what NUMBA_CACHE_DIR says,
+Kernels go to the first folder that can be written, in Numba's own order: what NUMBA_CACHE_DIR says,
 `__pycache__` beside the source, the user's cache folder; then, with a warning, a folder for
 temporary files. What is kept there is loaded and run, so that one is the user's alone.
 """
@@ -38,7 +38,7 @@ from numba.misc.appdirs import AppDirs
 
 from foldyn.errors import FoldynWarning
 from foldyn.jit.sources import digest
-from foldyn.writing import write_bytes
+from foldyn.writing import remove_leftovers, write_bytes
 
 REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
 OTHERS = 3  # versions of a function that are kept beside the present one
@@ -96,6 +96,7 @@ class Kept(_Cache):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_bytes(path, hashlib.sha256(content).digest() + content)
             self._remove_old()
+            remove_leftovers(path.parent)
         except OSError as error:
             _warn(f"compiled kernels cannot be kept in {path.parent}: {error.strerror}")
 

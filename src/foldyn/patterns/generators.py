@@ -155,7 +155,7 @@ def eggbox(
         half = math.radians(_fold_dihedral(dihedral, flat_allowed=False)) / 2
     cos_y = math.hypot(math.cos(gamma), math.sin(gamma) * math.cos(half))
     h1, h2 = a * cos_y, b * math.cos(gamma) / cos_y
-    # The roots above taken by hand, so that nothing cancels.
+    # the roots of the docstring's formulas, taken by hand so that nothing cancels
     along_y = a * math.sin(gamma) * math.sin(half)
     s = b * math.sin(gamma) * math.cos(half) / cos_y
     return _grid("eggbox", cells, lambda i, j: [s * i, along_y * j, h1 * (j % 2) + h2 * (i % 2)])

@@ -33,7 +33,8 @@ from foldyn.writing import whole
 ENGINE = "h5netcdf"
 OTHERS = (
     ".csv", ".dat", ".fold", ".gif", ".html", ".json", ".mat", ".mp4", ".npy", ".npz", ".obj",
-    ".parquet", ".pkl", ".png", ".toml", ".tsv", ".txt", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
+    ".parquet", ".pkl", ".png", ".toml", ".tsv", ".txt", ".vtk", ".vtkhdf", ".vtu", ".xlsx",
+    ".zarr",
 )  # fmt: skip
 """Suffixes that promise another kind of file."""
 _PARTS = ("real", "imag")

@@ -74,7 +74,7 @@ def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
         triangles += pieces
         panels += [number] * len(pieces)
     nodes, rows, panel = np.array(points.all), np.array(triangles, np.int64), np.array(panels)
-    remedy = "it is not convex enough; cut it into convex panels"
+    remedy = "the panel is not convex enough to be meshed; cut it into convex panels"
     check_triangles(nodes, rows, panel, pattern, remedy)
     return ShellMesh(nodes, rows, panel, edges)
 

@@ -116,7 +116,7 @@ def record(
     stations: Walk, progress: Callable[[Point], None] | None, solver: Solver,
     problem: OrigamiProblem, facts: dict[str, Any], adaptive: bool = False,
 ) -> xarray.Dataset:  # fmt: skip
-    """Follow a path to its end and make its dataset; of what there is where it cannot go on.
+    """Follow a path to its end and make its dataset; raises where it cannot go on, with what is.
 
     facts : what was asked for, stored as attributes.
     adaptive : whether an adaptive load acts.

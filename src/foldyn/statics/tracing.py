@@ -15,10 +15,10 @@ from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
-from foldyn.statics.path_methods import PathPlan, Until, along, plan_path
+from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
 from foldyn.statics.recording import record
 from foldyn.statics.stepping import Point, Walk, settle, walk
-from foldyn.values import indices, show, whole
+from foldyn.values import choice, indices, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -61,8 +61,8 @@ def trace(
     steps : int, optional
         Instead of load_factors: equal steps from 0 to 1 (default 10). For "mgdcm" and
         "arc_length": steps after which the path ends (default 100).
-    constant : "gravity" or sequence of int
-        Loads, by their numbers in `case.loads`, that act in full at every factor.
+    constant : "gravity", int or sequence of int
+        Loads, by their numbers in `case.loads`, each once, that act in full at every factor.
     initial : State, optional
         Displacements near which the first point is sought; fixed supports hold their nodes where
         it puts them. Without it the path is sought from rest at the factor 0.
@@ -117,6 +117,7 @@ def trace(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
+    choice("method", method, METHODS)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
     plan = plan_path(method, load_factors, steps, first_step)
