@@ -102,3 +102,14 @@ def test_every_top_level_name_is_in_the_api_page():
     public = [name for name in fd.__all__ if not name.startswith("_")]
     missing = [name for name in public if not re.search(rf"\b{name}\b", text)]
     assert not missing, f"docs/api.md does not show {missing}"
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """Circles of imports, late ones in functions included; those for type checkers do not count."""
+    grimp = pytest.importorskip("grimp")  # comes with import-linter
+    graph = grimp.build_graph("foldyn", exclude_type_checking_imports=True)
+    left = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    while free := [module for module, imported in left.items() if not imported & left.keys()]:
+        for module in free:
+            del left[module]
+    assert not left, sorted(left)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import foldyn.jit  # noqa: F401 - starts Numba, before anything is imported from it
+import foldyn.jit
+import foldyn.materials.switch  # noqa: F401 - gives laws their functions
 from foldyn.errors import InputError
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear

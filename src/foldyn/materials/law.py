@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +28,8 @@ class Law(ABC):
     name: str
     code: int = CALLED
     rest_state: tuple[float, ...]
+    compiled: ClassVar[Callable[..., NDArray]]
+    """All functions of a law by its code; the switch, which knows the laws, gives it to them."""
 
     @property
     def addresses(self) -> tuple[int, int, int] | None:
@@ -66,11 +70,9 @@ class BarLaw(Law):
         return self._table(stretch)[2]
 
     def _table(self, stretch: ArrayLike) -> NDArray:
-        from foldyn.materials import switch  # it imports the laws that subclass this
-
         lam = np.asarray(stretch, float)
         address = np.array(self.addresses or (0, 0, 0), np.int64)
-        return switch.bar_table(self.code, lam.ravel() - 1.0, address).reshape((3, *lam.shape))
+        return self.compiled(self.code, lam.ravel() - 1.0, address).reshape((3, *lam.shape))
 
 
 class HingeLaw(Law):
@@ -103,13 +105,11 @@ class HingeLaw(Law):
         return self._table(theta, rest)[3]
 
     def _table(self, theta: ArrayLike, rest: ArrayLike) -> NDArray:
-        from foldyn.materials import switch
-
         theta, rest = np.broadcast_arrays(np.asarray(theta, float), np.asarray(rest, float))
         address = np.array(self.addresses or (0, 0, 0), np.int64)
         flat_rest = np.ascontiguousarray(rest.ravel())
         parameters = np.ascontiguousarray(self.parameters(flat_rest))
-        flat = switch.hinge_table(
+        flat = self.compiled(
             self.code, np.ascontiguousarray(theta.ravel()), flat_rest, parameters, address
         )
         return flat.reshape((4, *theta.shape))

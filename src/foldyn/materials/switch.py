@@ -13,6 +13,7 @@ from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import call1, call2
 from foldyn.materials import enhanced_linear, linear, ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
+from foldyn.materials.law import BarLaw, HingeLaw
 
 
 @scalar
@@ -131,3 +132,6 @@ def hinge_table(code, theta, rest, p, address):
         out[2, i] = hinge_slope(code, t, r, p[i, 0], p[i, 1], address[2])
         out[3, i] = hinge_rest_slope(code, t, r, p[i, 0], p[i, 1], address[0])
     return out
+
+
+BarLaw.compiled, HingeLaw.compiled = staticmethod(bar_table), staticmethod(hinge_table)
