@@ -39,6 +39,14 @@ BAD = {
     ),
     "no density": ([("density = 1000.0\n", "")], "sheet.density: missing; a motion needs it"),
     "damping": ([("alpha = 0.02", "alpha = -0.02")], "damping.alpha = -0.02: must be at least"),
+    "ratios": (
+        [("alpha = 0.02", "alpha = 0.02\nratios = [[9, 0.1], [17, 0.1]]")],
+        "damping.ratios = [[9.0, 0.1], [17.0, 0.1]]: they give alpha and beta; leave those out",
+    ),
+    "one ratio": (
+        [("alpha = 0.02", "ratios = [9, 0.1]")],
+        "damping.ratios = [9, 0.1]: must be two pairs of a frequency (Hz) and the damping ratio",
+    ),
     "title": ([('"an example"', "3")], "title = 3: must be text"),
     "node": (
         [("nodes = [6, 7, 8]", "nodes = [6, 99]")],

@@ -30,6 +30,14 @@ def test_the_weight_is_that_of_the_sheet(mass) -> None:
     assert (forces[:, 2] < 0.0).all()
 
 
+def test_standard_gravity_by_its_direction() -> None:
+    """9.80665 m/s2 (3rd General Conference on Weights and Measures, 1901)."""
+    assert fd.Gravity("-z") == fd.Gravity((0.0, 0.0, -9.80665))
+    assert fd.Gravity("x").acceleration == (9.80665, 0.0, 0.0)
+    with pytest.raises(InputError, match=r'acceleration = "down": .*choose one of x, y, z, -x'):
+        fd.Gravity("down")
+
+
 @pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
 def test_a_free_structure_falls_with_g(mass) -> None:
     g = np.array([1.0, -2.0, -9.81])

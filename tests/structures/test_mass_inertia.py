@@ -19,6 +19,7 @@ from mass_samples import (
     shares,
 )
 
+import foldyn as fd
 from foldyn.structures import MASS_RULES
 from foldyn.structures.mass import rotational_inertia
 
@@ -185,3 +186,35 @@ def test_rotational_inertia_of_a_square_in_numbers():
         assert rotational_inertia(s.mass, s.nodes, a, b) == pytest.approx(14 / 3, rel=1e-13)
     diagonal = rotational_inertia(s.mass, s.nodes, 0, 2)
     assert diagonal == pytest.approx(14 / 12, rel=1e-13)
+
+
+def test_mass_center_and_inertia_of_a_structure():
+    """A square plate of side 2 and mass 2.4: m a^2 / 12 about its axes, m a^2 / 6 about its normal.
+
+    The consistent rule has them exactly; all rules have the mass and, by symmetry, the center.
+    """
+    pattern = fd.Pattern([[1, 1, 3], [3, 1, 3], [3, 3, 3], [1, 3, 3]], [[0, 1, 2, 3]])
+    sheet = fd.Sheet(1e6, 0.25, 0.01, 60.0)
+    exact = np.diag([0.8, 0.8, 1.6])
+    for rule in MASS_RULES:
+        plate = fd.discretize(pattern, sheet, mass=rule)
+        assert plate.total_mass == pytest.approx(2.4)
+        np.testing.assert_allclose(plate.center_of_mass, [2.0, 2.0, 3.0], rtol=1e-14)
+        if rule in ("consistent", "inertia_exact"):
+            np.testing.assert_allclose(plate.inertia, exact, atol=1e-13)
+        elif rule == "panel":  # a fifth in each corner and in the center
+            np.testing.assert_allclose(plate.inertia, 2.4 * exact, atol=1e-13)
+        with pytest.raises(ValueError, match="read-only"):
+            plate.inertia[0, 0] = 0.0
+    shell = fd.shell(pattern, sheet, 8, mass="consistent")
+    np.testing.assert_allclose(shell.inertia, exact, atol=1e-13)
+
+
+@pytest.mark.parametrize("rule", ["mixed_voronoi", "consistent", "panel"])
+def test_a_spinning_structure_has_the_energy_of_its_inertia(rule):
+    """Kinetic energy of a rigid turn is w I w / 2, with every rule."""
+    s = fd.discretize(fd.patterns.miura(a=1.0, b=1.3), fd.Sheet(1e6, 0.25, 0.01, 60.0), mass=rule)
+    spin = np.array([0.3, -0.5, 0.7])
+    velocity = np.cross(spin, s.nodes - s.center_of_mass)
+    energy = 0.5 * float((velocity * (s.mass @ velocity)).sum())
+    assert energy == pytest.approx(0.5 * spin @ s.inertia @ spin, rel=1e-12)

@@ -15,7 +15,7 @@ from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.cases import Case, Rayleigh, resolve_nodes
+from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
@@ -130,8 +130,8 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
         faults.tell()
         if schema.model.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
-        with within("damping."):
-            damping = Rayleigh(**schema.damping.model_dump())
+        with within("damping"):
+            damping = schema.damping.made()
 
     def make(mass: str) -> Case:
         """Make the case with one mass rule."""

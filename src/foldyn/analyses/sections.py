@@ -15,13 +15,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
-from foldyn.cases.case import STATES
+from foldyn.cases.case import STATES, Rayleigh
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import AXES, support_from
-from foldyn.errors import Faults, InputError
+from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
@@ -230,12 +230,40 @@ class ShownSection(Section):
     axis: Annotated[Any, one_of(AXES)] = None
 
 
+def _ratios(value: Any) -> list[list[float]]:
+    array = numbers("", value)
+    if array.shape != (2, 2):
+        raise InputError(
+            f" = {show(value)}: must be two pairs of a frequency (Hz) and the damping ratio there, "
+            "as in [[9.3, 0.135], [16.7, 0.09]]"
+        )
+    return array.tolist()
+
+
 class DampingSection(Section):
-    """[damping]: Rayleigh coefficients."""
+    """[damping]: Rayleigh coefficients, or two damping ratios."""
 
     alpha: Annotated[float, Field(ge=0)] = 0.0
     beta: Annotated[float, Field(ge=0)] = 0.0
+    ratios: Annotated[Any, PlainValidator(_ratios)] = None
     state: Annotated[str, one_of(STATES)] = "rest"
+
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if self.ratios is not None and self.model_fields_set & {"alpha", "beta"}:
+            raise InputError(
+                f" = {show(self.ratios)}: they give alpha and beta; leave those out, or ratios",
+                ".ratios",
+            )
+        return self
+
+    def made(self) -> Rayleigh:
+        """The damping."""
+        if self.ratios is None:
+            return Rayleigh(self.alpha, self.beta, self.state)
+        (f1, z1), (f2, z2) = self.ratios
+        with within(f".ratios = {show(self.ratios)}: "):
+            return Rayleigh.from_ratios(f1, z1, f2, z2, self.state)
 
 
 class CaseSchema(Section):

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
+from foldyn.cases.supports import signed
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.values import brief, number_or_list, show, vector
 
 __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
+
+STANDARD = 9.80665  # m/s2, standard gravity (3rd CGPM, 1901)
 
 
 class Load(Part):
@@ -135,13 +138,14 @@ class Gravity(Load):
 
     Parameters
     ----------
-    acceleration : sequence of float, shape (3,)
-        Acceleration (m/s2) of free fall, as (0, 0, -9.81); not zero.
+    acceleration : sequence of float, shape (3,), or str
+        Acceleration (m/s2) of free fall, as (0, 0, -9.81), not zero; or the direction in which
+        things fall on Earth, as "-z": standard gravity, 9.80665 m/s2.
     history : History or callable, optional
         Factor of time; constant by default.
     """
 
-    acceleration: Sequence[float]
+    acceleration: Sequence[float] | str
     history: History | Callable[[Any], Any] | None = None
 
     keys = {"gravity": "acceleration"}
@@ -149,7 +153,11 @@ class Gravity(Load):
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        given = vector("acceleration", self.acceleration, nonzero=True)
+        if isinstance(self.acceleration, str):
+            axis, sign = signed("acceleration", self.acceleration)
+            given = tuple(sign * STANDARD * (k == axis) + 0.0 for k in range(3))
+        else:
+            given = vector("acceleration", self.acceleration, nonzero=True)
         object.__setattr__(self, "acceleration", given)
         object.__setattr__(self, "history", as_history(self.history))
 

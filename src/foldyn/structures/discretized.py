@@ -105,6 +105,27 @@ class Discretized:
         """Rest lengths of the bars (nb,), m."""
         return read_only(lengths(self.nodes, self.bars))
 
+    @cached_property
+    def total_mass(self) -> float:
+        """Mass (kg)."""
+        return float(self.mass.sum())
+
+    @cached_property
+    def center_of_mass(self) -> NDArray:
+        """Center of mass (3,) at rest, m."""
+        return read_only(np.asarray(self.mass.sum(axis=0)).ravel() @ self.nodes / self.total_mass)
+
+    @cached_property
+    def inertia(self) -> NDArray:
+        """Inertia tensor (3, 3) at rest about the center of mass, kg m2, by the mass rule.
+
+        With the consistent rule it is that of the panels themselves; lumped ones differ, see the
+        page on mass rules.
+        """
+        arm = self.nodes - self.center_of_mass
+        second = arm.T @ (self.mass @ arm)
+        return read_only(np.trace(second) * np.eye(3) - second)
+
     @property
     def coarser(self) -> Discretized | None:
         """The same with a coarser mesh, for those that have one."""
