@@ -126,6 +126,7 @@ def test_fit_files_are_told_from_case_files(folder) -> None:
         ("nodes = [0, 2]", "nodes = [0, 1]", '"node 1 x": no such column; did you mean'),
         ("nodes = [0, 2]", 'nodes = "xmin"', "give the numbers of the nodes in sway.csv"),
         ("band = [1, 6]", "band = [6, 1]", "data[3]: band = [6, 1]: give two frequencies"),
+        ("band = [1, 6]", "band = [[1, 6], [2, 3]]", "data[3]: band = [[1, 6], [2, 3]]: give two"),
         ("band = [1, 6]\n", "", "data[3]: band = None: give two frequencies"),
         ("band = [1, 6]", 'band = [1, "b"]', 'data[3]: band = [1, "b"]: must be numbers'),
         ("nodes = [0, 2]", "nodes = [0.5]", "data[2]: nodes = [0.5]: 0.5 is not a node number"),

@@ -295,10 +295,10 @@ def _texts(given: Any) -> bool:
 
 def _range(name: str, given: Any, what: str) -> tuple[float, float]:
     """Two increasing numbers."""
-    pair = isinstance(given, list | tuple) and len(given) == 2
-    if not pair or not numbers(name, given)[0] < given[1]:
+    pair = numbers(name, given) if isinstance(given, list | tuple) else np.zeros(0)
+    if pair.shape != (2,) or not pair[0] < pair[1]:
         raise InputError(f"{name} = {show(given)}: give two {what}, as in [2, 30]")
-    return given[0], given[1]
+    return float(pair[0]), float(pair[1])
 
 
 def _made(kind: Any, file: Path, **known: Any) -> Any:
