@@ -62,8 +62,8 @@ def run(given: Namespace) -> Path:
         done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
         say(f"wrote {', '.join(kept.kept)}")
         if figures:
-            say("drawing figures")
             with drawing(case_file.path):  # whatever keeps them from it, the results are there
+                say("drawing figures")
                 page = case_file.analysis.page(case_file, done, folder, given.typed)
             say(f"wrote figures and {page}")
     return folder
