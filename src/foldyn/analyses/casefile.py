@@ -178,7 +178,7 @@ class CaseFile:
         What to compute; its `arguments` are those of `simulate`, `trace`, `modes` or `frf`.
     output : Output
     text : str
-        What the file said when it was read.
+        What the file said when it was read; "" of a document that was not read from one.
     """
 
     path: Path

@@ -30,7 +30,7 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     command : what was typed to compute it.
     """
     first = next(iter(results))
-    case, path = case_file.case(first), case_file.path
+    case = case_file.case(first)
     model = _given(case.structure.options) | {"mass": ", ".join(results)}
     mesh, version = mesh_error(results[first]), results[first].attrs["foldyn_version"]
     rows = [
@@ -42,11 +42,13 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     ]
     if command:
         rows.append(["command", command])
-    return [
+    sections: list[Section] = [
         Heading("How it was computed"),
         Table(["part", "as computed"], rows),
-        Listing(f"The case file {path.name}", case_file.text),
     ]
+    if case_file.text:
+        sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
+    return sections
 
 
 def mesh_error(result: xarray.Dataset) -> str:

@@ -56,12 +56,13 @@ def read_case(
         key, the value and what to do.
     """
     path = Path(path)
-    document = read_document(path)
+    text = _text(path)
+    document = _parsed(path, text)
     if model is not None or divisions is not None:
         validated(path, document)
         with within("", path):
             document = remodeled(document, model, divisions)
-    return case_of_document(path, document)
+    return case_of_document(path, document, text)
 
 
 def read_as(
@@ -88,7 +89,8 @@ def read_as(
     FoldynWarning
         Loads, motions of the base or a start have no place there, and are left out.
     """
-    document = read_document(path)
+    text = _text(path)
+    document = _parsed(path, text)
     flags = {key: value for key, value in flags.items() if value is not None}
     own = schema_of(document) is ANALYSES[kind].schema
     if not own:  # else flags may give what is missing
@@ -99,7 +101,7 @@ def read_as(
         document = converted(path, document, kind, flags.get("state", "rest"))
     if kind == "frf" and not {"frequencies"} & {*flags, *document["analysis"]}:
         raise InputError("at which frequencies? Give --frequencies FIRST LAST COUNT (Hz)", "", path)
-    return case_of_document(path, flagged(document, flags))
+    return case_of_document(path, flagged(document, flags), text)
 
 
 def validated(path: Path, document: Mapping[str, Any]) -> Any:
@@ -112,8 +114,11 @@ def validated(path: Path, document: Mapping[str, Any]) -> Any:
         raise InputError(describe(error, shape, shapes), "", path) from None
 
 
-def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
-    """Check what a case file says and make its cases; see `read_case`."""
+def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") -> CaseFile:
+    """Check what a case file says and make its cases; see `read_case`.
+
+    text : of the file, if the document was read from one.
+    """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
     masses = list(schema.model.mass or [model.mass])
@@ -158,7 +163,7 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
     shown = {name: value for name, value in schema.output if name not in ("nodes", "every")}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, schema.model.kind, masses, analysis,
-        Output(nodes, chosen is not None, **shown), schema, make, cases, read_document_text(path),
+        Output(nodes, chosen is not None, **shown), schema, make, cases, text,
     )  # fmt: skip
     start = getattr(schema, "initial", None)
     if start is not None and start.file is None:
@@ -169,18 +174,20 @@ def case_of_document(path: Path, document: Mapping[str, Any]) -> CaseFile:
 
 def read_document(path: Path) -> dict[str, Any]:
     """Read what a case file says, unchecked."""
-    text = read_document_text(path)
+    return _parsed(path, _text(path))
+
+
+def _text(path: Path) -> str:
+    return read_text(
+        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
+    )
+
+
+def _parsed(path: Path, text: str) -> dict[str, Any]:
     with within("", path):
         document = from_toml(text)
         check_values(document)
     return document
-
-
-def read_document_text(path: Path) -> str:
-    """The text of a case file."""
-    return read_text(
-        path, "a case file (TOML)", MOST_MIB, "put long tables into files of their own"
-    )
 
 
 def check_values(document: Mapping[str, Any]) -> None:
