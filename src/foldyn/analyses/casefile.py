@@ -324,9 +324,13 @@ class Computation:
         """Beginning of messages about it."""
         return f"{self.case_file.path}: {self.case_file.named(self.mass)}"
 
-    def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
+    def result(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
         """Compute it; `begun` is called, at least once, when all input has been accepted."""
         with self.case_file.placing(self.mass):
-            result = self.compute(progress, begun)
+            return self.compute(progress, begun)
+
+    def run(self, progress: bool = False, begun: Begun = lambda: None) -> xarray.Dataset:
+        """The result with what it says of its mesh, for whoever looks at it."""
+        result = self.result(progress, begun)
         judged = refinement(self.case_file.case(self.mass))
         return result if judged is None else result.assign_attrs(judged.facts())

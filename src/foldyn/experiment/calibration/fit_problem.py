@@ -227,15 +227,14 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         if case_file.analysis.kind == "dynamics":
-            return case_file.run(**_steady(case_file))
+            return case_file.computation(**_steady(case_file)).result()
         case, given = case_file.case(), case_file.analysis.arguments
         factors = np.unique(np.concatenate([one.factors(case) for one in members]))
         path = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
         settings = replace(given["settings"], stability=False)
-        return case_file.run(
-            method="newton", load_factors=path, first_step=None, until=None,
-            settings=settings,
-        )  # fmt: skip
+        return case_file.computation(
+            method="newton", load_factors=path, first_step=None, until=None, settings=settings
+        ).result()
 
 
 def _steady(case_file: CaseFile) -> dict[str, Any]:
