@@ -163,7 +163,7 @@ class Gravity(Load):
 
     def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Load`."""
-        mass = np.asarray(structure.mass.sum(axis=1)).ravel()
+        mass = structure.nodal_mass
         return mass[:, None] * np.array(self.acceleration)
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:

@@ -221,7 +221,7 @@ def _arrows(
 
 def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
     """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
-    mass = np.asarray(sheet.structure.mass.sum(axis=0)).ravel()
+    mass = sheet.structure.nodal_mass
     return mass @ points / mass.sum()
 
 

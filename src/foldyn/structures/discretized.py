@@ -111,9 +111,14 @@ class Discretized:
         return float(self.mass.sum())
 
     @cached_property
+    def nodal_mass(self) -> NDArray:
+        """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
+        return read_only(np.asarray(self.mass.sum(axis=1)).ravel())
+
+    @cached_property
     def center_of_mass(self) -> NDArray:
         """Center of mass (3,) at rest, m."""
-        return read_only(np.asarray(self.mass.sum(axis=0)).ravel() @ self.nodes / self.total_mass)
+        return read_only(self.nodal_mass @ self.nodes / self.total_mass)
 
     @cached_property
     def inertia(self) -> NDArray:
