@@ -122,9 +122,9 @@ def peaks_of(
     f, curve = f[usable], curve[usable]
     if f.size < 3 or not curve.any():
         return ()
-    kind = shown if shown in PER_FORCE else "receptance"
+    kind = kind_of(shown)
     rate = float(response.attrs.get("window_rate", 0.0))
-    curve_peaks = resonances(f, curve, kind, prominence, count, "coherence" in response)
+    curve_peaks = resonances(f, curve, shown, prominence, count, "coherence" in response)
     if not curve_peaks.index.size:
         return ()
     peaks, widths = [], []
@@ -138,16 +138,23 @@ def peaks_of(
 
 
 def resonances(
-    f: NDArray, curve: NDArray, kind: str, prominence: float | None, count: int | None,
+    f: NDArray, curve: NDArray, shown: str, prominence: float | None, count: int | None,
     scatters: bool,
 ) -> Peaks:  # fmt: skip
     """Peaks of a finite curve that figures mark and tables list; see `peaks_of`.
 
+    shown : what it shows; a transmissibility has the peaks of a receptance.
     scatters : whether the curve is an estimate from random records, where low peaks mean nothing.
     """
+    kind = kind_of(shown)
     if prominence is not None:
         return find_peaks(f, curve, prominence, count, kind)
     return find_peaks(f, curve, PROMINENT, count, kind, rise=None if scatters else HALF_POWER)
+
+
+def kind_of(shown: str) -> str:
+    """What estimators of peaks take a quantity as."""
+    return shown if shown in PER_FORCE else "receptance"
 
 
 def _with_half_power(

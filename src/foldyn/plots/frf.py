@@ -187,9 +187,8 @@ def _peaks(curve: Curve, quantity: str, prominence: float | None) -> NDArray[np.
     usable = np.isfinite(curve.values)
     if usable.sum() < 3 or not curve.values[usable].any():
         return np.zeros((0, 2))
-    kind = "receptance" if quantity == "transmissibility" else quantity
     f, scatters = curve.frequency[usable], curve.coherence is not None
-    peaks = resonances(f, curve.values[usable], kind, prominence, None, scatters)
+    peaks = resonances(f, curve.values[usable], quantity, prominence, None, scatters)
     return np.column_stack([peaks.frequency, peaks.height])
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -91,10 +91,9 @@ class Shell(Discretized):
     def coarser(self) -> Shell | None:
         """The same with half as many pieces of every edge; None of one piece."""
         half = self.options.divisions // 2
-        given: dict[str, Any] = {
-            item.name: getattr(self.options, item.name) for item in fields(self.options)
-        }
-        return shell(self.pattern, self.sheet, **{**given, "divisions": half}) if half else None
+        if not half:
+            return None
+        return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=half)))
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
