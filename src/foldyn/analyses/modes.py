@@ -117,7 +117,7 @@ class ModesAnalysis(Analysis):
         plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
         some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
         yield Picture(film, f"The same modes{some} in motion, all at one pace.")
-        same = {rule: mac(modes, other, case.structure.mass) for rule, other in others}
+        same = {rule: mac(modes, other, case.mass) for rule, other in others}
         if same:
             yield album.figure(
                 "mac",

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
-from foldyn.cases.case import STATES, Rayleigh
+from foldyn.cases.damping import STATES, Rayleigh
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS

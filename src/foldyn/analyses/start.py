@@ -108,7 +108,7 @@ def _rigid_motion(case: Case, start: MotionStart) -> State:
     v = velocity + spin x (x - center), with the center of the nodes' masses at rest.
     """
     x = case.structure.nodes
-    mass = case.structure.nodal_mass
+    mass = case.nodal_mass
     arm = x - mass @ x / mass.sum()
     velocity = np.array(start.velocity or (0.0, 0.0, 0.0)) + np.cross(start.spin or (0, 0, 0), arm)
     speed = np.abs(velocity)

@@ -1,11 +1,13 @@
 """Cases: supports, loads, histories, damping, states."""
 
 from foldyn.cases import histories, loads
-from foldyn.cases.case import Case, Rayleigh, State
+from foldyn.cases.case import Case
+from foldyn.cases.damping import Rayleigh
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.selection import resolve_nodes, select
+from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose
 
 __all__ = [

@@ -1,146 +1,28 @@
-"""The case: what a solver gets, a structure with supports, loads and damping; and its states."""
+"""The case: what a solver gets, a structure with supports, loads and damping."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from scipy import sparse
 
+from foldyn.cases.damping import Rayleigh
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
 from foldyn.errors import Faults, InputError
+from foldyn.mechanics.body import Body
 from foldyn.structures.discretized import read_only
-from foldyn.values import brief, choice, number, numbers, show
+from foldyn.values import brief, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
 Summands = Iterable[tuple[NDArray[np.float64], Any]]
-
-
-STATES = ("rest", "start")
-
-
-@dataclass(frozen=True)
-class Rayleigh:
-    """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.
-
-    A motion of angular frequency w is damped with the ratio alpha / (2 w) + beta w / 2.
-
-    Parameters
-    ----------
-    alpha : float
-        Mass-proportional coefficient (1/s), at least 0.
-    beta : float
-        Stiffness-proportional coefficient (s), at least 0.
-    state : {"rest", "start"}
-        Where K0 is taken: at the structure's rest, or where a motion starts (for modes and
-        frequency responses: the state about which it vibrates).
-    """
-
-    alpha: float = 0.0
-    beta: float = 0.0
-    state: str = "rest"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        object.__setattr__(self, "alpha", number("alpha", self.alpha, least=0.0))
-        object.__setattr__(self, "beta", number("beta", self.beta, least=0.0))
-        choice("state", self.state, STATES)
-
-    @classmethod
-    def from_ratios(
-        cls, f1: float, z1: float, f2: float, z2: float, state: str = "rest"
-    ) -> Rayleigh:
-        """Damping that has the ratios z1 and z2 at the frequencies f1 and f2.
-
-        Solves z = alpha / (4 pi f) + beta pi f for both. Between the frequencies the ratio is
-        lower, beyond them higher.
-
-        Parameters
-        ----------
-        f1, f2 : float
-            Frequencies (Hz), positive and different.
-        z1, z2 : float
-            Damping ratios there, at least 0 (0.02 is 2 %).
-        state : {"rest", "start"}
-            See `Rayleigh`.
-
-        Raises
-        ------
-        InputError
-            No alpha and beta of at least 0 give these ratios.
-
-        Examples
-        --------
-        >>> import foldyn as fd
-        >>> damping = fd.Rayleigh.from_ratios(9.3, 0.135, 16.7, 0.09)
-        >>> print(f"{damping.alpha:.1f} 1/s, {damping.beta:.1e} s")
-        14.4 1/s, 4.1e-04 s
-        """
-        f1, f2 = number("f1", f1, above=0.0), number("f2", f2, above=0.0)
-        z1, z2 = number("z1", z1, least=0.0), number("z2", z2, least=0.0)
-        if f1 == f2:
-            raise InputError(f" = {f2:g}: must differ from f1", "f2")
-        lower, upper = sorted((z1 * f1 / f2, z1 * f2 / f1))
-        slack = 1e-12 * upper  # rounding where one of the two is alone
-        if not lower - slack <= z2 <= upper + slack:
-            ends = ("alpha", "beta") if f1 < f2 else ("beta", "alpha")
-            raise InputError(
-                f" = {z2:g}: with a ratio of {z1:g} at {f1:g} Hz, that at {f2:g} Hz can be from "
-                f"{lower:.3g} ({ends[0]} alone) to {upper:.3g} ({ends[1]} alone)",
-                "z2",
-            )
-        apart = f2**2 - f1**2
-        alpha = 4.0 * math.pi * f1 * f2 * (z1 * f2 - z2 * f1) / apart
-        beta = (z2 * f2 - z1 * f1) / (math.pi * apart)
-        return cls(max(alpha, 0.0), max(beta, 0.0), state)
-
-    def matrix(self, mass: Any, stiffness: Any) -> Any:
-        """C from M (kg) and K0 (N/m)."""
-        damping = mass * self.alpha
-        return damping if self.beta == 0.0 else damping + self.beta * stiffness
-
-    def rate(self, omega: Any) -> Any:
-        """Damping (1/s) of a mode with angular frequency omega (rad/s) and modal mass 1 kg m2."""
-        return self.alpha + self.beta * omega**2
-
-
-@brief
-@dataclass(frozen=True, eq=False)
-class State:
-    """Displacement and velocity of every node, for example to start a motion from.
-
-    Parameters
-    ----------
-    displacement : array_like, shape (n, 3), optional
-        Displacement (m) of every node from its rest position; zero by default.
-    velocity : array_like, shape (n, 3), optional
-        Velocity (m/s) of every node; zero by default.
-    """
-
-    displacement: ArrayLike | None = None
-    velocity: ArrayLike | None = None
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        shapes = set()
-        for name in ("displacement", "velocity"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            array = numbers(name, value)
-            if array.ndim != 2 or array.shape[1] != 3:
-                raise InputError(f"{name}: shape {array.shape}: must be (nodes, 3)")
-            shapes.add(array.shape)
-            object.__setattr__(self, name, array)
-        if len(shapes) == 2:
-            raise InputError("displacement and velocity: must have the same shape")
 
 
 @brief
@@ -228,6 +110,26 @@ class Case:
             with faults.collected():
                 load.rest_changes(self.structure, place)
         faults.tell()
+
+    @property
+    def body(self) -> Body:
+        """What solvers take: the structure with what the case adds to its stiffness."""
+        return self.structure.body
+
+    @property
+    def energy_groups(self) -> Mapping[str, str]:
+        """Parts of its strain energy, and what they are."""
+        return self.structure.energy_groups
+
+    @property
+    def mass(self) -> sparse.csr_array:
+        """Nodal mass matrix (n, n), kg: the structure's with what the case adds to it."""
+        return self.structure.mass
+
+    @property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
+        return self.structure.nodal_mass
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:

@@ -17,7 +17,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.case import Case, Rayleigh
+from foldyn.cases.case import Case
+from foldyn.cases.damping import Rayleigh
 from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.history import as_history

@@ -40,7 +40,7 @@ class Damping(NamedTuple):
 
 def damping_of(case: Case, by: Numbering, start: NDArray | None) -> Damping:
     """Damping of a case as it stands in memory, for a motion from `start` (n, 3), or from rest."""
-    matrix, body = sparse.csr_array((0, 0)), case.structure.body
+    matrix, body = sparse.csr_array((0, 0)), case.body
     if case.damping.beta > 0.0:
         state = start if case.damping.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state

@@ -146,7 +146,7 @@ def prepare(
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
-    integrator = method_of("rk4") if method == AUTO else suited(method, case.structure)
+    integrator = method_of("rk4") if method == AUTO else suited(method, case)
     duration = number("duration", duration, above=0.0)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
@@ -164,8 +164,8 @@ def prepare(
         )
         integrator = method_of(method)
     integrator = _with_radius(integrator, spectral_radius)
-    if not integrator.implicit or not is_lumped(case.structure.mass):
-        check_mass(case.structure.mass, case.fixed)
+    if not integrator.implicit or not is_lumped(case.mass):
+        check_mass(case.mass, case.fixed)
     critical = integrator.critical_step(case, u)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
@@ -184,7 +184,7 @@ def prepare(
         )
     timing.check_samples(timing.expected_samples(plan), len(u), len(case.supported_dofs))
     if integrator.implicit:
-        check_fill(case.structure.fill, case.structure.body.size)
+        check_fill(case.structure.fill, case.body.size)
     check_steady(case, plan.start, plan.end)
     if plan.steps:
         timing.warn_of_coarse_steps(case, plan, integrator.looks, integrator.implicit)
@@ -234,7 +234,7 @@ def _plan(
     if method.adaptive or (method.implicit and (dt is None or tolerance is not None)):
         default = IMPLICIT_TOLERANCE if method.implicit else TOLERANCE
         largest = math.inf if force else critical
-        tolerance, floor = tolerance or default, FLOOR * case.structure.body.longest()
+        tolerance, floor = tolerance or default, FLOOR * case.body.longest()
         return timing.variable_steps(
             duration, dt, every, largest, start, tolerance, floor, timing.knots(case)
         )

@@ -95,7 +95,7 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
     if case.damping.beta == 0.0 or case.damping.state != "start":
         return
     free = np.asarray(case.free_dofs)
-    body = case.structure.body
+    body = case.body
     matrix = sparse.csc_array(body.tangent(body.dofs(u))[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
     try:

@@ -41,7 +41,7 @@ def choose(
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if massless := case.structure.massless:
         return "generalized_alpha", f"implicit: {massless} have no mass"
-    if (case.structure.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
+    if (case.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
         return implicit, "implicit: nodes without mass have no acceleration"
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
@@ -73,7 +73,7 @@ def choose(
 
 def _explicit_cost(case: Case, evaluations: int) -> float:
     """Seconds of a step, as measured from 39 to 22,000 dofs."""
-    substitution = 1.0 if is_lumped(case.structure.mass) else 2.0
+    substitution = 1.0 if is_lumped(case.mass) else 2.0
     return evaluations * (5e-7 + 2.5e-8 * substitution * case.structure.nodes.size)
 
 
@@ -103,10 +103,10 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     the angular velocity of its rigid part. Hinges count with at least their nominal stiffness.
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
-    stiffness = structure.body.tangent(u, 1.0)
+    stiffness = case.body.tangent(u, 1.0)
     force = _applied(case, u) - stiffness @ _imposed(case)
     k = stiffness[free][:, free]
-    m = sparse.kron(structure.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    m = sparse.kron(case.mass, sparse.eye_array(3), format="csr")[free][:, free]
     spin, deforming, moving = _split(structure.nodes + u, v)
     pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
     softest = (2.0 * math.pi / duration) ** 2
@@ -150,7 +150,7 @@ def vibrating_share(
 
 def _applied(case: Case, u: NDArray) -> NDArray:
     """Forces (3n,) at u that loads and actuated folds exert beside the internal ones, N."""
-    body = case.structure.body
+    body = case.body
     force = -body.internal(u)
     for load, _ in case.load_terms:
         force += load.ravel()
@@ -173,7 +173,7 @@ def _imposed(case: Case) -> NDArray:
 
 def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
     """Whether forces at the start set the structure in motion at once."""
-    internal = case.structure.body.internal(u).reshape(u.shape)
+    internal = case.body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
     for load, history in case.load_terms:
         force = force + history(start) * load

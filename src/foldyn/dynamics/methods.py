@@ -169,22 +169,22 @@ def method_of(name: str) -> Integrator:
     return METHODS[name]
 
 
-def suited(name: str, structure: Any) -> Integrator:
-    """Integrator by its name, for a structure."""
+def suited(name: str, case: Case) -> Integrator:
+    """Integrator by its name, for a case."""
     method = method_of(name)
-    if lacking := _lacking(method, structure):
-        fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, structure))
+    if lacking := _lacking(method, case):
+        fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, case))
         raise InputError(
             f" = {name!r}: {lacking}, which this method needs; choose one of {fit}", "method"
         )
     return method
 
 
-def _lacking(method: Integrator, structure: Any) -> str:
-    """What a method needs and a structure lacks, in words; empty where nothing."""
-    if structure.massless and not method.massless:
-        return f"{structure.massless} have no mass"
-    if method.conserving and not structure.body.has_discrete_gradient:
+def _lacking(method: Integrator, case: Case) -> str:
+    """What a method needs and a case lacks, in words; empty where nothing."""
+    if case.structure.massless and not method.massless:
+        return f"{case.structure.massless} have no mass"
+    if method.conserving and not case.body.has_discrete_gradient:
         return "the forces of this structure have no discrete gradient"
     return ""
 
@@ -212,4 +212,4 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     with which no vibration grows, for all frequencies w up to the highest of the structure: for
     RK4 ``|R(s dt)| <= 1``.
     """
-    return suited(method, case.structure).critical_step(case, u)
+    return suited(method, case).critical_step(case, u)

@@ -85,7 +85,7 @@ class Motion:
         self._course = begin(self.case, *self._state, self.plan, self._packed)
         self._out = samples(
             count, len(structure.nodes), len(self.case.supported_dofs),
-            len(audited(structure.energy_groups)),
+            len(audited(self.case.energy_groups)),
         )  # fmt: skip
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
@@ -229,7 +229,7 @@ class Motion:
     def _dataset(self) -> xarray.Dataset:
         """Samples stored so far, with the case and the statistics."""
         out = self._written()
-        names = audited(self.case.structure.energy_groups)
+        names = audited(self.case.energy_groups)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         return trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,

@@ -44,7 +44,7 @@ class Sampler:
         if not isinstance(given, Mapping):
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
         structure = case.structure
-        taken = {*TAKEN, *structure.energy_groups}
+        taken = {*TAKEN, *case.energy_groups}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.supported_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
         for name, what in given.items():

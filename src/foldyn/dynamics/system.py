@@ -108,8 +108,8 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
     """
     structure = case.structure
-    body, by = renumbered(structure.body)
-    nodal = by.matrix(structure.mass)
+    body, by = renumbered(case.body)
+    nodal = by.matrix(case.mass)
     mass = inertia(nodal, by.held(case.fixed))
     histories: list[History] = []
     for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms):

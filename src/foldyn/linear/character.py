@@ -89,7 +89,7 @@ def character(
         count = max(2, min(MOST_STATIONS, len(chosen) // NODES_PER_STATION))
     else:
         count = whole("stations", stations, least=1)
-    weight = structure.nodal_mass[chosen]
+    weight = case.nodal_mass[chosen]
     x = (structure.nodes + modes["displacement"].values)[chosen]
     parts = _beam_parts(x, weight, AXES.index(axis), count)
     share = _shares(modes["shape"].values[:, chosen], np.repeat(weight, 3), parts)

@@ -175,7 +175,7 @@ def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
         load = drive.vector / drive.value
     else:
         load = np.zeros_like(drive.vector)
-        mass = system.case.structure.nodal_mass
+        mass = system.case.nodal_mass
         load[:, AXES.index(drive.axis)] = mass
     shape = np.zeros(len(system.free))
     nodal = system.free < load.size

@@ -132,7 +132,7 @@ class _Hinges:
     """The superlinear hinges of a system: gradients, offsets from rest, stiffness and slopes."""
 
     def __init__(self, system: Linearized) -> None:
-        body = system.case.structure.body
+        body = system.case.body
         hinges = body.soft_hinges(body.dofs(system.displacement))
         self.gradient = sparse.csr_array(hinges.gradient[:, system.free])
         self.offset, self.stiffness = hinges.offset, hinges.stiffness

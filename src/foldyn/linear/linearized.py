@@ -119,8 +119,8 @@ def linearize(
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
-    check_mass(case.structure.mass, case.fixed)
-    check_fill(case.structure.fill, case.structure.body.size)
+    check_mass(case.mass, case.fixed)
+    check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
     body = point.body
     free = np.concatenate([case.free_dofs, body.hidden])
@@ -136,7 +136,7 @@ def linearize(
             stacklevel=3,
         )
     stiffness = exact if change is None else sparse.csr_array(exact + change)
-    mass = sparse.kron(case.structure.mass, sparse.eye_array(3), format="csr")
+    mass = sparse.kron(case.mass, sparse.eye_array(3), format="csr")
     if len(body.hidden):
         massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
         mass = sparse.block_diag([mass, massless], format="csr")
@@ -173,7 +173,7 @@ def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
     if case.damping.state != "rest" or case.damping.beta == 0.0:
         return exact
-    body = case.structure.body
+    body = case.body
     return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))
 
 

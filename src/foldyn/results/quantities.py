@@ -98,7 +98,7 @@ def variable(dims: tuple[str, ...], values: ArrayLike, units: str, text: str) ->
 
 def energies_of(case: Any) -> dict[str, Quantity]:
     """Parts of the strain energy of a case's structure."""
-    return {name: Quantity("J", text) for name, text in case.structure.energy_groups.items()}
+    return {name: Quantity("J", text) for name, text in case.energy_groups.items()}
 
 
 REASONS: Mapping[str, str] = {

@@ -58,7 +58,7 @@ def mechanisms(problem: OrigamiProblem) -> list[str]:
     held[problem.held] = True
     x = structure.nodes + problem.displacement(problem.start())
     rigid = name_rigid_motions(x, held)
-    unstrained = None if rigid else structure.body.unstrained(problem.start())
+    unstrained = None if rigid else problem.case.body.unstrained(problem.start())
     if unstrained is None:
         return rigid
     return [_name(mode.reshape(-1, 3)) for mode in free_modes(problem, unstrained).T]

@@ -78,7 +78,7 @@ class OrigamiProblem:
     ) -> None:  # fmt: skip
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
-        body = structure.body
+        body = case.body
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
         self._work = body.workspaces(1)[0]
         self._shape = structure.nodes.shape

@@ -96,7 +96,7 @@ class Relief:
     def __init__(self, case: Case, start: NDArray) -> None:
         self._nodes, self._held = case.structure.nodes, case.fixed.ravel()
         try:
-            self._mass = case.structure.mass
+            self._mass = case.mass
         except InputError as error:
             raise InputError(
                 f": needs the mass of the structure: {error}", "inertia_relief"

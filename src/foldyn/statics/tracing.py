@@ -128,7 +128,7 @@ def trace(
         raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
     if not isinstance(inertia_relief, bool):
         raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
-    check_fill(case.structure.fill, case.structure.body.size)
+    check_fill(case.structure.fill, case.body.size)
     problem = OrigamiProblem(case, steady, displacement, adaptive_load, inertia_relief)
     _check_start(problem)
     _check_actuation(problem, plan)
