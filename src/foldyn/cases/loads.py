@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,8 +238,10 @@ class Actuate(Load):
         """See `Load`; refuses angles that the fold law cannot be free of stress at."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
         with within(f"{place}."):
-            given: Any = self.angle, self.fold_angle, self.fraction
-            angles = dihedrals(*given, isinstance(self.creases, str), _letters(structure, creases))
+            angles = dihedrals(
+                cast(Any, self.angle), cast(Any, self.fold_angle), cast(Any, self.fraction),
+                isinstance(self.creases, str), _letters(structure, creases),
+            )  # fmt: skip
         closed = angles[(angles == 0.0) | (angles == 360.0)]
         if closed.size and not structure.fold_law.closed_at_rest:
             shut = float(closed[0])
