@@ -114,7 +114,7 @@ BAD = {
     ),
     "empty load": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]\n", "")],
-        "loads[0]: give nodes and force, or gravity, or creases and angle",
+        "loads[0]: give nodes and force, or gravity, or creases",
     ),
     "misspelled force": (
         [("force = [0.01, 0, 0]", "forces = [0.01, 0, 0]")],

@@ -114,7 +114,7 @@ BAD = {
     ),
     "creases without angle": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]")],
-        "loads[0].angle: missing; give its value",
+        "loads[0].angle: missing; give it (degrees), or fold_angle or fraction",
     ),
     "angle without creases": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "angle = 90")],
@@ -122,11 +122,11 @@ BAD = {
     ),
     "creases with a force": (
         [("force = [0.01, 0, 0]", "force = [0.01, 0, 0]\ncreases = [0]\nangle = 90")],
-        "loads[0].creases: creases and angle are a load of their own; leave out nodes and force",
+        "loads[0].creases: creases that fold are a load of their own; leave out nodes and force",
     ),
     "creases with gravity": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\ngravity = [0, 0, -9.81]")],
-        "loads[0].creases: creases and angle are a load of their own; leave out gravity, or write",
+        "loads[0].creases: creases that fold are a load of their own; leave out gravity, or write",
     ),
     "crease actuated twice": (
         [

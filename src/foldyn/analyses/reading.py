@@ -22,7 +22,7 @@ from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.formats import read_pattern
 from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern
-from foldyn.structures import Sheet
+from foldyn.structures import sheet_from
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
 MOST_MIB = 2
@@ -128,7 +128,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     with faults.collected():
         pattern = _pattern(schema.pattern, path.parent)
     with faults.collected():
-        sheet = Sheet(**schema.sheet.model_dump())
+        sheet = sheet_from(schema.sheet.model_dump())
     if schema.sheet.density is None and kind.needs_density:
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):

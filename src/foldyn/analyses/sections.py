@@ -25,6 +25,7 @@ from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
+from foldyn.structures.creases import per_crease
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 
@@ -164,6 +165,13 @@ def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
     return PlainValidator(read_part)
 
 
+def _per_crease(value: Any) -> Any:
+    """Accept a number for all creases, one for each, or a table by assignment."""
+    return per_crease(
+        "", value if isinstance(value, Mapping) else number_or_list("", value, "crease")
+    )
+
+
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, le=MOST)]
 Whole = Annotated[int, Field(ge=-MOST, le=MOST)]
@@ -171,18 +179,32 @@ Nodes = Annotated[Any, PlainValidator(lambda value: check_nodes(value, ""))]
 Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
-PerCrease = Annotated[Any, PlainValidator(lambda value: number_or_list("", value, "crease"))]
+PerCrease = Annotated[Any, PlainValidator(_per_crease)]
 Animation = Annotated[str, one_of(ANIMATIONS)]
+
+
+Ratio = Annotated[float, Field(gt=-1, lt=0.5)]
+
+
+class PanelsSection(Section):
+    """[[sheet.panels]]: arguments of `PanelSheet`."""
+
+    panels: Annotated[Any, PlainValidator(lambda value: indices("", value, "panel", "from 0"))]
+    youngs_modulus: Positive | None = None
+    poissons_ratio: Ratio | None = None
+    thickness: Positive | None = None
+    density: Positive | None = None
 
 
 class SheetSection(Section):
     """[sheet]: arguments of `Sheet`."""
 
     youngs_modulus: Positive
-    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    poissons_ratio: Ratio
     thickness: Positive
     density: Positive | None = None
     length_scale_ratio: Positive = 1.0
+    panels: list[PanelsSection] = []
 
 
 class ModelSection(Section):

@@ -173,8 +173,7 @@ class Part:
         folder : Path, optional
             Where relative paths of CSV files start; without it no file is read.
         """
-        needed = {item.name for item in fields(cast(Any, cls)) if item.default is MISSING}
-        for key in (*(key for key, name in cls.keys.items() if name in needed), *cls.missing):
+        for key in (*cls.needed(), *cls.missing):
             if key not in table:
                 raise InputError(f": missing; {cls.missing.get(key, 'give its value')}", f".{key}")
         given = {argument: table[key] for key, argument in cls.keys.items() if key in table}
@@ -187,6 +186,12 @@ class Part:
             inside = error.field[len(error.key) :]
             key = next((key for key, name in cls.keys.items() if name == error.key), error.key)
             raise InputError(error.reason, f".{key}{inside}" if key else inside) from None
+
+    @classmethod
+    def needed(cls) -> list[str]:
+        """Keys of the arguments without a default."""
+        names = {item.name for item in fields(cast(Any, cls)) if item.default is MISSING}
+        return [key for key, name in cls.keys.items() if name in names]
 
     def table(self) -> dict[str, Any]:
         """Its table of plain values, without the history."""

@@ -28,7 +28,7 @@ from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import Pattern
-from foldyn.structures import Sheet, discretize
+from foldyn.structures import Sheet, discretize, sheet_from
 from foldyn.values import plain
 
 LAWS: Mapping[str, Mapping[str, type]] = {
@@ -106,11 +106,7 @@ class _Writer:
         sections: dict[str, Any] = {
             "pattern": self._pattern(structure.pattern),
             "nodes": self._store("rest_position", structure.nodes),
-            "sheet": {
-                f.name: float(value)
-                for f in dataclasses.fields(structure.sheet)
-                if (value := getattr(structure.sheet, f.name)) is not None
-            },
+            "sheet": self._sheet(structure.sheet),
             "model": self._model(structure),
             "damping": dataclasses.asdict(case.damping),
             "supports": [self._part(support) for support in case.supports],
@@ -142,6 +138,19 @@ class _Writer:
             "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
         }
 
+    def _sheet(self, sheet: Sheet) -> dict[str, Any]:
+        section: dict[str, Any] = {
+            f.name: float(value)
+            for f in dataclasses.fields(sheet)
+            if f.name != "panels" and (value := getattr(sheet, f.name)) is not None
+        }
+        if sheet.panels:
+            section["panels"] = [
+                {"panels": self._store(f"tables_sheet{i}_panels", part.panels), **part.own}
+                for i, part in enumerate(sheet.panels)
+            ]
+        return section
+
     def _model(self, structure: Any) -> dict[str, Any]:
         section: dict[str, Any] = {}
         options = structure.options
@@ -151,7 +160,7 @@ class _Writer:
                 continue
             if name in LAWS:
                 section[name] = self._law(name, value)
-            elif name in PER_CREASE:
+            elif name in PER_CREASE and not isinstance(value, Mapping):
                 array = np.asarray(value, dtype=np.float64)
                 section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
             else:
@@ -232,7 +241,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         pattern = Pattern(table["vertices"], faces, letters, table["name"])
-        sheet = Sheet(**sections["sheet"])
+        sheet = sheet_from(sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
         least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
         if least > len(nodes):  # before a mesh of any size is made

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.folding import (
+    check_angles,
+    check_fold_angles,
+    check_fraction,
+    dihedrals,
+)
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.cases.supports import signed
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.values import brief, number_or_list, show, vector
+from foldyn.values import brief, show, vector
 
 __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
 
@@ -177,65 +183,91 @@ class Gravity(Load):
 class Actuate(Load):
     """Creases that fold or unfold by themselves.
 
-    The rest dihedral of each crease moves from its rest value (`Structure.fold_rest`) to `angle`
-    in proportion to the factor of the history.
+    The rest dihedral of each crease moves from its rest value (`Structure.fold_rest`) to the one
+    given, in proportion to the factor of the history. Give one of `angle`, `fold_angle` and
+    `fraction`.
 
     Parameters
     ----------
     creases : int, sequence of int, or {"all", "mountain", "valley"}
         Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
         "valley", or "all", which are all but the flat ones.
-    angle : float or sequence of float
+    angle : float or sequence of float, optional
         Rest dihedral (degrees, 0 to 360, flat 180) at factor 1, of all these creases or of each.
     history : History or callable, optional
         Factor of time; constant by default.
+    fold_angle : float or sequence of float, optional
+        Instead, the fold angle of the FOLD format (degrees, -180 to 180): 180 less the dihedral,
+        0 flat, valleys positive, mountains negative. One number for creases chosen by a word is a
+        size, at least 0: each of them folds the way it is assigned.
+    fraction : float or str, optional
+        Instead, how far to fully folded, 0 to 1 or as in "80%": valleys fold to 180 degrees times
+        it, mountains to -180 degrees times it.
     """
 
     creases: int | str | Sequence[int]
-    angle: float | Sequence[float]
+    angle: float | Sequence[float] | None = None
     history: History | Callable[[Any], Any] | None = None
+    fold_angle: float | Sequence[float] | None = None
+    fraction: float | str | None = None
 
-    keys = {"creases": "creases", "angle": "angle"}
-    apart = "creases and angle are a load of their own"
+    keys = {
+        "creases": "creases", "angle": "angle", "fold_angle": "fold_angle", "fraction": "fraction",
+    }  # fmt: skip
+    apart = "creases that fold are a load of their own"
     moves = True
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "creases", check_creases("creases", self.creases))
-        object.__setattr__(self, "angle", check_angles("angle", self.angle))
+        given = [name for name in FOLDED if getattr(self, name) is not None]
+        if not given:
+            raise InputError(": missing; give it (degrees), or fold_angle or fraction", "angle")
+        if len(given) > 1:
+            raise InputError(f": give only one of {' and '.join(given)}", given[1])
+        object.__setattr__(self, given[0], FOLDED[given[0]](given[0], getattr(self, given[0])))
         object.__setattr__(self, "history", as_history(self.history))
+
+    def table(self) -> dict[str, Any]:
+        """See `Part`."""
+        return {key: value for key, value in super().table().items() if value is not None}
 
     def rest_changes(
         self, structure: Any, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """See `Load`; refuses angles that the fold law cannot be free of stress at."""
         creases = resolve_creases(structure, self.creases, f"{place}.creases")
-        angles = np.array(self.angle)
-        if angles.ndim and len(angles) != len(creases):
-            raise InputError(
-                f" = {show(self.angle)}: {len(angles)} angles for {len(creases)} creases; give "
-                "one, or one for each",
-                f"{place}.angle",
-            )
+        with within(f"{place}."):
+            angles = dihedrals(
+                cast(Any, self.angle), cast(Any, self.fold_angle), cast(Any, self.fraction),
+                isinstance(self.creases, str), _letters(structure, creases),
+            )  # fmt: skip
         closed = angles[(angles == 0.0) | (angles == 360.0)]
         if closed.size and not structure.fold_law.closed_at_rest:
+            shut = float(closed[0])
+            said = {"angle": shut, "fold_angle": 180.0 - shut, "fraction": self.fraction}
+            name = next(name for name in said if getattr(self, name) is not None)
             raise InputError(
-                f"{place}.angle = {closed[0]:g}: this fold law, free of stress at rest, has an "
-                "infinite moment there; give an angle between 0 and 360 degrees (flat: 180), or "
+                f"{place}.{name} = {said[name]:g}: this fold law, free of stress at rest, has an "
+                "infinite moment there; give a dihedral between 0 and 360 degrees (flat: 180), or "
                 "another fold_law"
             )
         return creases, np.radians(angles) - structure.fold_rest[creases]
 
 
-def check_angles(name: str, angle: Any) -> float | tuple[float, ...]:
-    """Return a dihedral (degrees) for all creases, or a tuple of one for each."""
-    checked = number_or_list(name, angle, "crease")
-    listed = isinstance(checked, tuple)
-    for i, value in enumerate(checked if listed else (checked,)):
-        if not 0.0 <= value <= 360.0:
-            place = f"{name}[{i}]" if listed else name
-            raise InputError(f" = {value:g}: must lie between 0 and 360 degrees (flat: 180)", place)
-    return checked
+FOLDED: Mapping[str, Callable[[str, Any], Any]] = {
+    "angle": check_angles,
+    "fold_angle": check_fold_angles,
+    "fraction": check_fraction,
+}
+"""Arguments of `Actuate` that say how far creases fold, and their checks."""
+
+
+def _letters(structure: Any, creases: NDArray[np.int64]) -> NDArray[np.str_]:
+    """Assignments of creases; unassigned without a pattern."""
+    pattern = structure.pattern
+    letters = "U" * len(structure.folds) if pattern is None else pattern.assignments
+    return np.array(list(letters), dtype="<U1")[creases]
 
 
 LOADS: tuple[type[Load], ...] = (Force, Gravity, Actuate)
@@ -246,7 +278,7 @@ def load_from(table: Any, folder: Path | None = None) -> Load:
     """Load from its table in a case file; see `Part.of`."""
     given = given_keys(table, LOADS) - {"history"}
     if not given:
-        raise InputError(f": give {', or '.join(' and '.join(kind.keys) for kind in LOADS)}")
+        raise InputError(f": give {', or '.join(' and '.join(kind.needed()) for kind in LOADS)}")
     kind = next(kind for kind in reversed(LOADS) if given & set(kind.keys))
     others = [key for key in table if key in given and key not in kind.keys]
     if others:

@@ -22,10 +22,11 @@ from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.shells.body import GROUPS, ShellBody
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
-from foldyn.shells.sides import Sides, side_stiffness, sides, without_free_sides
+from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
 from foldyn.structures import Sheet
-from foldyn.structures.calibration import check_scale
-from foldyn.structures.discretize import check_kinds, fold_rest, fold_stiffness
+from foldyn.structures.calibration import check_sheet
+from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
+from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
@@ -45,9 +46,13 @@ class ShellOptions:
     divisions: int = 16
     mass: str = "lumped"
     fold_law: str | HingeLaw = EnhancedLinear()
-    crease_stiffness: float | Sequence[float] | None = None
-    crease_rest: float | Sequence[float] | None = None
+    crease_stiffness: PerCrease = None
+    crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("crease_stiffness", "crease_rest"):
+            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,7 +173,7 @@ class Shell(Discretized):
         """The arrays that the compiled kernels work on."""
         corners, ends, law = self.nodes[self.triangles], self.sides, self.fold_law
         side = np.roll(corners, -1, axis=1) - corners
-        membrane, bending = side_stiffness(corners, self.sheet)
+        membrane, bending = stiffness(corners, self.triangle_panel, self.sheet)
         rest = np.concatenate([self.nodes, ends.wings]) - self.nodes.mean(axis=0)
         hinge_rest = mechanics.angles(rest, ends.hinges.astype(np.uint32))
         length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
@@ -263,8 +268,8 @@ def shell(
     divisions: int = 16,
     mass: str = "lumped",
     fold_law: str | HingeLaw = EnhancedLinear(),
-    crease_stiffness: float | Sequence[float] | None = None,
-    crease_rest: float | Sequence[float] | None = None,
+    crease_stiffness: PerCrease = None,
+    crease_rest: PerCrease = None,
     clamped: Sequence[Sequence[int]] = (),
 ) -> Shell:
     """Discretize a pattern as a thin shell of triangles with exact creases.
@@ -310,12 +315,13 @@ def shell(
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
     edges = _clamped(clamped, pattern)
+    options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
     check_memory(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
         PER_NODE * nodes, "take fewer",
     )  # fmt: skip
-    check_scale(sheet, pattern)
+    check_sheet(sheet, pattern)
     mesh = shell_mesh(pattern, divisions)
     ends = sides(mesh, pattern, edges)
     pieces = ends.hinges[ends.piece_hinge]
@@ -324,11 +330,11 @@ def shell(
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
         sides=ends,
-        fold_stiffness=fold_stiffness(crease_stiffness, pattern, sheet),
-        piece_rest=fold_rest(crease_rest, pieces, mesh.nodes, pattern, ends.piece_crease),
+        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
+        piece_rest=fold_rest(options.crease_rest, pieces, mesh.nodes, pattern, ends.piece_crease),
         pattern=pattern,
         sheet=sheet,
-        options=ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges),
+        options=options,
     ).marked()
 
 

@@ -123,7 +123,17 @@ def _mirrored(corners: NDArray) -> NDArray:
     return 2.0 * foot - c
 
 
-def side_stiffness(corners: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
+def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
+    """Membrane and bending stiffness (nt, 3, 3) of triangles (nt, 3, 3), each in a panel (nt,)."""
+    kinds, kind = sheet.kinds(int(panel.max()) + 1)
+    membrane, bending = np.empty((2, len(corners), 3, 3))
+    for number, own in enumerate(kinds):
+        rows = kind[panel] == number
+        membrane[rows], bending[rows] = _of_one_kind(corners[rows], own)
+    return membrane, bending
+
+
+def _of_one_kind(corners: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
     """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
 
     Side k runs from corner k to corner k + 1. Units: J (per strain squared), N m (per rad squared).

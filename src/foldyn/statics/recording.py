@@ -23,7 +23,7 @@ from foldyn.statics.newton import Solver
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import PathStoppedError, Point, Walk
-from foldyn.structures.structure import hinge_angles
+from foldyn.structures.mesh import hinge_angles
 
 if TYPE_CHECKING:
     import xarray

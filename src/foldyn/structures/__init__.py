@@ -2,7 +2,17 @@
 
 from foldyn.structures.discretize import discretize
 from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.sheet import Sheet
-from foldyn.structures.structure import ModelOptions, Structure, hinge_angles
+from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.sheet import PanelSheet, Sheet, sheet_from
+from foldyn.structures.structure import ModelOptions, Structure
 
-__all__ = ["MASS_RULES", "ModelOptions", "Sheet", "Structure", "discretize", "hinge_angles"]
+__all__ = [
+    "MASS_RULES",
+    "ModelOptions",
+    "PanelSheet",
+    "Sheet",
+    "Structure",
+    "discretize",
+    "hinge_angles",
+    "sheet_from",
+]

@@ -31,16 +31,23 @@ STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotien
 WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
-def fold_stiffness(length: NDArray, sheet: Sheet) -> NDArray:
-    """Stiffness of whole creases (N m/rad) of the given lengths (m)."""
-    g = sheet.bending_modulus
-    slender = 0.55 * g * (length / sheet.thickness) ** (1.0 / 3.0)
-    return 1.0 / (sheet.length_scale_ratio / g + 1.0 / slender)
+def fold_stiffness(length: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole creases (nf,), N m/rad, of the given lengths (m).
+
+    The two sides of a crease are springs in series, each with half the compliance of a crease
+    between two panels like its own.
+    """
+    count = len(pattern.faces)
+    g = sheet.values("bending_modulus", count)[pattern.crease_faces]
+    t = sheet.values("thickness", count)[pattern.crease_faces]
+    slender = 0.55 * g * (length[:, None] / t) ** (1.0 / 3.0)
+    compliance = sheet.length_scale_ratio / g + 1.0 / slender
+    return 1.0 / (0.5 * (compliance[:, 0] + compliance[:, 1]))
 
 
-def bend_stiffness_per_length(d: NDArray, sheet: Sheet) -> NDArray:
+def bend_stiffness_per_length(d: NDArray, g: NDArray, t: NDArray) -> NDArray:
     """Stiffness per length of bend (N/rad) for a panel diagonal d (m)."""
-    return sheet.bending_modulus * (d / sheet.thickness) ** (1.0 / 3.0) / d
+    return g * (d / t) ** (1.0 / 3.0) / d
 
 
 def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool) -> NDArray:
@@ -49,20 +56,23 @@ def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool) ->
     length = np.linalg.norm(vector, axis=1)
     if not len(length):
         return length
+    count = len(pattern.faces)
+    g = sheet.values("bending_modulus", count)[mesh.inner_panel]
+    t = sheet.values("thickness", count)[mesh.inner_panel]
     on_diagonal = mesh.centers[mesh.inner_panel] < 0
     if on_diagonal.all():
-        return bend_stiffness_per_length(length, sheet) * length
+        return bend_stiffness_per_length(length, g, t) * length
     per_length = np.empty(len(length))
-    _, first, count = np.unique(mesh.inner_panel, return_index=True, return_counts=True)
-    for size in np.unique(count):
-        rows = first[count == size][:, None] + np.arange(size)  # spokes of each panel, by corner
+    _, first, spokes = np.unique(mesh.inner_panel, return_index=True, return_counts=True)
+    for size in np.unique(spokes):
+        rows = first[spokes == size][:, None] + np.arange(size)  # spokes of each panel, by corner
         if size == 4:
             opposite = np.roll(length[rows], -2, axis=1)
         else:
             unit = vector[rows] / length[rows][:, :, None]
             alignment = np.einsum("pic,pjc->pij", unit, unit)
             opposite = np.take_along_axis(length[rows], alignment.argmin(axis=2), axis=1)
-        kb = bend_stiffness_per_length(length[rows] + opposite, sheet)
+        kb = bend_stiffness_per_length(length[rows] + opposite, g[rows], t[rows])
         if merlin2:
             kb = _merlin2_corners(kb, rows, mesh, pattern)
         per_length[rows] = kb
@@ -92,8 +102,12 @@ def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
 def bar_areas(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool
 ) -> tuple[NDArray, dict[tuple[int, int], float]]:
-    """Cross-section areas (m2): of the inner bars (nh,), and of the edges by (low, high) pair."""
-    t, nu = sheet.thickness, sheet.poissons_ratio
+    """Cross-section areas (m2): of the inner bars (nh,), and of the edges by (low, high) pair.
+
+    Those of panels with a modulus of their own are areas of the transformed section: they count
+    with that modulus over the sheet's, so that E A of an edge is the sum of its panels'.
+    """
+    kinds, kind = sheet.kinds(len(pattern.faces))
     x = mesh.nodes
     inner = np.zeros(len(mesh.inner))
     inner_length = lengths(x, mesh.inner)
@@ -105,6 +119,9 @@ def bar_areas(
     edges: dict[tuple[int, int], float] = {}
     weak: list[int] = []
     for panel, face in enumerate(pattern.faces):
+        own = kinds[kind[panel]]
+        t, nu = own.thickness, own.poissons_ratio
+        stiffer = own.youngs_modulus / sheet.youngs_modulus
         inside = slice(inner_first[panel], inner_first[panel + 1])
         ends = [edge_of(a, b) for a, b in around(face)]
         length = np.linalg.norm(x[list(face)] - x[[*face[1:], face[0]]], axis=1)
@@ -119,7 +136,7 @@ def bar_areas(
             along = scale * abs(h**2 - nu * w**2) / h
             across = scale * abs(w**2 - nu * h**2) / w
             area = np.array([along, across, along, across])
-            inner[inside] = scale * nu * (h**2 + w**2) ** 1.5 / (h * w)
+            inner[inside] = scale * nu * (h**2 + w**2) ** 1.5 / (h * w) * stiffer
             if area.min() < WEAK * t * min(w, h):
                 weak.append(panel)
             if merlin2 and all(e in creases for e in ends):
@@ -129,9 +146,9 @@ def bar_areas(
                 len(face),
                 2.0 * panel_area[panel] * t / ((1.0 - nu) * (length.sum() + inner_sum[panel])),
             )
-            inner[inside] = area[0]
+            inner[inside] = area[0] * stiffer
         for pair, value in zip(ends, area.tolist(), strict=True):
-            edges[pair] = edges.get(pair, 0.0) + value
+            edges[pair] = edges.get(pair, 0.0) + value * stiffer
     if weak:
         shown = ", ".join(map(str, weak[:6])) + (", ..." if len(weak) > 6 else "")
         warnings.warn(
@@ -155,10 +172,16 @@ def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> N
     return out
 
 
-def check_scale(sheet: Sheet, pattern: Pattern) -> None:
-    """Refuse a sheet and pattern whose stiffness or mass is too far from 1 to compute with."""
+def check_sheet(sheet: Sheet, pattern: Pattern) -> None:
+    """Refuse panels that are not there, and what is too far from 1 to compute with."""
+    sheet.check_panels(len(pattern.faces))
     edges = lengths(pattern.vertices, pattern.edges)
-    low, high = float(edges.min()), float(edges.max())
+    for kind in sheet.kinds(len(pattern.faces))[0]:
+        _check_scale(kind, float(edges.min()), float(edges.max()))
+
+
+def _check_scale(sheet: Sheet, low: float, high: float) -> None:
+    """Refuse a sheet whose stiffness or mass, with edges from low to high (m), is out of range."""
     stretching, mass = sheet.youngs_modulus * sheet.thickness, sheet.thickness * high**2
     for what, value in (
         ("stretching stiffness E t (N/m)", stretching),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -14,11 +14,12 @@ from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
+from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.mass import MASS_RULES
-from foldyn.structures.mesh import lengths, n4b5, n5b8
+from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.structure import ModelOptions, Structure, hinge_angles
-from foldyn.values import choice, numbers, vector
+from foldyn.structures.structure import ModelOptions, Structure
+from foldyn.values import choice, vector
 
 PER_NODE = 5000.0
 """Bytes a node with its tangent: 5200 and 4900 measured with 20,000 and 80,000 nodes."""
@@ -33,8 +34,8 @@ def discretize(
     fold_law: str | HingeLaw = EnhancedLinear(),
     bend_law: str | HingeLaw = "superlinear",
     calibration: Literal["standard", "merlin2"] = "standard",
-    crease_stiffness: float | Sequence[float] | None = None,
-    crease_rest: float | Sequence[float] | None = None,
+    crease_stiffness: PerCrease = None,
+    crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
@@ -53,11 +54,12 @@ def discretize(
     calibration : {"standard", "merlin2"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
         `foldyn.structures.calibration`).
-    crease_stiffness : float or sequence, optional
-        Stiffness per length (N m/rad per m) of all creases or of each, instead of the calibration.
-    crease_rest : float or sequence, optional
-        Rest dihedral (degrees, between 0 and 360) of all creases or of each, in the order of
-        `pattern.creases`, instead of the pattern's own.
+    crease_stiffness : float, sequence or mapping, optional
+        Stiffness per length (N m/rad per m) of all creases, of each in the order of
+        `pattern.creases`, or by assignment, as {"mountain": 0.1, "valley": 0.2}, instead of the
+        calibration, which creases of an assignment that is not named ("flat") keep.
+    crease_rest : float, sequence or mapping, optional
+        Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
 
@@ -88,7 +90,7 @@ def discretize(
     choice("mass", mass, MASS_RULES)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
-    calibrate.check_scale(sheet, pattern)
+    calibrate.check_sheet(sheet, pattern)
     points = _given_centers(centers or {}, pattern, scheme)
     mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
     merlin2 = calibration == "merlin2"
@@ -105,8 +107,8 @@ def discretize(
         options=options,
         pattern=pattern,
         folds=mesh.folds,
-        fold_stiffness=fold_stiffness(crease_stiffness, pattern, sheet),
-        fold_rest=fold_rest(crease_rest, mesh.folds, x, pattern),
+        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
+        fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
         bends=mesh.bends,
         bend_stiffness=calibrate.bend_stiffness(mesh, pattern, sheet, merlin2),
         bend_rest=hinge_angles(x, mesh.bends),
@@ -137,57 +139,3 @@ def _given_centers(
             )
         points[int(panel)] = np.array(vector(f"centers: panel {panel}", point))
     return points
-
-
-def fold_stiffness(
-    given: float | Sequence[float] | None, pattern: Pattern, sheet: Sheet
-) -> NDArray:
-    """Stiffness of whole creases (nf,), N m/rad, calibrated or from that `given` per length."""
-    length = lengths(pattern.vertices, pattern.creases)
-    if given is None:
-        return calibrate.fold_stiffness(length, sheet)
-    per_length = _per_crease("crease_stiffness", given, pattern)
-    if (per_length < 0.0).any():
-        raise InputError("crease_stiffness: must not be negative")
-    return per_length * length
-
-
-def _per_crease(field: str, value: float | Sequence[float], pattern: Pattern) -> NDArray:
-    """One number for each crease (nf,) from a number, or from one for each."""
-    n = len(pattern.creases)
-    array = numbers(field, value)
-    if array.ndim > 1 or (array.ndim == 1 and len(array) != n):
-        raise InputError(f"{field}: {array.size} values for {n} creases: give one, or one for each")
-    return np.broadcast_to(array, (n,)).copy()
-
-
-def fold_rest(
-    given: float | Sequence[float] | None,
-    folds: NDArray,
-    x: NDArray,
-    pattern: Pattern,
-    crease: NDArray | None = None,
-) -> NDArray:
-    """Rest dihedrals (rad) of hinge rows, none of them closed.
-
-    crease : crease that each row lies on; the creases in order unless given.
-    """
-    crease = np.arange(len(folds)) if crease is None else crease
-    if given is None:
-        rest = hinge_angles(x, folds)
-        closed = np.flatnonzero((rest < 1e-9) | (rest > 2.0 * np.pi - 1e-9) | np.isnan(rest))
-        if len(closed):
-            number = crease[closed[0]]
-            low, high = pattern.creases[number]
-            raise InputError(
-                f"crease {number} (vertices {low}, {high}) is folded flat upon itself: open "
-                "the pattern, or give crease_rest and start from an opened one"
-            )
-        return rest
-    degrees = _per_crease("crease_rest", given, pattern)
-    closed = degrees[(degrees <= 0.0) | (degrees >= 360.0)]
-    if closed.size:
-        raise InputError(
-            f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
-        )
-    return np.radians(degrees)[crease]

@@ -147,14 +147,16 @@ class Discretized:
         """
         if self.sheet.density is None:
             raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
+        faces = self.pattern.faces if self.pattern is not None else ()
+        count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
         return Surface(
             nodes=self.nodes,
-            faces=self.pattern.faces if self.pattern is not None else (),
+            faces=faces,
             centers=self.centers,
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
             triangle_area=0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1),
-            areal_density=self.sheet.density * self.sheet.thickness,
+            areal_density=self.sheet.values("areal_density", count),
         )
 
     def _displacement(self, u: ArrayLike) -> NDArray:

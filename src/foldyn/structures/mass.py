@@ -27,13 +27,18 @@ class Surface(NamedTuple):
     triangles: NDArray  # (nt, 3)
     triangle_panel: NDArray  # (nt,)
     triangle_area: NDArray  # (nt,) m2
-    areal_density: float  # kg/m2
+    areal_density: NDArray  # (np,) kg/m2
 
     @property
     def panel_mass(self) -> NDArray:
         """Mass of each panel (np,), kg."""
         area = np.bincount(self.triangle_panel, self.triangle_area, minlength=len(self.faces))
         return self.areal_density * area
+
+    @property
+    def triangle_mass(self) -> NDArray:
+        """Mass of each triangle (nt,), kg."""
+        return self.areal_density[self.triangle_panel] * self.triangle_area
 
     def nodes_of(self, panel: int) -> list[int]:
         """Corners of a panel, then its center node if it has one."""
@@ -152,7 +157,7 @@ def consistent(surface: Surface) -> sparse.csr_array:
     Its rotational inertia is exact about every axis in the plane of a panel.
     """
     element = (np.ones((3, 3)) + np.eye(3)) / 12.0
-    values = (surface.areal_density * surface.triangle_area)[:, None, None] * element
+    values = surface.triangle_mass[:, None, None] * element
     rows = np.repeat(surface.triangles, 3, axis=1).ravel()
     columns = np.tile(surface.triangles, (1, 3)).ravel()
     n = len(surface.nodes)
@@ -224,7 +229,7 @@ def lumped(mass: NDArray) -> sparse.csr_array:
 
 def _from_triangle_shares(surface: Surface, shares: NDArray) -> sparse.csr_array:
     """Lumped matrix from shares (nt, 3) of each triangle's mass for its corners."""
-    mass = shares * (surface.areal_density * surface.triangle_area)[:, None]
+    mass = shares * surface.triangle_mass[:, None]
     total = np.bincount(surface.triangles.ravel(), mass.ravel(), minlength=len(surface.nodes))
     return lumped(total)
 

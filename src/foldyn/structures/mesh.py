@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn import mechanics
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around
@@ -152,6 +153,12 @@ def double_areas(x: NDArray, triangles: NDArray) -> NDArray:
     """Normals (nt, 3) of triangles (nt, 3) of points x (n, 3), as long as twice their areas."""
     a, b, c = (x[triangles[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
+
+
+def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
+    """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
+    centered = np.ascontiguousarray(x - x.mean(axis=0))  # as `mechanics.build` does
+    return mechanics.angles(centered, np.ascontiguousarray(hinges, np.uint32))
 
 
 def check_triangles(

@@ -1,13 +1,64 @@
-"""What a pattern is made of."""
+"""What a pattern is made of: a sheet, and panels that differ from the rest of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
-from foldyn.errors import InputError
-from foldyn.values import length, number
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError, within
+from foldyn.values import brief, indices, length, number, show
+
+MATERIAL = ("youngs_modulus", "poissons_ratio", "thickness", "density")
+"""What panels may have of their own."""
 
 
+@brief
+@dataclass(frozen=True)
+class PanelSheet:
+    """Panels whose thickness or material differs from the rest of the sheet.
+
+    Parameters
+    ----------
+    panels : int or sequence of int
+        Their numbers, in the order of `pattern.faces`.
+    youngs_modulus, poissons_ratio, thickness, density : float, optional
+        As in `Sheet`, at least one of them; what is left out is that of the sheet.
+
+    Raises
+    ------
+    InputError
+        A value out of its range, or none at all.
+    """
+
+    panels: Sequence[int] | int
+    youngs_modulus: float | None = None
+    poissons_ratio: float | None = None
+    thickness: float | None = None
+    density: float | None = None
+
+    def __post_init__(self) -> None:
+        chosen = indices("panels", self.panels, "panel", "as in [0, 1]")
+        if min(chosen) < 0:
+            raise InputError(f" = {show(list(chosen))}: panels are counted from 0", "panels")
+        object.__setattr__(self, "panels", chosen)
+        if not self.own:
+            raise InputError(f": give what differs there: {', '.join(MATERIAL)}", "panels")
+        for name, value in self.own.items():
+            object.__setattr__(self, name, _checked(name, value))
+
+    @property
+    def own(self) -> dict[str, float]:
+        """What differs from the rest of the sheet."""
+        given = {name: getattr(self, name) for name in MATERIAL}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+@brief
 @dataclass(frozen=True)
 class Sheet:
     """An isotropic elastic sheet.
@@ -25,11 +76,20 @@ class Sheet:
         rho (kg/m3), positive. Needed for the mass; statics does without.
     length_scale_ratio : float, default 1
         L*/L_F, positive: the crease's softness in fold calibration; larger is softer.
+    panels : sequence of PanelSheet, optional
+        Panels that differ from the rest.
 
     Raises
     ------
     InputError
-        A value out of its range.
+        A value out of its range; a panel named twice; a density of panels of a sheet without one.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> stiff = fd.PanelSheet(panels=[0, 1], thickness=0.02)
+    >>> fd.Sheet(1e6, 0.25, thickness=0.01, panels=[stiff]).of(1).thickness
+    0.02
     """
 
     youngs_modulus: float
@@ -37,26 +97,105 @@ class Sheet:
     thickness: float
     density: float | None = None
     length_scale_ratio: float = 1.0
+    panels: Sequence[PanelSheet] = ()
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name, value = f"sheet: {field.name}", getattr(self, field.name)
-            if value is None and field.name == "density":
+        for name in (*MATERIAL, "length_scale_ratio"):
+            value = getattr(self, name)
+            if value is None and name == "density":
                 continue
-            if field.name == "thickness":
-                checked = length(name, value)
-            elif field.name == "poissons_ratio":
-                checked = number(name, value)
-                if not -1.0 < checked < 0.5:
+            with within("sheet: "):
+                object.__setattr__(self, name, _checked(name, value))  # in double precision
+        with within("sheet: "):
+            object.__setattr__(self, "panels", self._checked_panels())
+
+    def _checked_panels(self) -> tuple[PanelSheet, ...]:
+        given: Any = self.panels
+        if isinstance(given, PanelSheet) or not isinstance(given, Sequence):
+            raise InputError(f" = {show(given)}: must be a list of PanelSheet", "panels")
+        before: dict[int, int] = {}
+        for i, part in enumerate(given):
+            if not isinstance(part, PanelSheet):
+                raise InputError(f" = {show(part)}: must be a PanelSheet", f"panels[{i}]")
+            if part.density is not None and self.density is None:
+                raise InputError(
+                    f" = {part.density:g}: the rest of the sheet has none; give sheet.density",
+                    f"panels[{i}].density",
+                )
+            for panel in _numbers(part):
+                if panel in before:
                     raise InputError(
-                        f"{name} = {checked}: must lie between -1 and 0.5, both excluded (0.5 "
-                        "makes the bar areas infinite)"
+                        f": panel {panel} is among those of panels[{before[panel]}] already; "
+                        "leave it out of one of the two",
+                        f"panels[{i}].panels",
                     )
-            else:
-                checked = number(name, value, above=0.0)
-            object.__setattr__(self, field.name, checked)  # in double precision
+                before[panel] = i
+        return tuple(given)
 
     @property
     def bending_modulus(self) -> float:
         """E t^3 / (12 (1 - nu^2)), N m."""
         return self.youngs_modulus * self.thickness**3 / (12.0 * (1.0 - self.poissons_ratio**2))
+
+    @property
+    def areal_density(self) -> float:
+        """rho t, kg/m2; nan without a density."""
+        return math.nan if self.density is None else self.density * self.thickness
+
+    def of(self, panel: int) -> Sheet:
+        """The sheet of one panel, which is the same everywhere."""
+        kinds, kind = self.kinds(panel + 1)
+        return kinds[kind[panel]]
+
+    def kinds(self, count: int) -> tuple[list[Sheet], NDArray[np.int64]]:
+        """Sheets without differing panels, and which of them each of `count` panels has."""
+        rest = replace(self, panels=())
+        kind = np.zeros(count, np.int64)
+        for number_of, part in enumerate(self.panels, 1):
+            chosen = np.array(_numbers(part))
+            kind[chosen[chosen < count]] = number_of
+        return [rest, *(replace(rest, **part.own) for part in self.panels)], kind
+
+    def values(self, name: str, count: int) -> NDArray[np.float64]:
+        """An attribute of the sheet, as "thickness", for each of `count` panels (count,)."""
+        kinds, kind = self.kinds(count)
+        return np.array([getattr(sheet, name) for sheet in kinds], float)[kind]
+
+    def check_panels(self, count: int) -> None:
+        """Refuse panels that a pattern of `count` panels does not have."""
+        for i, part in enumerate(self.panels):
+            beyond = [panel for panel in _numbers(part) if panel >= count]
+            if beyond:
+                raise InputError(
+                    f"sheet: panels[{i}].panels: panel {beyond[0]} is out of range; this pattern "
+                    f"has panels 0 to {count - 1}"
+                )
+
+
+def sheet_from(table: Mapping[str, Any]) -> Sheet:
+    """Sheet from its table, in which `panels` is a list of tables."""
+    parts = []
+    for i, part in enumerate(table.get("panels", ())):
+        with within(f"sheet: panels[{i}]."):
+            parts.append(PanelSheet(**part))
+    return Sheet(**{**table, "panels": parts})
+
+
+def _numbers(part: PanelSheet) -> tuple[int, ...]:
+    return part.panels  # type: ignore[return-value]  # checked
+
+
+def _checked(name: str, value: Any) -> float:
+    """Return a value of a sheet in its range."""
+    if name == "thickness":
+        return length(name, value)
+    if name != "poissons_ratio":
+        return number(name, value, above=0.0)
+    checked = number(name, value)
+    if not -1.0 < checked < 0.5:
+        raise InputError(
+            f" = {checked}: must lie between -1 and 0.5, both excluded (0.5 makes the bar areas "
+            "infinite)",
+            name,
+        )
+    return checked

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -13,12 +13,13 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
-from foldyn.errors import InputError
 from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
+from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
+from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.sheet import Sheet
 from foldyn.values import choice
 
@@ -39,16 +40,12 @@ class ModelOptions:
     fold_law: str | HingeLaw = EnhancedLinear()
     bend_law: str | HingeLaw = "superlinear"
     calibration: Literal["standard", "merlin2"] = "standard"
-    crease_stiffness: float | Sequence[float] | None = None
-    crease_rest: float | Sequence[float] | None = None
+    crease_stiffness: PerCrease = None
+    crease_rest: PerCrease = None
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
-            value = getattr(self, name)
-            if isinstance(value, bool):
-                raise InputError(f"{name} = {value}: give a number, or one for each crease")
-            if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
-                object.__setattr__(self, name, tuple(value))  # a copy that stays as it is
+            object.__setattr__(self, name, per_crease(name, getattr(self, name)))
         choice("scheme", self.scheme, SCHEMES)
         choice("calibration", self.calibration, CALIBRATIONS)
 
@@ -200,9 +197,3 @@ class Structure(Discretized):
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
-
-
-def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
-    """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
-    centered = np.ascontiguousarray(x - x.mean(axis=0))  # as `mechanics.build` does
-    return mechanics.angles(centered, np.ascontiguousarray(hinges, np.uint32))

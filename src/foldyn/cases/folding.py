@@ -1,0 +1,108 @@
+"""How far actuated creases fold: by dihedral, by fold angle, or by a fraction of fully folded.
+
+The fold angle is that of the FOLD format, 180 degrees less the dihedral: 0 where the panels are
+flat, positive for a valley, negative for a mountain, 180 or -180 degrees where it is closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.values import number, number_or_list, show
+
+SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
+"""Sign of the fold angle of each assignment."""
+Angles = float | tuple[float, ...]
+
+
+def check_angles(name: str, value: Any) -> Angles:
+    """Return a dihedral (degrees) for all creases, or a tuple of one for each."""
+    return _within(name, value, 0.0, 360.0, " (flat: 180)")
+
+
+def check_fold_angles(name: str, value: Any) -> Angles:
+    """Return a fold angle (degrees) for all creases, or a tuple of one for each."""
+    return _within(name, value, -180.0, 180.0, " (flat: 0; valleys above, mountains below)")
+
+
+def check_fraction(name: str, value: Any) -> float:
+    """Return a fraction between 0 and 1 from a number, or from a text as "80%"."""
+    given = value
+    if isinstance(value, str):
+        try:
+            given = float(value.strip().removesuffix("%")) / 100.0
+        except ValueError:
+            given = None
+        if given is None or not value.strip().endswith("%"):
+            raise InputError(
+                f' = {show(value)}: must be as in "80%", or a number from 0 to 1', name
+            )
+    return number(name, given, least=0.0, most=1.0)
+
+
+def _within(name: str, value: Any, low: float, high: float, hint: str) -> Angles:
+    checked = number_or_list(name, value, "crease")
+    listed = isinstance(checked, tuple)
+    for i, angle in enumerate(checked if listed else (checked,)):
+        if not low <= angle <= high:
+            place = f"{name}[{i}]" if listed else name
+            raise InputError(
+                f" = {angle:g}: must lie between {low:g} and {high:g} degrees{hint}", place
+            )
+    return checked
+
+
+def dihedrals(
+    angle: Angles | None,
+    fold_angle: Angles | None,
+    fraction: float | None,
+    assigned: bool,
+    letters: NDArray[np.str_],
+) -> NDArray[np.float64]:
+    """Dihedrals (degrees) of creases with some `letters` (nc,); one of the first three is given.
+
+    assigned : whether the creases were chosen by their assignment, so that one fold angle for all
+        of them is a size, and each folds the way it is assigned.
+    """
+    if angle is not None:
+        return _each("angle", angle, len(letters))
+    if fraction is not None:
+        return 180.0 - 180.0 * fraction * _signs("fraction", letters)
+    folded = _each("fold_angle", fold_angle, len(letters))
+    if not assigned or isinstance(fold_angle, tuple):
+        return 180.0 - folded
+    if folded[0] < 0.0:
+        raise InputError(
+            f" = {folded[0]:g}: is a size for creases chosen by assignment, each of which folds "
+            "its own way; give at least 0",
+            "fold_angle",
+        )
+    return 180.0 - folded * _signs("fold_angle", letters)
+
+
+def _each(name: str, value: Any, count: int) -> NDArray[np.float64]:
+    array = np.array(value)
+    if array.ndim and len(array) != count:
+        raise InputError(
+            f" = {show(value)}: {len(array)} angles for {count} creases; give one, or one for each",
+            name,
+        )
+    return np.broadcast_to(array, (count,))
+
+
+def _signs(name: str, letters: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Sign of the fold angle of each crease, which must be a mountain or a valley."""
+    unknown = [letter for letter in letters.tolist() if letter not in SIGNS]
+    if unknown:
+        what = {"F": "flat", "U": "unassigned"}[unknown[0]]
+        raise InputError(
+            f": a crease is {what}, so that it has no way to fold; give mountains and valleys, or "
+            "an angle for each crease",
+            name,
+        )
+    return np.array([SIGNS[letter] for letter in letters.tolist()])

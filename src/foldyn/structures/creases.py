@@ -1,0 +1,106 @@
+"""Stiffness and rest angles of creases: calibrated, or given for all, each or an assignment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns import Pattern
+from foldyn.structures import calibration
+from foldyn.structures.mesh import hinge_angles, lengths
+from foldyn.structures.sheet import Sheet
+from foldyn.values import choice, number, numbers
+
+PerCrease = float | Sequence[float] | Mapping[str, float] | None
+FAMILIES: Mapping[str, str] = {"mountain": "M", "valley": "V", "flat": "F"}
+"""Words for the creases of an assignment."""
+
+
+def per_crease(name: str, value: Any) -> Any:
+    """Return values for creases as a number, a tuple, or a new dict by assignment; None as it is.
+
+    A number and a list are checked with the pattern.
+    """
+    if isinstance(value, Mapping):
+        if not value:
+            raise InputError(f": give a value by assignment: {', '.join(FAMILIES)}", name)
+        words = [choice(f"{name}: assignment", word, FAMILIES) for word in value]
+        return {word: number(f"{name}.{word}", value[word]) for word in words}
+    if isinstance(value, bool):
+        raise InputError(f" = {value}: give a number, one for each crease, or a table", name)
+    if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
+        return tuple(value)  # a copy that stays as it is
+    return value
+
+
+def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole creases (nf,), N m/rad, calibrated or from that `given` per length."""
+    length = lengths(pattern.vertices, pattern.creases)
+    if given is None:
+        return calibration.fold_stiffness(length, pattern, sheet)
+    per_length, chosen = _values("crease_stiffness", given, pattern)
+    if (per_length[chosen] < 0.0).any():
+        raise InputError("crease_stiffness: must not be negative")
+    if chosen.all():
+        return per_length * length
+    return np.where(chosen, per_length * length, calibration.fold_stiffness(length, pattern, sheet))
+
+
+def fold_rest(
+    given: PerCrease,
+    folds: NDArray,
+    x: NDArray,
+    pattern: Pattern,
+    crease: NDArray | None = None,
+) -> NDArray:
+    """Rest dihedrals (rad) of hinge rows, none of them closed.
+
+    crease : crease that each row lies on; the creases in order unless given.
+    """
+    crease = np.arange(len(folds)) if crease is None else crease
+    degrees, chosen = _values("crease_rest", given, pattern)
+    closed = degrees[chosen & ((degrees <= 0.0) | (degrees >= 360.0))]
+    if closed.size:
+        raise InputError(
+            f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
+        )
+    rest, given_there = np.radians(degrees)[crease], chosen[crease]
+    if given_there.all():
+        return rest
+    drawn = hinge_angles(x, folds)
+    shut = (drawn < 1e-9) | (drawn > 2.0 * np.pi - 1e-9) | np.isnan(drawn)
+    wrong = np.flatnonzero(shut & ~given_there)
+    if len(wrong):
+        number = crease[wrong[0]]
+        low, high = pattern.creases[number]
+        raise InputError(
+            f"crease {number} (vertices {low}, {high}) is folded flat upon itself: open "
+            "the pattern, or give crease_rest and start from an opened one"
+        )
+    return np.where(given_there, rest, drawn)
+
+
+def _values(field: str, given: PerCrease, pattern: Pattern) -> tuple[NDArray, NDArray]:
+    """Value of each crease (nf,), and whether one was given for it (nf,)."""
+    count = len(pattern.creases)
+    if given is None:
+        return np.zeros(count), np.zeros(count, bool)
+    if not isinstance(given, Mapping):
+        array = numbers(field, given)
+        if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
+            raise InputError(
+                f"{field}: {array.size} values for {count} creases: give one, or one for each"
+            )
+        return np.broadcast_to(array, (count,)).copy(), np.ones(count, bool)
+    letters = np.array(pattern.assignments, dtype="<U1")
+    value, chosen = np.zeros(count), np.zeros(count, bool)
+    for word, one in given.items():
+        rows = letters == FAMILIES[word]
+        if not rows.any():
+            raise InputError(f": this pattern has no crease assigned {word}", f"{field}.{word}")
+        value[rows], chosen[rows] = one, True
+    return value, chosen

@@ -1,0 +1,81 @@
+"""Stiffness and rest angles of creases by assignment."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+MIURA = fd.patterns.miura((2, 1), 1.0, 0.7, 65, 80)
+LETTERS = np.array(MIURA.assignments)
+LENGTH = np.linalg.norm(np.diff(MIURA.vertices[MIURA.creases], axis=1)[:, 0], axis=1)
+MODELS = [fd.discretize, lambda *args, **options: fd.shell(*args, divisions=2, **options)]
+
+
+@pytest.mark.parametrize("make", MODELS)
+def test_each_family_has_its_own(make):
+    plain = make(MIURA, SHEET)
+    s = make(
+        MIURA, SHEET, crease_stiffness={"mountain": 0.1, "valley": 0.2}, crease_rest={"valley": 95}
+    )
+    wanted = np.where(LETTERS == "M", 0.1, 0.2) * LENGTH
+    np.testing.assert_allclose(s.fold_stiffness, wanted, rtol=1e-14)
+    rest = np.where(LETTERS == "V", np.radians(95), plain.fold_rest)
+    np.testing.assert_allclose(s.fold_rest, rest, rtol=1e-14)
+
+
+@pytest.mark.parametrize("make", MODELS)
+def test_families_that_are_not_named_keep_the_calibration(make):
+    plain, s = make(MIURA, SHEET), make(MIURA, SHEET, crease_stiffness={"valley": 0.2})
+    mountain = LETTERS == "M"
+    np.testing.assert_array_equal(s.fold_stiffness[mountain], plain.fold_stiffness[mountain])
+    np.testing.assert_allclose(s.fold_stiffness[~mountain], 0.2 * LENGTH[~mountain], rtol=1e-14)
+
+
+def test_flat_creases_are_a_family():
+    flat = fd.Pattern(MIURA.vertices, MIURA.faces, ["F", "U", *LETTERS[2:]])
+    plain = fd.discretize(flat, SHEET)
+    s = fd.discretize(flat, SHEET, crease_stiffness={"flat": 7.0})
+    assert s.fold_stiffness[0] == pytest.approx(7.0 * LENGTH[0])
+    np.testing.assert_array_equal(s.fold_stiffness[1:], plain.fold_stiffness[1:])
+
+
+def test_a_closed_crease_needs_a_rest_angle_of_its_family():
+    """Folded flat upon itself as drawn; its family's rest angle opens it."""
+    shut = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.2, 0.1, 0), (0.2, 0.9, 0)],
+                      [(0, 1, 2, 3), (2, 1, 4, 5)], {(1, 2): "V"})  # fmt: skip
+    with pytest.raises(InputError, match="folded flat upon itself"):
+        fd.discretize(shut, SHEET)
+    s = fd.discretize(shut, SHEET, crease_rest={"valley": 20})
+    assert np.degrees(s.fold_rest) == pytest.approx([20.0])
+
+
+def test_the_mapping_is_copied():
+    given = {"mountain": 0.1}
+    s = fd.discretize(MIURA, SHEET, crease_stiffness=given)
+    given["mountain"] = 5.0
+    assert s.options.crease_stiffness == {"mountain": 0.1}
+
+
+@pytest.mark.parametrize("make", MODELS)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"crease_stiffness": {"montain": 1}}, "did you mean 'mountain'"),
+        (
+            {"crease_stiffness": {"flat": 1}},
+            "crease_stiffness.flat: this pattern has no crease",
+        ),
+        ({"crease_stiffness": {"valley": -1}}, "crease_stiffness: must not be negative"),
+        ({"crease_stiffness": {"valley": "1"}}, "crease_stiffness.valley = .*must be a number"),
+        ({"crease_stiffness": {}}, "crease_stiffness: give a value by assignment: mountain"),
+        ({"crease_stiffness": True}, "crease_stiffness = True"),
+        ({"crease_rest": {"valley": 360}}, "crease_rest = 360: must lie between 0 and 360"),
+    ],
+)
+def test_wrong_families(make, options, message):
+    with pytest.raises(InputError, match=message):
+        make(MIURA, SHEET, **options)
