@@ -15,7 +15,7 @@ from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.cases.supports import signed
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.values import brief, number_or_list, show, vector
 
 __all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
@@ -134,6 +134,7 @@ class Gravity(Load):
 
     Each node gets the sum of its row of the mass matrix times the acceleration, so that the
     weight is exact with every mass rule and a free structure falls with the acceleration itself.
+    Point masses count.
     The part that supports hold adds to the reactions.
 
     Parameters
@@ -161,15 +162,9 @@ class Gravity(Load):
         object.__setattr__(self, "acceleration", given)
         object.__setattr__(self, "history", as_history(self.history))
 
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
-        """See `Load`."""
-        mass = structure.nodal_mass
+    def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces (n, 3), N, on nodes with masses (n,), kg."""
         return mass[:, None] * np.array(self.acceleration)
-
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse gravity where the mass is not known."""
-        with within(f"{place}: gravity needs the mass of the structure: "):
-            _ = structure.mass
 
 
 @brief

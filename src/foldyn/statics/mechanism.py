@@ -57,7 +57,9 @@ def mechanisms(problem: OrigamiProblem) -> list[str]:
     held = np.zeros(structure.nodes.size, bool)
     held[problem.held] = True
     start, body = problem.start(), problem.case.body
-    rigid = name_rigid_motions(structure.nodes + problem.displacement(start), held, body.holds(start))
+    rigid = name_rigid_motions(
+        structure.nodes + problem.displacement(start), held, body.holds(start)
+    )
     unstrained = None if rigid else body.unstrained(start)
     if unstrained is None:
         return rigid

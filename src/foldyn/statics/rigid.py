@@ -36,9 +36,7 @@ def rigid_motions(x: NDArray) -> NDArray:
     return motions.reshape(-1, 6)
 
 
-def free_rigid_motions(
-    x: NDArray, held: NDArray, holds: sparse.csr_array | None = None
-) -> NDArray:
+def free_rigid_motions(x: NDArray, held: NDArray, holds: sparse.csr_array | None = None) -> NDArray:
     """Rigid motions (3n, r) of points x (n, 3) that leave the dofs of the mask held (3n,) still.
 
     holds : what else keeps them in place, see `Body.holds`.
@@ -125,9 +123,7 @@ class Relief:
         self.pins = np.sort(free[order[: self._count]])
 
     def _motions(self, u: NDArray) -> NDArray:
-        return free_rigid_motions(
-            self._nodes + u.reshape(-1, 3), self._held, self._body.holds(u)
-        )
+        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held, self._body.holds(u))
 
     def inertia(self, u: NDArray, force: NDArray) -> NDArray:
         """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""
