@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def _driven(case: Case, drive: list[Any]) -> Case:
     """The case with its drive, for the picture of the structure."""
     bases = [part for part in drive if isinstance(part, BaseMotion)]
     forces = [part for part in drive if not isinstance(part, BaseMotion)]
-    return Case(case.structure, [*case.supports, *bases], [*case.loads, *forces], case.damping)
+    return replace(case, supports=[*case.supports, *bases], loads=[*case.loads, *forces])
 
 
 def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from foldyn.analyses.casefile import CaseFile, Output
@@ -129,7 +130,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         pattern = _pattern(schema.pattern, path.parent)
     with faults.collected():
         sheet = sheet_from(schema.sheet.model_dump())
-    if schema.sheet.density is None and kind.needs_density:
+    if schema.sheet.density is None and kind.needs_density and not schema.masses:
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
         faults.tell()
@@ -145,7 +146,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
             if sheet.density is not None:
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):
-            return Case(structure, schema.supports, schema.loads, damping)
+            return Case(structure, schema.supports, schema.loads, damping, schema.masses)
 
     case = make(masses[0])
     cases = {masses[0]: case}
@@ -235,9 +236,11 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
 def _check_vertices(schema: Any, count: int) -> None:
     """Refuse nodes of a shell's mesh: what a case file says is meant for every mesh."""
     places = {
-        f"{name}[{i}].nodes": getattr(part, "nodes", None)
-        for name in ("supports", "loads", "drive")
+        f"{name}[{i}].{key}": np.ravel(given).tolist()
+        for name in ("supports", "loads", "masses", "drive")
         for i, part in enumerate(getattr(schema, name, ()))
+        for key in ("nodes", "between")
+        if not isinstance(given := getattr(part, key, "") or "", str)
     }
     until = getattr(schema.analysis, "until", None)
     places |= {} if until is None else {"analysis.until.node": (until.node,)}

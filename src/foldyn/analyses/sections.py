@@ -18,9 +18,10 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInf
 from foldyn.cases.damping import STATES, Rayleigh
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
+from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import AXES, support_from
+from foldyn.cases.supports import AXES, check_pairs, support_from
 from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
@@ -180,6 +181,7 @@ Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_per_crease)]
+Pairs = Annotated[Any, PlainValidator(lambda value: check_pairs("", value))]
 Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
@@ -220,6 +222,7 @@ class ModelSection(Section):
     calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
+    clamped: Pairs = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:
@@ -298,3 +301,4 @@ class CaseSchema(Section):
     damping: DampingSection = DampingSection()
     supports: list[Annotated[Any, part(support_from)]] = []
     loads: list[Annotated[Any, part(load_from)]] = []
+    masses: list[Annotated[Any, part(mass_from)]] = []

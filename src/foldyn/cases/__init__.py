@@ -6,9 +6,10 @@ from foldyn.cases.damping import Rayleigh
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
+from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
-from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose
+from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Spring
 
 __all__ = [
     "SUPPORTS",
@@ -17,7 +18,9 @@ __all__ = [
     "Fix",
     "Function",
     "Impose",
+    "PointMass",
     "Rayleigh",
+    "Spring",
     "State",
     "as_history",
     "resolve_nodes",

@@ -14,11 +14,16 @@ from scipy import sparse
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
+from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
-from foldyn.errors import Faults, InputError
+from foldyn.cases.springs import packed
+from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Spring, Support
+from foldyn.errors import Faults, InputError, within
+from foldyn.mechanics.attached import Springs
+from foldyn.mechanics.attached_body import GROUP, attached
 from foldyn.mechanics.body import Body
 from foldyn.structures.discretized import read_only
+from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.values import brief, show
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
@@ -34,13 +39,15 @@ class Case:
     ----------
     structure : Structure
         The discretized pattern.
-    supports : sequence of Fix, Impose and BaseMotion
-        Nodes held at rest or moved as prescribed, and motions of the base; none by default (free
-        motion is legal in dynamics).
+    supports : sequence of Fix, Impose, BaseMotion and Spring
+        Nodes held at rest, moved as prescribed or held by springs, and motions of the base; none
+        by default (free motion is legal in dynamics).
     loads : sequence of Force, Gravity and Actuate
         Forces, gravity and creases that fold by themselves; none by default.
     damping : Rayleigh
         Damping; none by default.
+    masses : sequence of PointMass
+        What nodes carry beside the mass of the sheet; none by default.
 
     Attributes
     ----------
@@ -84,10 +91,11 @@ class Case:
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
     damping: Rayleigh = field(default_factory=Rayleigh)
+    masses: Sequence[PointMass] = ()
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        for name, kinds in (("supports", SUPPORTS), ("loads", LOADS)):
+        for name, kinds in (("supports", SUPPORTS), ("loads", LOADS), ("masses", (PointMass,))):
             object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
         if not isinstance(self.damping, Rayleigh):
             raise InputError(
@@ -97,6 +105,9 @@ class Case:
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         for place, load in self._loads():
             load.check(self.structure, self.fixed, place)
+            if isinstance(load, Gravity):
+                with within(f"{place}: gravity needs the mass of the structure: "):
+                    _ = self.mass
 
     def _check_selections(self) -> None:
         """Refuse nodes and creases that are not there, all at once."""
@@ -104,6 +115,10 @@ class Case:
         for place, support in self._supports(Fix, Impose):
             with faults.collected():
                 self._nodes_of(place, support)
+        with faults.collected():
+            _ = self.springs
+        with faults.collected():
+            _ = self.point_masses
         for place, load in self._loads():
             with faults.collected():
                 load.loaded(self.structure, place)
@@ -111,25 +126,67 @@ class Case:
                 load.rest_changes(self.structure, place)
         faults.tell()
 
-    @property
+    @cached_property
     def body(self) -> Body:
         """What solvers take: the structure with what the case adds to its stiffness."""
-        return self.structure.body
+        body = self.structure.body
+        return body if self.springs is None else attached(body, springs=self.springs)
+
+    @cached_property
+    def springs(self) -> Springs | None:
+        """Its springs as arrays; None without any."""
+        parts = list(self._supports(Spring))
+        return packed(parts, self.structure) if parts else None
 
     @property
     def energy_groups(self) -> Mapping[str, str]:
         """Parts of its strain energy, and what they are."""
-        return self.structure.energy_groups
+        groups = self.structure.energy_groups
+        return groups if self.springs is None else {**groups, GROUP: "strain energy of the springs"}
 
-    @property
+    @cached_property
     def mass(self) -> sparse.csr_array:
-        """Nodal mass matrix (n, n), kg: the structure's with what the case adds to it."""
-        return self.structure.mass
+        """Nodal mass matrix (n, n), kg: the structure's with point masses.
 
-    @property
+        Raises
+        ------
+        InputError
+            The sheet has no density, and there are no point masses.
+        """
+        if not self.masses:
+            return self.structure.mass
+        points = sparse.csr_array(sparse.diags_array(self.point_masses))
+        try:
+            return sparse.csr_array(self.structure.mass + points)
+        except InputError:
+            if self.structure.sheet.density is not None:
+                raise
+            return points  # a sheet without mass
+
+    @cached_property
+    def point_masses(self) -> NDArray[np.float64]:
+        """Sum (n,) of the point masses on each node, kg."""
+        return read_only(nodal_masses(self.masses, self.structure))
+
+    @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
         """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
-        return self.structure.nodal_mass
+        return self.structure.nodal_mass if not self.masses else read_only(row_sums(self.mass))
+
+    @property
+    def total_mass(self) -> float:
+        """Mass (kg)."""
+        return float(self.mass.sum())
+
+    @property
+    def center_of_mass(self) -> NDArray[np.float64]:
+        """Center of mass (3,) at rest, m."""
+        return center_of_mass(self.structure.nodes, self.mass)
+
+    @property
+    def inertia(self) -> NDArray[np.float64]:
+        """Inertia tensor (3, 3) at rest about the center of mass, kg m2."""
+        return inertia_tensor(self.structure.nodes, self.mass)
 
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
@@ -241,6 +298,8 @@ class Case:
     def _forces(self, loads: Iterable[tuple[str, Load]]) -> Summands:
         for place, load in loads:
             forces = load.forces(self.structure, place)
+            if isinstance(load, Gravity):
+                forces = load.weight(self.nodal_mass)
             if forces is not None:
                 yield forces, load.history
 

@@ -23,6 +23,7 @@ from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.history import as_history
 from foldyn.cases.loads import Load, load_from
+from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
@@ -112,6 +113,8 @@ class _Writer:
             "supports": [self._part(support) for support in case.supports],
             "loads": [self._part(load) for load in case.loads],
         }
+        if case.masses:
+            sections["masses"] = [self._part(mass) for mass in case.masses]
         if not self.obstacles and not structure.as_made:
             self.obstacles.append(
                 "its structure differs from what discretize makes of its pattern, sheet and options"
@@ -156,7 +159,7 @@ class _Writer:
         options = structure.options
         for option in dataclasses.fields(options):
             name, value = option.name, getattr(options, option.name)
-            if value is None:
+            if value is None or value == ():
                 continue
             if name in LAWS:
                 section[name] = self._law(name, value)
@@ -164,7 +167,7 @@ class _Writer:
                 array = np.asarray(value, dtype=np.float64)
                 section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
             else:
-                section[name] = value
+                section[name] = [list(edge) for edge in value] if name == "clamped" else value
         if structure.kind != BARS_AND_HINGES:
             section["kind"] = structure.kind
         return section
@@ -222,10 +225,11 @@ class _Writer:
 def _read(sections: Mapping[str, Any]) -> Case:
     supports = [support_from(item) for item in sections["supports"]]
     loads = [load_from(item) for item in sections["loads"]]
+    masses = [mass_from(item) for item in sections.get("masses", ())]
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
-        return Case(structure, supports, loads, Rayleigh(**sections["damping"]))
+        return Case(structure, supports, loads, Rayleigh(**sections["damping"]), masses)
 
 
 def _structure(sections: Mapping[str, Any]) -> Any:

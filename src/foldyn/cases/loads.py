@@ -140,6 +140,7 @@ class Gravity(Load):
 
     Each node gets the sum of its row of the mass matrix times the acceleration, so that the
     weight is exact with every mass rule and a free structure falls with the acceleration itself.
+    Point masses count.
     The part that supports hold adds to the reactions.
 
     Parameters
@@ -167,15 +168,9 @@ class Gravity(Load):
         object.__setattr__(self, "acceleration", given)
         object.__setattr__(self, "history", as_history(self.history))
 
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64]:
-        """See `Load`."""
-        mass = structure.nodal_mass
+    def weight(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Forces (n, 3), N, on nodes with masses (n,), kg."""
         return mass[:, None] * np.array(self.acceleration)
-
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse gravity where the mass is not known."""
-        with within(f"{place}: gravity needs the mass of the structure: "):
-            _ = structure.mass
 
 
 @brief

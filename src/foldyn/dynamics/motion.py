@@ -201,11 +201,12 @@ class Motion:
         if plan.dt > self.critical:
             moment += f", with a step above the critical one of {self.critical:.3g} s,"
         if code == Outcome.PENETRATION:
-            j, k, i, l = order[hinges[hinge]].tolist()  # noqa: E741
+            j, k, i, l = (int(order[v]) if 0 <= v < len(order) else None for v in hinges[hinge])  # noqa: E741
+            wings = f"wings {i}, {l}" if l is not None else f"wing {i}, the edge is clamped"
             self._stop(
-                f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} (wings "
-                f"{i}, {l}) jumped by more than pi; a fold law that locks (EnhancedLinear) or a "
-                "smaller step keeps panels apart",
+                f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} ({wings}) "
+                "jumped by more than pi; a fold law that locks (EnhancedLinear) or a smaller step "
+                "keeps panels apart",
                 PenetrationError,
             )
         if code == Outcome.STUCK:

@@ -6,7 +6,8 @@ motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free
 
     M z'' + C z' + K z = -(M t)_f (y'' + alpha y'),
 
-because a translation strains nothing: K t = 0, and so is what beta K0 makes of it. Rayleigh's
+because a translation strains nothing: K t = 0, and so is what beta K0 makes of it. (Springs that
+stand on the ground do resist it; their -K t (y + beta y') is added.) Rayleigh's
 alpha M damps the absolute motion, as air does, and therefore drags at the moving body; beta K0
 damps the strain. For one mass m on a spring k
 
@@ -18,8 +19,8 @@ the textbook formula with c = beta k where alpha = 0.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,7 +132,7 @@ def _forces(case: Case, parts: list[Force], amplitude: float) -> Drive:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FoldynWarning)
         try:
-            driven = Case(case.structure, case.supports, parts)
+            driven = replace(case, loads=parts)
         except InputError as error:
             raise InputError(str(error).replace("loads[", "drive[", 1)) from None
     for warning in caught:
@@ -169,25 +170,44 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     return Drive(amplitude, vector, amplitude * part.value, part.axis)
 
 
-def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
-    """Load (nf,) per unit of the drive: forces per N, or masses (kg) that the base accelerates."""
+class Term(NamedTuple):
+    """Part of the load per unit of a drive: a shape times a factor of frequency."""
+
+    shape: NDArray[np.float64]  # (nf,)
+    factor: Callable[[float], complex]  # of the angular frequency (rad/s)
+
+
+def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
+    """Load per unit of the drive: forces per N, or what a moving base does.
+
+    The base accelerates masses, and drags at them; springs that stand on the ground, which does
+    not move with it, hold back.
+    """
     if drive.axis is None:
-        load = drive.vector / drive.value
-    else:
-        load = np.zeros_like(drive.vector)
-        mass = system.case.nodal_mass
-        load[:, AXES.index(drive.axis)] = mass
+        return [Term(_on_free(system, drive.vector / drive.value), lambda omega: 1.0)]
+    axis, damping = AXES.index(drive.axis), system.case.damping
+    load = np.zeros_like(drive.vector)
+    load[:, axis] = system.case.nodal_mass
+    inertia = Term(
+        _on_free(system, load), lambda omega: omega**2 - 1j * omega * damping.alpha
+    )  # fmt: skip
+    springs = system.case.springs
+    held = np.zeros_like(drive.vector)
+    if springs is not None:
+        stands = springs.ends[:, 1] < 0
+        pull = springs.stiffness[stands] * springs.direction[stands, axis]
+        np.add.at(held, springs.ends[stands, 0], pull[:, None] * springs.direction[stands])
+    if not held.any():
+        return [inertia]
+    return [inertia, Term(_on_free(system, held), lambda omega: -1.0 - 1j * omega * damping.beta)]
+
+
+def _on_free(system: Linearized, vectors: NDArray) -> NDArray[np.float64]:
+    """Vectors (n, 3) on the free dofs (nf,)."""
     shape = np.zeros(len(system.free))
-    nodal = system.free < load.size
-    shape[nodal] = load.ravel()[system.free[nodal]]
+    nodal = system.free < vectors.size
+    shape[nodal] = vectors.ravel()[system.free[nodal]]
     return shape
-
-
-def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
-    """Factor on the shape of the load at an angular frequency (rad/s)."""
-    if drive.axis is None:
-        return 1.0
-    return omega**2 - 1j * omega * system.case.damping.alpha
 
 
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:

@@ -16,7 +16,7 @@ from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
 from foldyn.linear.eigen import Pencil, Spectrum, lowest
-from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
+from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
 from foldyn.values import whole
@@ -47,12 +47,13 @@ def direct(
     FoldynWarning
         There are such frequencies.
     """
-    shape = drive_shape(system, drive)
-    response = np.empty((len(frequency), len(shape)), np.complex128)
+    terms = drive_terms(system, drive)
+    response = np.zeros((len(frequency), len(system.free)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        solution = solve(dynamic_stiffness(system, omega), shape)
-        response[k] = solution * drive_factor(system, drive, omega)
+        for term in terms:
+            solution = solve(dynamic_stiffness(system, omega), term.shape)
+            response[k] += solution * term.factor(omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {}, {})
@@ -109,18 +110,20 @@ def modal(
     pencil = Pencil(system.stiffness, system.mass)
     count = pencil.finite if options.count is None else int(options.count)
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
-    shape = drive_shape(system, drive)
-    load = modes.shapes.T @ shape
     damping = modes.shapes.T @ (system.damping @ modes.shapes)
-    left = np.zeros(pencil.size)
-    if options.static_correction and count < pencil.finite:
-        left = _residual(pencil, modes, shape, load)
+    parts = []
+    for term in drive_terms(system, drive):
+        load, left = modes.shapes.T @ term.shape, np.zeros(pencil.size)
+        if options.static_correction and count < pencil.finite:
+            left = _residual(pencil, modes, term.shape, load)
+        parts.append((load, left, term.factor))
     noise = pencil.noise(modes.shapes)
-    response = np.empty((len(frequency), pencil.size), np.complex128)
+    response = np.zeros((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        q = _amplitudes(modes.values, noise, damping, omega, load)
-        response[k] = (modes.shapes @ q + left) * drive_factor(system, drive, omega)
+        for load, left, factor in parts:
+            q = _amplitudes(modes.values, noise, damping, omega, load)
+            response[k] += (modes.shapes @ q + left) * factor(omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     facts = {"modes": count, "static_correction": options.static_correction}

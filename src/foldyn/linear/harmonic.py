@@ -22,7 +22,7 @@ from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
-from foldyn.linear.excitation import Answer, Drive, drive_factor, drive_shape, warn_at
+from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness
 from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
@@ -89,14 +89,14 @@ def harmonic(
             "method",
         )
     hinges = _Hinges(system)
-    shape = drive_shape(system, drive)
-    response = np.full((len(frequency), len(shape)), np.nan, np.complex128)
+    terms = drive_terms(system, drive)
+    response = np.full((len(frequency), len(system.free)), np.nan, np.complex128)
     swing, spent = np.full(len(frequency), np.nan), 0
     done: list[tuple[float, NDArray]] = []
     converged = np.ones(len(frequency), bool)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        load = shape * (drive.value * drive_factor(system, drive, omega))
+        load = np.sum([term.shape * (drive.value * term.factor(omega)) for term in terms], axis=0)
         iteration = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
         motion, slope = iteration.solution(_ahead(done, float(f), hinges.reference))
         spent += iteration.iterations

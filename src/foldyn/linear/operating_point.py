@@ -72,7 +72,9 @@ def operating_point(
 def _equilibrium(case: Case) -> NDArray:
     """Displacement (n, 3) under the loads of a case in full, near its rest state."""
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
-    free = free_rigid_motions(case.structure.nodes, case.fixed.ravel()).shape[1] > 0
+    nodes, body = case.structure.nodes, case.body
+    holds = body.holds(np.zeros(body.size))
+    free = free_rigid_motions(nodes, case.fixed.ravel(), holds).shape[1] > 0
     with warnings.catch_warnings():  # the linearization itself warns of unstable motions
         warnings.filterwarnings("ignore", "the path loses stability", FoldynWarning)
         path = trace(case, "newton", factors, inertia_relief=free)

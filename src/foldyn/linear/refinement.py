@@ -77,7 +77,7 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
 def _frequencies(case: Case, structure: Any, count: int) -> NDArray[np.float64]:
     if structure.sheet.density is None:
         structure = replace(structure, sheet=replace(structure.sheet, density=1.0))
-    bare = Case(structure, case.supports)
+    bare = replace(case, structure=structure, loads=())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         found = modes(bare, count + 6)

@@ -14,7 +14,6 @@ from foldyn.cases import (
     Actuate,
     BaseMotion,
     Case,
-    Fix,
     Force,
     History,
     Impose,
@@ -92,7 +91,8 @@ class Rig:
 
     def _held(self) -> list[Support]:
         """Supports that stay where the state puts them; a base of the case's own stands still."""
-        held: list[Support] = [s for s in self.case.supports if isinstance(s, Fix)]
+        moving = (Impose, BaseMotion)
+        held: list[Support] = [s for s in self.case.supports if not isinstance(s, moving)]
         for support in self.case.supports:
             if isinstance(support, Impose):
                 nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")
@@ -107,7 +107,7 @@ class Rig:
             loads += forces(self.drive.vector, history)
         else:
             supports.append(BaseMotion(self.drive.axis, history, self.drive.value))
-        return Case(self.case.structure, supports, loads, self.case.damping)
+        return replace(self.case, supports=supports, loads=loads)
 
     def run(
         self,

@@ -95,7 +95,7 @@ class Body(ABC):
     size: int
     rows: int
     hidden: NDArray = np.zeros(0, np.int64)
-    energy_groups: ClassVar[tuple[str, ...]]
+    energy_groups: tuple[str, ...]
     has_discrete_gradient: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ mechanics
@@ -153,6 +153,10 @@ class Body(ABC):
     def longest(self) -> float:
         """Length (m) of the longest bar or side; the extent of the nodes where there is none."""
 
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """Unit rows (s, m) of what keeps it in place beside supports: motions along them strain."""
+        return sparse.csr_array((0, self.size))
+
     def turning_moments(self) -> float:
         """Sum of the hinges' moments (N m) for a turn of one."""
         return 0.0
@@ -206,6 +210,14 @@ def largest_turn(largest: float, before: NDArray, after: NDArray) -> float:
     if hinges > math.pi or not np.isfinite(hinges + largest):
         return math.inf
     return max(largest, hinges)
+
+
+def unit_rows(nodes: NDArray, entries: NDArray, size: int) -> sparse.csr_array:
+    """Rows (s, size) of norm one with entries (s, 3k) at the dofs of nodes (s, k)."""
+    columns = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), entries.shape[1])
+    row = np.repeat(np.arange(len(nodes)), columns.shape[1])
+    unit = entries / np.linalg.norm(entries, axis=1, keepdims=True)
+    return sparse.csr_array((unit.ravel(), (row, columns.ravel())), (len(nodes), size))
 
 
 class Numbering(NamedTuple):

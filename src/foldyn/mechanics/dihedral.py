@@ -151,3 +151,18 @@ def add_hessian(points, gradient, moment, block):
             block[0, q, 0, p] -= jk
             block[0, p, 0, q] -= ij + lj
             block[1, p, 1, q] -= jk + ik + lk
+
+
+@scalar
+def carry_wing(block):
+    """Give what a block (4, 3, 4, 3) has at its last node to the first two, half to each."""
+    for row in range(2):
+        for a in range(3):
+            for w in range(4):
+                for b in range(3):
+                    block[row, a, w, b] += 0.5 * block[3, a, w, b]
+    for v in range(3):
+        for a in range(3):
+            for column in range(2):
+                for b in range(3):
+                    block[v, a, column, b] += 0.5 * block[v, a, 3, b]

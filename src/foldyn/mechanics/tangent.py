@@ -48,6 +48,19 @@ def sparsity(model: BarsHinges) -> Sparsity:
     )
 
 
+def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
+    """Pattern with further blocks too, by their numbers as `block_keys` has them."""
+    rows, own = len(pattern.indptr) - 1, block_keys(pattern.indptr, pattern.indices)
+    both = np.union1d(own, more)
+    moved = np.searchsorted(both, own)
+    return Sparsity(
+        np.searchsorted(both // rows, np.arange(rows + 1)).astype(np.int32),
+        (both % rows).astype(np.int32),
+        moved[pattern.bar_slots],
+        moved[pattern.hinge_slots],
+    )
+
+
 @scalar
 def add_to_bar(data, slots, e, p, q, value):
     """Add an entry (p, q) to the blocks of both ends of a bar, and its negative between them."""

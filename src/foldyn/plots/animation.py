@@ -148,7 +148,7 @@ def _center_path(sheet: Sheet3D, moving: Points) -> Points | None:
     """Return the positions (frames, 3) of a free body's center of mass, None where it stays."""
     if sheet.case is None or np.asarray(sheet.case.fixed).any():
         return None
-    mass = sheet.structure.nodal_mass
+    mass = sheet.case.nodal_mass
     path = np.einsum("n,fnk->fk", mass / mass.sum(), moving)
     return path if np.linalg.norm(np.ptp(path, axis=0)) > _TRAVELS * sheet.size else None
 

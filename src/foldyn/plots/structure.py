@@ -221,7 +221,7 @@ def _arrows(
 
 def _center_of_mass(sheet: Sheet3D, points: Points) -> Points:
     """Return the center (3,) of the nodes' masses at these positions (n, 3)."""
-    mass = sheet.structure.nodal_mass
+    mass = sheet.case.nodal_mass
     return mass @ points / mass.sum()
 
 

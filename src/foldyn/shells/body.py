@@ -13,10 +13,17 @@ from scipy.sparse.linalg import splu
 from foldyn import mechanics
 from foldyn.errors import ComputationError, InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, SoftHinges, largest_turn
+from foldyn.mechanics.body import Body, SoftHinges, largest_turn, unit_rows
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
-from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
+from foldyn.shells.kernels import (
+    ShellModel,
+    ShellWork,
+    fold,
+    shell_energy,
+    shell_force,
+    shell_work,
+)
 from foldyn.shells.tangent import (
     ShellPattern,
     add_extrapolated_strain,
@@ -121,9 +128,23 @@ class ShellBody(Body):
 
     def angles(self, q: NDArray) -> NDArray:
         """See `Body`."""
-        x = self.model.rest.copy()
-        x[: self.model.nodes] += self._split(q)[0]
-        return mechanics.angles(x, self.model.hinges.astype(np.uint32))
+        model, u = self.model, self._split(q)[0]
+        x = model.rest.copy()
+        x[: model.nodes] += u
+        for j, k, _, wing in model.hinges[model.hinges[:, 3] >= model.nodes].tolist():
+            x[wing] += 0.5 * (u[j] + u[k])
+        return mechanics.angles(x, model.hinges.astype(np.uint32))
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Body`: clamped edges as they turn."""
+        model, (u, x) = self.model, self._split(np.append(q, np.zeros(self.size - len(q))))
+        rows = np.flatnonzero(model.hinges[:, 3] >= model.nodes)
+        work = shell_work(model)
+        if len(rows):
+            fold(model, u, x, work)
+        turns = work.gradient[rows]
+        turns[:, :6] += 0.5 * np.tile(turns[:, 9:], (1, 2))
+        return unit_rows(model.hinges[rows, :3], turns[:, :9], self.size)
 
     def turn(self, q: NDArray, other: NDArray) -> float:
         """Largest turn of a triangle's side, of a hinge or of a fold; inf on penetration."""

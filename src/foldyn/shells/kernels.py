@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -22,12 +22,12 @@ from foldyn.mechanics.threads import Team, team
 
 
 class ShellModel(NamedTuple):
-    """Arrays of a shell: n nodes, g fixed wings, nt triangles, nh hinges, c pieces of creases."""
+    """Arrays of a shell: n nodes, g wings, nt triangles, nh hinges, c pieces of creases."""
 
     nodes: int  # n
     rotations: int  # r
     per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
-    rest: NDArray  # (n + g, 3) from the mean of the nodes, m
+    rest: NDArray  # (n + g, 3) from the mean of the nodes, m; wings ride on their sides' ends
     triangles: NDArray  # (nt, 3)
     side: NDArray  # (nt, 3, 3) rest vectors of the sides, m
     per_length2: NDArray  # (nt, 3) 1 / L^2
@@ -74,16 +74,24 @@ def shell_work(model: ShellModel) -> ShellWork:
     )  # fmt: skip
 
 
+@scalar
+def moved(model, u, e, v, c):
+    """Displacement (m) along axis c of node v of hinge e, the mean of j and k for a wing."""
+    node = model.hinges[e, v]
+    if node < u.shape[0]:
+        return u[node, c]
+    return 0.5 * (u[model.hinges[e, 0], c] + u[model.hinges[e, 1], c])
+
+
 @kernel
 def fold(model, u, x, work):
     """Dihedrals, their gradients and the dihedrals of the creases at a state."""
-    rest, n = model.rest, u.shape[0]
+    rest = model.rest
     p = np.empty(12)
     for e in range(model.hinges.shape[0]):
         for v in range(4):
-            node = model.hinges[e, v]
             for c in range(3):
-                p[3 * v + c] = rest[node, c] + (u[node, c] if node < n else 0.0)
+                p[3 * v + c] = rest[model.hinges[e, v], c] + moved(model, u, e, v, c)
         found = dihedral_gradient(
             p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
         )
@@ -181,9 +189,13 @@ def shell_force(model, u, x, force, couple, work):
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]
-            if node < n:
-                for c in range(3):
-                    force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+            for c in range(3):
+                pull = work.moment[h] * work.gradient[h, 3 * v + c]
+                if node < n:
+                    force[node, c] += pull
+                else:
+                    force[model.hinges[h, 0], c] += 0.5 * pull
+                    force[model.hinges[h, 1], c] += 0.5 * pull
 
 
 @overload(force_of, inline="always")

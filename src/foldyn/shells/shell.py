@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,13 +17,14 @@ from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, edge_lookup
+from foldyn.patterns.topology import Edge
 from foldyn.shells.body import GROUPS, ShellBody
 from foldyn.shells.kernels import ShellModel
 from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_sheet
+from foldyn.structures.clamps import clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
@@ -290,8 +290,8 @@ def shell(
     fold_law, crease_stiffness, crease_rest
         As in `discretize`.
     clamped : sequence of (vertex, vertex)
-        Boundary edges along which the sheet keeps its rest tangent in space; their nodes need a
-        support of their own.
+        Boundary edges along which the sheet keeps its rest tangent in space, wherever they are
+        moved; their nodes need a support of their own.
 
     Returns
     -------
@@ -314,7 +314,7 @@ def shell(
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
-    edges = _clamped(clamped, pattern)
+    edges = clamped_edges(clamped, pattern)
     options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
     check_memory(
@@ -336,15 +336,3 @@ def shell(
         sheet=sheet,
         options=options,
     ).marked()
-
-
-def _clamped(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
-    boundary = edge_lookup(pattern.boundary)
-    try:
-        pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
-    except TypeError:
-        why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
-        raise InputError(why, "clamped") from None
-    if inner := [pair for pair in pairs if pair not in boundary]:
-        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", "clamped")
-    return tuple((pair[0], pair[1]) for pair in pairs)

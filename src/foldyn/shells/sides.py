@@ -16,7 +16,8 @@ On a side shared by two triangles of one panel the sheet is smooth: with d the c
 dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a rotation without mass. On a
 crease each side has a rotation of its own, and the crease turns by what is left of the dihedral,
 d - x - y. Free sides have no moment: their rotation is eliminated in the triangle. A clamped side
-keeps its rest tangent in space: its hinge has a wing that does not move.
+keeps its rest tangent in space: its hinge has a wing that is no node and rides on the mean
+displacement of the side's ends.
 """
 
 from __future__ import annotations
@@ -32,16 +33,17 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.shells.mesh import ShellMesh
 from foldyn.structures import Sheet
+from foldyn.structures.clamps import mirrored
 
 
 class Sides(NamedTuple):
-    """nt triangles with nh hinges, x rotations, c pieces of creases and g fixed wings.
+    """nt triangles with nh hinges, x rotations, c pieces of creases and g wings of clamped sides.
 
     Side k of a triangle runs from its corner k to k + 1; its rotation is
     beta = weight d[hinge] + sign x[rotation], where there is a hinge or a rotation (else -1).
     """
 
-    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; nodes from n on are fixed wings
+    hinges: NDArray  # (nh, 4) axis j, k, wings i, l; nodes from n on are wings that ride
     hinge: NDArray  # (nt, 3)
     weight: NDArray  # (nt, 3)
     rotation: NDArray  # (nt, 3)
@@ -91,7 +93,7 @@ def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> 
         hinge[k], weight[k] = len(numbers) + len(wings), 1.0
         row = (a[k], b[k], third[k], n + len(wings))
         hinges.append(np.array([row]))
-        wings.append(_mirrored(mesh.nodes[[a[k], b[k], third[k]]]))
+        wings.append(mirrored(mesh.nodes[[a[k], b[k], third[k]]]))
     free = np.zeros(3 * count, bool)
     free[alone] = True
     free[stiff] = False
@@ -114,13 +116,6 @@ def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> 
 def _pieces(points: list[int]) -> list[Edge]:
     """Pairs (low, high) of neighbors along an edge."""
     return [edge_of(a, b) for a, b in pairwise(points)]
-
-
-def _mirrored(corners: NDArray) -> NDArray:
-    """Third corner of a triangle, mirrored at its first side in its own plane."""
-    a, b, c = corners
-    foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))
-    return 2.0 * foot - c
 
 
 def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:

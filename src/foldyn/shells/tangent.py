@@ -15,8 +15,15 @@ from scipy import sparse
 
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.materials.switch import hinge_moment, hinge_slope
-from foldyn.mechanics.dihedral import add_hessian
-from foldyn.shells.kernels import ShellModel, fold, shell_work, side_rotations, side_strains
+from foldyn.mechanics.dihedral import add_hessian, carry_wing
+from foldyn.shells.kernels import (
+    ShellModel,
+    fold,
+    moved,
+    shell_work,
+    side_rotations,
+    side_strains,
+)
 
 
 class ShellPattern(NamedTuple):
@@ -189,6 +196,11 @@ def _add_triangles(model, pattern, u, x, work, data):
                     at = 3 * pattern.corner[t, k, v]
                     for c in range(3):
                         bend[k, at + c] = weight * work.gradient[h, 3 * v + c]
+                if model.hinges[h, 3] >= model.nodes:  # a wing rides on the ends of its side
+                    for v in range(2):
+                        at = 3 * pattern.corner[t, k, v]
+                        for c in range(3):
+                            bend[k, at + c] += 0.5 * weight * work.gradient[h, 9 + c]
             if model.rotation[t, k] >= 0:
                 bend[k, 18 + k] = model.sign[t, k] * model.per_reach
         _membrane(model, t, e, gap, block)
@@ -200,12 +212,13 @@ def _add_triangles(model, pattern, u, x, work, data):
 def _curvature(model, u, work, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):
-        node = model.hinges[h, v]
         for c in range(3):
-            points[v, c] = model.rest[node, c] + (u[node, c] if node < u.shape[0] else 0.0)
+            points[v, c] = model.rest[model.hinges[h, v], c] + moved(model, u, h, v, c)
             gradient[v, c] = work.gradient[h, 3 * v + c]
     out[:] = 0.0
     add_hessian(points, gradient, work.moment[h], out)
+    if model.hinges[h, 3] >= model.nodes:
+        carry_wing(out)
 
 
 @kernel

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import qr
 
 from foldyn.cases import Case
@@ -35,26 +36,34 @@ def rigid_motions(x: NDArray) -> NDArray:
     return motions.reshape(-1, 6)
 
 
-def free_rigid_motions(x: NDArray, held: NDArray) -> NDArray:
-    """Rigid motions (3n, r) of points x (n, 3) that leave the dofs of the mask held (3n,) still."""
+def free_rigid_motions(x: NDArray, held: NDArray, holds: sparse.csr_array | None = None) -> NDArray:
+    """Rigid motions (3n, r) of points x (n, 3) that leave the dofs of the mask held (3n,) still.
+
+    holds : what else keeps them in place, see `Body.holds`.
+    """
     motions = rigid_motions(x)
-    return motions @ _free_space(motions, held)
+    return motions @ _free_space(motions, held, holds)
 
 
-def _free_space(motions: NDArray, held: NDArray) -> NDArray:
+def _free_space(motions: NDArray, held: NDArray, holds: sparse.csr_array | None) -> NDArray:
     """Combinations (6, r) of the rigid motions that leave held dofs still, but not everything."""
-    _, values, right = np.linalg.svd(np.linalg.qr(motions[held], mode="r"))
-    rank = int((values > FREE * np.sqrt(held.sum())).sum())
+    still = motions[held]
+    if holds is not None and holds.shape[0]:
+        still = np.concatenate([still, holds[:, : len(motions)] @ motions])
+    _, values, right = np.linalg.svd(np.linalg.qr(still, mode="r"))
+    rank = int((values > FREE * np.sqrt(len(still))).sum())
     space = right[rank:].T
     # points on a line stand still as it turns about itself
     _, values, right = np.linalg.svd(motions @ space, full_matrices=False)
     return space @ right[values > FREE * np.sqrt(len(motions))].T
 
 
-def name_rigid_motions(x: NDArray, held: NDArray) -> list[str]:
+def name_rigid_motions(
+    x: NDArray, held: NDArray, holds: sparse.csr_array | None = None
+) -> list[str]:
     """Free rigid motions in words, such as "translation along x" and "rotation about y"."""
     motions = rigid_motions(x)
-    space = _free_space(motions, held)
+    space = _free_space(motions, held, holds)
     if not space.size:
         return []
     left, values, right = np.linalg.svd(space[3:])
@@ -95,6 +104,7 @@ class Relief:
 
     def __init__(self, case: Case, start: NDArray) -> None:
         self._nodes, self._held = case.structure.nodes, case.fixed.ravel()
+        self._body = case.body
         try:
             self._mass = case.mass
         except InputError as error:
@@ -113,7 +123,7 @@ class Relief:
         self.pins = np.sort(free[order[: self._count]])
 
     def _motions(self, u: NDArray) -> NDArray:
-        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held)
+        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held, self._body.holds(u))
 
     def inertia(self, u: NDArray, force: NDArray) -> NDArray:
         """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
+from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
@@ -37,6 +38,7 @@ def discretize(
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
+    clamped: Sequence[Sequence[int]] = (),
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
@@ -62,6 +64,9 @@ def discretize(
         Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
+    clamped : sequence of (vertex, vertex)
+        Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
+        their nodes need a support of their own. See `foldyn.structures.clamps`.
 
     Returns
     -------
@@ -81,8 +86,9 @@ def discretize(
     [0.0639]
     """
     check_kinds(pattern, sheet)
+    edges = clamped_edges(clamped, pattern)
     options = ModelOptions(
-        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest
+        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest, edges
     )
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
@@ -99,6 +105,7 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
 
     x = mesh.nodes
+    clamps = clamp_rows(edges, mesh.triangles)
     return Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
@@ -115,6 +122,8 @@ def discretize(
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,
+        clamps=clamps,
+        clamp_stiffness=clamp_stiffness(x, clamps, sheet),
     ).marked()
 
 

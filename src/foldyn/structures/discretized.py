@@ -15,7 +15,7 @@ from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, hinge_law
 from foldyn.mechanics.body import Body
-from foldyn.structures.mass import Surface
+from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
@@ -113,12 +113,12 @@ class Discretized:
     @cached_property
     def nodal_mass(self) -> NDArray:
         """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
-        return read_only(np.asarray(self.mass.sum(axis=1)).ravel())
+        return read_only(row_sums(self.mass))
 
     @cached_property
     def center_of_mass(self) -> NDArray:
         """Center of mass (3,) at rest, m."""
-        return read_only(self.nodal_mass @ self.nodes / self.total_mass)
+        return read_only(center_of_mass(self.nodes, self.mass))
 
     @cached_property
     def inertia(self) -> NDArray:
@@ -127,9 +127,7 @@ class Discretized:
         With the consistent rule it is that of the panels themselves; lumped ones differ, see the
         page on mass rules.
         """
-        arm = self.nodes - self.center_of_mass
-        second = arm.T @ (self.mass @ arm)
-        return read_only(np.trace(second) * np.eye(3) - second)
+        return read_only(inertia_tensor(self.nodes, self.mass))
 
     @property
     def coarser(self) -> Discretized | None:

@@ -249,6 +249,23 @@ MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
 }
 
 
+def row_sums(mass: sparse.csr_array) -> NDArray:
+    """Mass (n,) that moves with each node, kg, of a nodal matrix (n, n)."""
+    return np.asarray(mass.sum(axis=1)).ravel()
+
+
+def center_of_mass(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
+    """Center (3,) of a nodal mass matrix (n, n) on nodes (n, 3), m."""
+    return row_sums(mass) @ nodes / float(mass.sum())
+
+
+def inertia_tensor(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
+    """Inertia tensor (3, 3) about its center, kg m2."""
+    arm = nodes - center_of_mass(nodes, mass)
+    second = arm.T @ (mass @ arm)
+    return np.trace(second) * np.eye(3) - second
+
+
 def rotational_inertia(mass: sparse.csr_array, nodes: NDArray, start: int, end: int) -> float:
     """Moment of inertia (kg m2) of a mass matrix about the line through two nodes."""
     axis = nodes[end] - nodes[start]

@@ -14,8 +14,12 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
+from foldyn.mechanics.attached_body import attached
+from foldyn.mechanics.body import Body
 from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Edge
 from foldyn.structures.body import GROUPS, BarsHingesBody
+from foldyn.structures.clamps import clamps
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
@@ -42,6 +46,7 @@ class ModelOptions:
     calibration: Literal["standard", "merlin2"] = "standard"
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
+    clamped: tuple[Edge, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -73,6 +78,8 @@ class Structure(Discretized):
         Triangles, counter-clockwise from the front, and the panel of each.
     centers : (np,)
         Node number of each panel's center, -1 without one.
+    clamps, clamp_stiffness : (c, 3), (c,)
+        Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
     pattern, sheet, options
         What it was made from.
     """
@@ -93,6 +100,8 @@ class Structure(Discretized):
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
     node_mass: NDArray | None = None
+    clamps: NDArray = field(default_factory=lambda: _none(3))
+    clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -127,9 +136,13 @@ class Structure(Discretized):
         )
 
     @cached_property
-    def body(self) -> BarsHingesBody:
+    def body(self) -> Body:
         """What solvers take."""
-        return BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+        body = BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+        if not len(self.clamps):
+            return body
+        bends = tuple(GROUPS).index("strain_bends")
+        return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
 
     @cached_property
     def hinge_of_fold(self) -> NDArray:

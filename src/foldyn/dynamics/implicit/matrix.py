@@ -20,7 +20,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.tangent import Sparsity, block_keys
+from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 
 
 class Weights(NamedTuple):
@@ -65,13 +65,14 @@ class StepMatrix:
         self.blocks = packed.body.blocks()
         nodes = system.rows
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
-        self.pattern, where = _with_mass(self.blocks.pattern, nodal)
+        masses_at = block_keys(nodal.indptr, nodal.indices)
+        self.pattern = joined(self.blocks.pattern, masses_at)
+        own = block_keys(self.pattern.indptr, self.pattern.indices)
         shape = (len(self.pattern.indices), 3, 3)
         self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
-        masses[where] = nodal.data[:, None, None] * np.eye(3)
+        masses[np.searchsorted(own, masses_at)] = nodal.data[:, None, None] * np.eye(3)
         damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
         damping.sort_indices()
-        own = block_keys(self.pattern.indptr, self.pattern.indices)
         viscous[np.searchsorted(own, block_keys(damping.indptr, damping.indices))] = damping.data
         self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
@@ -168,20 +169,6 @@ class _Sparse:
         _gather(weights, matrices, self._take, put, data)
         shape = (self._size, self._size)
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
-
-
-def _with_mass(pattern: Sparsity, nodal: sparse.csr_array) -> tuple[Sparsity, NDArray]:
-    """Pattern with the entries of a nodal matrix too, and where these stand."""
-    nodes = nodal.shape[0]
-    own, other = (block_keys(each.indptr, each.indices) for each in (pattern, nodal))
-    both = np.union1d(own, other)
-    moved = np.searchsorted(both, own)
-    return Sparsity(
-        np.searchsorted(both // nodes, np.arange(nodes + 1)).astype(np.int32),
-        (both % nodes).astype(np.int32),
-        moved[pattern.bar_slots],
-        moved[pattern.hinge_slots],
-    ), np.searchsorted(both, other)
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -1,0 +1,60 @@
+"""Point masses: what nodes carry beside the mass of the sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.selection import check_nodes, resolve_nodes
+from foldyn.errors import InputError
+from foldyn.values import brief, number, show
+
+
+@brief
+@dataclass(frozen=True)
+class PointMass(Part):
+    """The same mass on each of some nodes, without a size of its own.
+
+    It moves with its node along x, y and z: in motions, modes, frequency responses, gravity and
+    inertia relief.
+
+    Parameters
+    ----------
+    nodes : int, sequence of int, or str
+        Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
+    mass : float
+        Mass (kg) on each of these nodes, above 0.
+    """
+
+    nodes: int | str | Sequence[int]
+    mass: float
+
+    keys = {"nodes": "nodes", "mass": "mass"}
+    missing = {"mass": "give the mass (kg) on each of these nodes"}
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        object.__setattr__(self, "mass", number("mass", self.mass, above=0.0, unit="kg"))
+
+
+def nodal_masses(masses: Sequence[PointMass], structure: Any) -> NDArray[np.float64]:
+    """Sum (n,) of point masses on each node, kg."""
+    total = np.zeros(len(structure.nodes))
+    for i, part in enumerate(masses):
+        total[resolve_nodes(structure, part.nodes, f"masses[{i}].nodes")] += part.mass
+    return total
+
+
+def mass_from(table: Any, folder: Path | None = None) -> PointMass:
+    """Point mass from its table in a case file; see `Part.of`."""
+    if not isinstance(table, Mapping):
+        raise InputError(f" = {show(table)}: must be a table")
+    check_keys(table, PointMass.keys)
+    return PointMass.of(table, folder)

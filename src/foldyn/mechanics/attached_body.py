@@ -1,0 +1,298 @@
+"""A body with springs and clamped edges, as solvers see it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.attached import (
+    Attached,
+    AttachedWork,
+    Clamps,
+    Springs,
+    add_clamp_forces,
+    add_spring_forces,
+    axial_blocks,
+    clamp_angles,
+    clamp_blocks,
+    clamp_energy,
+    no_clamps,
+    no_springs,
+    spring_energy,
+)
+from foldyn.mechanics.body import Blocks, Body, SoftHinges, Unstrained, largest_turn, unit_rows
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+
+GROUP = "strain_springs"
+BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
+def attached(body: Body, clamps: Clamps | None = None, springs: Springs | None = None) -> Body:
+    """A body with clamps or springs in addition to its own clamps."""
+    inner = body
+    if isinstance(body, AttachedBody):
+        inner, clamps = body.inner, body.clamps if clamps is None else clamps
+    return AttachedBody(inner, clamps or no_clamps(), springs or no_springs())
+
+
+class AttachedBody(Body):
+    """A body with springs and clamped edges; see `mechanics.body.Body`.
+
+    Parameters
+    ----------
+    inner : Body
+    clamps, springs
+        See `mechanics.attached`. Springs have a group of energy of their own, if there are any.
+    """
+
+    def __init__(self, inner: Body, clamps: Clamps, springs: Springs) -> None:
+        self.inner, self.clamps, self.springs = inner, clamps, springs
+        self.size, self.rows, self.hidden = inner.size, inner.rows, inner.hidden
+        sprung = len(springs.stiffness) + len(springs.axial_stiffness) > 0
+        self.energy_groups = (*inner.energy_groups, *([GROUP] if sprung else []))
+        self.model = Attached(inner.model, clamps, springs, len(inner.energy_groups))
+
+    def _with(self, inner: Body, clamps: Clamps | None = None) -> AttachedBody:
+        return AttachedBody(inner, self.clamps if clamps is None else clamps, self.springs)
+
+    def _nodal(self, q: NDArray) -> NDArray:
+        """Displacements (n, 3) of the nodes."""
+        nodes = self.size - len(self.hidden)
+        return np.ascontiguousarray(q, float).reshape(-1)[:nodes].reshape(-1, 3)
+
+    def _added(self, force: NDArray) -> NDArray:
+        """A vector (m,) of forces on nodes (n, 3)."""
+        return np.concatenate([force.ravel(), np.zeros(len(self.hidden))])
+
+    def dofs(self, displacement: NDArray) -> NDArray:
+        """See `Body`."""
+        return self.inner.dofs(displacement)
+
+    def energies(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        u, inner = self._nodal(q), self.inner.energies(q)
+        out = np.concatenate([inner, np.zeros(len(self.energy_groups) - len(inner))])
+        if len(self.clamps.rest):
+            out[self.clamps.group] += clamp_energy(self.clamps, u)
+        out[len(inner) :] = spring_energy(self.springs, u)
+        return out
+
+    def internal(self, q: NDArray, work: AttachedWork | None = None) -> NDArray:
+        """See `Body`."""
+        u = self._nodal(q)
+        force, angle = np.zeros_like(u), np.empty(len(self.clamps.rest))
+        add_clamp_forces(self.clamps, u, force, angle)
+        add_spring_forces(self.springs, u, force)
+        return self.inner.internal(q, work.inner if work else None) + self._added(force)
+
+    def hinge_forces(self, q: NDArray, work: AttachedWork | None = None) -> NDArray:
+        """See `Body`."""
+        u = self._nodal(q)
+        force, angle = np.zeros_like(u), np.empty(len(self.clamps.rest))
+        add_clamp_forces(self.clamps, u, force, angle)
+        return self.inner.hinge_forces(q, work.inner if work else None) + self._added(force)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Body`."""
+        return self._plus(self.inner.tangent(q, floor), self.blocks_at(q))
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `Body`."""
+        return self._plus(self.inner.step_tangent(q, before), self.blocks_at(q))
+
+    def blocks(self) -> AttachedBlocks:
+        """See `Body`."""
+        return AttachedBlocks(self.inner.blocks(), self.pairs, self.rows)
+
+    @cached_property
+    def _ends(self) -> tuple[NDArray, NDArray]:
+        """Ends (s, 2) of all springs, directed and axial, and which of them stand on the ground."""
+        ends = np.concatenate([self.springs.ends, self.springs.axial_ends])
+        return ends, ends[:, 1] < 0
+
+    @cached_property
+    def pairs(self) -> NDArray:
+        """Rows and columns (k, 2) of the nodes that `blocks_at` couples."""
+        ends, grounded = self._ends
+        pairs = [np.repeat(ends[grounded, :1], 2, axis=1)]
+        for nodes in (ends[~grounded], self.clamps.nodes):
+            count = nodes.shape[1]
+            rows, columns = np.repeat(nodes, count, axis=1), np.tile(nodes, (1, count))
+            pairs.append(np.stack([rows, columns], axis=2).reshape(-1, 2))
+        return np.concatenate(pairs)
+
+    def blocks_at(self, q: NDArray, loose: bool = False) -> NDArray:
+        """Tangent (k, 3, 3), N/m, of springs and clamps, block by block of `pairs`.
+
+        loose : without the forces of axial springs.
+        """
+        springs, grounded = self._springs_at(q, loose), self._ends[1]
+        return np.concatenate(
+            [
+                springs[grounded],
+                np.einsum("ij,sab->sijab", BETWEEN, springs[~grounded]).reshape(-1, 3, 3),
+                clamp_blocks(self.clamps, self._nodal(q)).reshape(-1, 3, 3),
+            ]
+        )
+
+    def _springs_at(self, q: NDArray, loose: bool) -> NDArray:
+        """Stiffness (s, 3, 3), N/m, of all springs against motions of one end."""
+        stiffness, direction = self.springs.stiffness, self.springs.direction
+        along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
+        return np.concatenate([along, axial_blocks(self.springs, self._nodal(q), loose)])
+
+    def _plus(self, matrix: sparse.csr_array, blocks: NDArray) -> sparse.csr_array:
+        """A matrix (m, m) with blocks of `pairs` added to it."""
+        return sparse.csr_array(matrix + _assembled(self.pairs, blocks, self.size))
+
+    def workspaces(self, threads: int) -> Sequence[AttachedWork]:
+        """See `Body`: one thread."""
+        inner = self.inner.workspaces(1)[0]
+        count = len(inner.angle)
+        angle = np.empty(count + len(self.clamps.rest))
+        fold_angle = angle[:count] if inner.fold_angle is inner.angle else inner.fold_angle
+        inner = inner._replace(angle=angle[:count], fold_angle=fold_angle)
+        return [AttachedWork(inner, angle, fold_angle, inner.strips, inner.team)]
+
+    # ------------------------------------------------------------------ measures
+    def angles(self, q: NDArray) -> NDArray:
+        """See `Body`: those of the model, then of the clamps."""
+        own = clamp_angles(self.clamps, self._nodal(q))[0]
+        return np.concatenate([self.inner.angles(q), own])
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """See `Body`."""
+        before, after = (clamp_angles(self.clamps, self._nodal(state))[0] for state in (q, other))
+        return largest_turn(self.inner.turn(q, other), before, after)
+
+    def scale(self) -> NDArray:
+        """See `Body`; axial springs count as bars do."""
+        nodal, springs = np.zeros((self.size - len(self.hidden)) // 3), self.springs
+        np.add.at(nodal, springs.axial_ends, (springs.axial_stiffness * springs.length)[:, None])
+        return self.inner.scale() + self._added(np.repeat(nodal, 3))
+
+    def longest(self) -> float:
+        """See `Body`."""
+        return self.inner.longest()
+
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Body`: directed springs along their directions, clamps as they turn."""
+        ends, direction = self.springs.ends, self.springs.direction
+        grounded = ends[:, 1:] < 0
+        entries = np.concatenate([direction, np.where(grounded, 0.0, -direction)], axis=1)
+        springs = unit_rows(np.where(grounded, ends[:, :1], ends), entries, self.size)
+        turns = clamp_angles(self.clamps, self._nodal(q))[1]
+        clamps = unit_rows(self.clamps.nodes, turns, self.size)
+        return sparse.csr_array(sparse.vstack([self.inner.holds(q), springs, clamps]))
+
+    def turning_moments(self) -> float:
+        """See `Body`."""
+        return self.inner.turning_moments() + float(self.clamps.stiffness.sum())
+
+    def soft_hinges(self, q: NDArray) -> SoftHinges:
+        """See `Body`."""
+        return self.inner.soft_hinges(q)
+
+    def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
+        """See `Body`."""
+        return self.inner.soft_tangent(q, slope)
+
+    # ------------------------------------------------------------------ folds
+    @property
+    def fold_rest(self) -> NDArray:
+        """See `Body`."""
+        return self.inner.fold_rest
+
+    def folded(self, rest: NDArray) -> AttachedBody:
+        """See `Body`."""
+        return self._with(self.inner.folded(rest))
+
+    def actuated(self, folds: NDArray) -> tuple[AttachedBody, NDArray, NDArray]:
+        """See `Body`."""
+        inner, rows, place = self.inner.actuated(folds)
+        return self._with(inner), rows, place
+
+    def turned(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.inner.turned()
+
+    # ------------------------------------------------------------------ other bodies
+    def renumbered(self) -> tuple[AttachedBody, NDArray]:
+        """See `Body`."""
+        inner, order = self.inner.renumbered()
+        rank = np.append(ranks(order), -1)  # that of the ground, which is -1, stays
+        springs = self.springs._replace(
+            ends=rank[self.springs.ends], axial_ends=rank[self.springs.axial_ends]
+        )
+        clamps = self.clamps._replace(nodes=rank[self.clamps.nodes])
+        return AttachedBody(inner, clamps, springs), order
+
+    def nominal(self, q: NDArray) -> AttachedBody:
+        """See `Body`."""
+        angle = clamp_angles(self.clamps, self._nodal(q))[0]
+        return self._with(self.inner.nominal(q), self.clamps._replace(rest=angle))
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """See `Body`."""
+        inner = self.inner.unstrained(q)
+        if inner is None:
+            return None
+        blocks = self.nominal(q).blocks_at(q, loose=True)
+        clamps = blocks.copy()
+        clamps[: len(blocks) - 9 * len(self.clamps.rest)] = 0.0
+        return Unstrained(
+            self._plus(inner.tangent, blocks),
+            self._plus(inner.hinges, clamps),
+            partial(self._stretch, inner.stretch, self._springs_at(q, True)),
+        )
+
+    def _stretch(self, bars: Any, springs: NDArray, motion: NDArray) -> float:
+        """As `Unstrained.stretch`: of bars or of springs (s, 3, 3), whichever is larger."""
+        (ends, grounded), u = self._ends, self._nodal(motion)
+        first, second = u[ends[:, 0]], np.where(grounded[:, None], 0.0, u[ends[:, 1]])
+        apart, most = first - second, np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1)
+        energy = float(np.einsum("sa,sab,sb->", apart, springs, apart))
+        whole = float((np.linalg.norm(springs, axis=(1, 2)) * most**2).sum())
+        return max(bars(motion), np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0)
+
+
+def _assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
+    """Matrix (size, size) of 3x3 blocks at pairs (k, 2) of nodes."""
+    axis = np.arange(3)
+    row = np.broadcast_to(3 * pairs[:, 0, None, None] + axis[:, None], blocks.shape)
+    column = np.broadcast_to(3 * pairs[:, 1, None, None] + axis, blocks.shape)
+    entries = (blocks.ravel(), (row.ravel(), column.ravel()))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+
+
+class AttachedBlocks:
+    """Blocks of a body with springs and clamps; see `mechanics.body.Blocks`."""
+
+    def __init__(self, inner: Blocks, pairs: NDArray, rows: int) -> None:
+        self._inner, self._keys = inner, pairs[:, 0] * rows + pairs[:, 1]
+        self.pattern = joined(inner.pattern, self._keys)
+        self.order, self.unused = inner.order, inner.unused
+
+    def put(
+        self, body: AttachedBody, pattern: Sparsity, u: NDArray, before: NDArray, again: bool,
+        out: NDArray,
+    ) -> None:  # fmt: skip
+        """See `Blocks`."""
+        self._inner.put(body.inner, pattern, u, before, again, out)
+        np.add.at(out, self._places(pattern), body.blocks_at(u))
+
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`."""
+        filled = self._inner.filled(pattern)
+        filled[self._places(pattern)] = True
+        return filled
+
+    def _places(self, pattern: Sparsity) -> NDArray:
+        """Where the blocks stand in a pattern."""
+        return np.searchsorted(block_keys(pattern.indptr, pattern.indices), self._keys)

@@ -1,0 +1,93 @@
+"""Clamped edges: boundary edges along which a panel keeps its tangent in space.
+
+In bars and hinges a clamp is a hinge between the triangle (j, k, i) at the edge and its mirror
+image in its own plane, which does not turn. With L the length of the edge and h the distance of i
+from it, its stiffness is
+
+    k = 2 D L / h,    D = E t^3 / 12 (1 - nu^2).
+
+That is a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces of length
+h with hinges between them bends like it if each hinge gathers the curvature of the half pieces on
+both of its sides, k = D L / h. At a clamp there is one half piece only: the panel and its mirror
+image would turn by twice the angle, with the same moment.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.mechanics.attached import Clamps
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import Edge, edge_lookup, edge_of
+from foldyn.values import show
+
+
+def clamped_edges(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
+    """Boundary edges (low, high) from pairs of vertices.
+
+    Raises
+    ------
+    InputError
+        No pairs of vertices, an edge that is none of the boundary, or one listed twice.
+    """
+    boundary = edge_lookup(pattern.boundary)
+    try:
+        pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
+    except TypeError:
+        why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
+        raise InputError(why, "clamped") from None
+    if inner := [pair for pair in pairs if pair not in boundary]:
+        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", "clamped")
+    if len(set(pairs)) < len(pairs):
+        twice = next(pair for pair in pairs if pairs.count(pair) > 1)
+        raise InputError(f": {twice} is listed twice", "clamped")
+    return tuple((pair[0], pair[1]) for pair in pairs)
+
+
+def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> NDArray:
+    """Rows (c, 3) of boundary edges: the triangle there, from the edge's first corner."""
+    found = {}
+    for triangle in triangles.tolist():
+        for turn in range(3):
+            a, b, third = (triangle[(turn + k) % 3] for k in range(3))
+            found[edge_of(a, b)] = (a, b, third)
+    return np.array([found[edge] for edge in edges], np.int64).reshape(-1, 3)
+
+
+def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:
+    """Stiffness (c,), N m/rad, of clamped edges of triangles (c, 3) of points x (n, 3).
+
+    modulus : D (c,), N m, of their panels.
+    """
+    a, b, third = (x[rows[:, k]] for k in range(3))
+    squared = ((b - a) ** 2).sum(axis=1)
+    area = np.linalg.norm(np.cross(b - a, third - a), axis=1)  # L h
+    return 2.0 * modulus * squared / area
+
+
+def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
+    """Clamps of triangles (c, 3) of points x (n, 3), free of moment there.
+
+    group : of the energies, to which theirs belongs.
+    """
+    points = x[rows]
+    wings = np.array([mirrored(corners) for corners in points]).reshape(-1, 1, 3)
+    return Clamps(
+        nodes=rows,
+        points=np.ascontiguousarray(np.concatenate([points, wings], axis=1) - x.mean(axis=0)),
+        rest=np.full(len(rows), np.pi),
+        stiffness=stiffness,
+        group=group,
+    )
+
+
+def mirrored(corners: NDArray) -> NDArray:
+    """Third corner of a triangle (3, 3), mirrored at its first side in its own plane."""
+    a, b, c = corners
+    foot = a + (b - a) * ((c - a) @ (b - a)) / ((b - a) @ (b - a))
+    return 2.0 * foot - c
