@@ -156,7 +156,7 @@ class Shell(Discretized):
     @cached_property
     def fold_rest(self) -> NDArray:
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
-        return read_only(self.body.fold_rest)
+        return read_only(self.body.rest_angles)
 
     @cached_property
     def _reach(self) -> float:

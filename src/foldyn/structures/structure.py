@@ -132,17 +132,16 @@ class Structure(Discretized):
     @cached_property
     def body(self) -> BarsHingesBody:
         """What solvers take."""
-        return BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+        rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
+        laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
+        return BarsHingesBody(self.model, np.concatenate(rows), laws)
 
-    @cached_property
-    def hinge_of_fold(self) -> NDArray:
-        """Row of each fold (nf,) in `model.hinges`, where folds and bends may be mixed."""
-        there = np.flatnonzero(self.model.hinge_group == 0)
+    def _rows(self, group: int, hinges: NDArray) -> NDArray:
+        """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be mixed there."""
+        there = np.flatnonzero(self.model.hinge_group == group)
         rows = np.empty(len(there), np.int64)
-        rows[np.lexsort(self.folds.T)] = there[
-            np.lexsort(self.model.hinges[there].astype(np.int64).T)
-        ]
-        return read_only(rows)
+        rows[np.lexsort(hinges.T)] = there[np.lexsort(self.model.hinges[there].astype(np.int64).T)]
+        return rows
 
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
