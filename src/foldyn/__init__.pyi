@@ -66,6 +66,11 @@ from foldyn.results import (
 )
 from foldyn.shells import Shell as Shell, shell as shell
 from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
-from foldyn.structures import Sheet as Sheet, Structure as Structure, discretize as discretize
+from foldyn.structures import (
+    Laminate as Laminate,
+    Sheet as Sheet,
+    Structure as Structure,
+    discretize as discretize,
+)
 
 __version__: str

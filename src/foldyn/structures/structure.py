@@ -20,6 +20,7 @@ from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
@@ -168,6 +169,22 @@ class Structure(Discretized):
             read_only(array)
         return mass
 
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """See `Discretized`; a bar between panels takes their mean strain."""
+        turns = np.zeros(0)
+        for kind in self.hinge_kinds:
+            change = np.zeros(len(kind.nodes))
+            for wing in (2, 3):
+                corners = kind.nodes[:, [0, 1, wing]]
+                panel = panel_of_triangle(self.triangles, self.triangle_panel, corners)
+                change -= curvature[panel] * chord_turns(self.nodes[corners])
+            turns = np.concatenate([turns, change])
+        stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
+        free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
+        tension = -stiffness * self.bar_law.stress(1.0 + free)
+        none = np.zeros(0)
+        return Swelling(turns, self.bars, tension, np.zeros((0, 4), np.int64), none, none)
+
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
         energies = self.body.energies(self._displacement(u))
@@ -205,3 +222,14 @@ def hinge_angles(x: NDArray, hinges: NDArray) -> NDArray:
     """Dihedrals (rad) of hinge rows (nh, 4) at node positions x (n, 3)."""
     centered = np.ascontiguousarray(x - x.mean(axis=0))  # as `mechanics.build` does
     return mechanics.angles(centered, np.ascontiguousarray(hinges, np.uint32))
+
+
+def _mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
+    """Mean (k,) over the triangles (nt, 3) on each pair of nodes (k, 2) of their values (nt,)."""
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
+    size = int(triangles.max(initial=0)) + 1
+    key = np.sort(pairs) @ [size, 1]
+    place = np.searchsorted(np.sort(key), sides @ [size, 1])
+    order = np.argsort(key)[place]
+    count = np.bincount(order, minlength=len(pairs))
+    return np.bincount(order, np.repeat(value, 3), minlength=len(pairs)) / count
