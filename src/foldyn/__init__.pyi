@@ -69,6 +69,7 @@ from foldyn.results import (
 from foldyn.shells import Shell as Shell, shell as shell
 from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
 from foldyn.structures import (
+    Laminate as Laminate,
     PanelSheet as PanelSheet,
     Sheet as Sheet,
     Structure as Structure,

@@ -73,6 +73,8 @@ class Case:
     actuation_terms : tuple of (ndarray of shape (nf,), History)
         Changes (rad) of the rest angles of the folds at factor 1, zero elsewhere, with their
         history; equal histories are one term.
+    rest_terms : tuple of (ndarray of shape (nr,), History)
+        The same of all rest angles (`body.rest_angles`: folds first), whatever changes them.
 
     Raises
     ------
@@ -266,6 +268,15 @@ class Case:
     def actuation_terms(self) -> Terms:
         """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
         return _summed(self._actuated())
+
+    @cached_property
+    def rest_terms(self) -> Terms:
+        """Changes (rad) of all rest angles at factor 1, shape (nr,), with their history."""
+        return _summed(self._turned())
+
+    def _turned(self) -> Summands:
+        for change, history in self.actuation_terms:
+            yield np.pad(change, (0, len(self.body.rest_angles) - len(change))), history
 
     def _actuated(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

@@ -1,6 +1,6 @@
-"""Folds whose rest angle moves in time: they do work as they turn, though no force acts.
+"""Hinges whose rest angle moves in time: they do work as they turn, though no force acts.
 
-The power of an actuated fold is k (dW/d rest) d rest/dt, W the energy of its law per unit
+The power of one is k (dW/d rest) d rest/dt, W the energy of its law per unit
 stiffness: what the energy audit needs.
 """
 
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import kernel
-from foldyn.materials import HingeLaw
 from foldyn.materials.switch import hinge_rest_slope, move_rest
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import folds_of
@@ -25,23 +24,23 @@ class Actuators(NamedTuple):
     start: NDArray  # (a,)
     span: NDArray  # (a,)
     row: NDArray  # (a,) of the waveforms
-    code: int  # of the fold law, the same for all
-    address: int  # of its energy, if it is the user's own
+    code: NDArray  # (a,) of its law
+    address: NDArray  # (a,) of the law's energy, if it is the user's own
 
 
-def actuators(
-    body: Body, law: HingeLaw, folds: NDArray, span: NDArray, row: NDArray
-) -> tuple[Body, Actuators]:
-    """A body whose rest angles can be changed, and its actuated folds, all of one law.
+def actuators(body: Body, numbers: NDArray, span: NDArray, row: NDArray) -> tuple[Body, Actuators]:
+    """A body whose rest angles can be changed, and what turns.
 
-    folds, span, row : (f,) numbers of folds, how far each turns (rad), and its waveform.
+    numbers, span, row : (f,) of its rest angles, how far each turns (rad), and its waveform.
     """
     hinge, place = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    if len(folds):
-        body, hinge, place = body.actuated(folds)
-    address = int(law.addresses[0]) if law.addresses else 0
+    laws = [body.rest_law(number) for number in numbers.tolist()]
+    if len(numbers):
+        body, hinge, place = body.actuated(numbers)
+    code = np.array([law.code for law in laws], np.int64)
+    address = np.array([law.addresses[0] if law.addresses else 0 for law in laws], np.int64)
     start = body.turned()[0][hinge]
-    return body, Actuators(hinge, start, span[place], row[place], int(law.code), address)
+    return body, Actuators(hinge, start, span[place], row[place], code[place], address[place])
 
 
 @kernel
@@ -54,7 +53,7 @@ def turn(model, actuators, factor):
         if not 0.0 <= rest <= 2.0 * np.pi:
             rest = np.nan
         rest_angle[e] = rest
-        move_rest(actuators.code, rest, p[e])
+        move_rest(actuators.code[k], rest, p[e])
 
 
 @kernel
@@ -64,7 +63,7 @@ def actuator_power(model, actuators, factor, angle):
     for k in range(actuators.hinge.size):
         e = actuators.hinge[k]
         slope = hinge_rest_slope(
-            actuators.code, angle[e], rest_angle[e], p[e, 0], p[e, 1], actuators.address
+            actuators.code[k], angle[e], rest_angle[e], p[e, 0], p[e, 1], actuators.address[k]
         )  # fmt: skip
         rate = actuators.span[k] * factor[actuators.row[k], 1]
         power += stiffness[e] * slope * rate

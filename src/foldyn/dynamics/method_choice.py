@@ -155,12 +155,12 @@ def _applied(case: Case, u: NDArray) -> NDArray:
     force = -body.internal(u)
     for load, _ in case.load_terms:
         force += load.ravel()
-    change = np.zeros(len(case.structure.folds))
-    for turn, _ in case.actuation_terms:
+    change = np.zeros_like(body.rest_angles)
+    for turn, _ in case.rest_terms:
         change += turn
     if change.any():
         linear = body.nominal(u)
-        force -= linear.folded(linear.fold_rest + change).internal(u) - linear.internal(u)
+        force -= linear.folded(linear.rest_angles + change).internal(u) - linear.internal(u)
     return force
 
 

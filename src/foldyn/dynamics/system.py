@@ -49,7 +49,7 @@ class System(NamedTuple):
 
     varies: bool  # whether there are histories,
     moves: bool  # supports that move,
-    turns: bool  # folds that are actuated
+    turns: bool  # rest angles that change
     rows: int  # of arrays: n, and those of the dofs beside displacements
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
@@ -107,12 +107,11 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
 
     start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
     """
-    structure = case.structure
     body, by = renumbered(case.body)
     nodal = by.matrix(case.mass)
     mass = inertia(nodal, by.held(case.fixed))
     histories: list[History] = []
-    for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.actuation_terms):
+    for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.rest_terms):
         if term[1] not in histories:
             histories.append(term[1])
     moves = [
@@ -121,8 +120,8 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     ]
     loads = [(by.inward(vector), history) for vector, history in case.load_terms]
     callbacks = Callbacks()
-    turns = _entries(case.actuation_terms, histories)
-    body, turned = actuators(body, structure.fold_law, *turns)
+    turns = _entries(case.rest_terms, histories)
+    body, turned = actuators(body, *turns)
     system = System(
         varies=bool(histories),
         moves=bool(moves),

@@ -141,7 +141,7 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
         "a load": case.load_terms,
         "an imposed displacement": case.imposed_terms,
         "a base motion": case.base_terms,
-        "an actuation": case.actuation_terms,
+        "an actuation": case.rest_terms,
     }
     for what, terms in driven.items():
         yield from ((what, history) for _, history in terms if history.kind != "constant")

@@ -82,10 +82,11 @@ def harmonic(
         There are such frequencies.
     """
     case = system.case
-    if len(case.actuated_creases) and isinstance(case.structure.fold_law, Superlinear):
+    turned = [k for change, _ in case.rest_terms for k in np.flatnonzero(change).tolist()]
+    if any(isinstance(case.body.rest_law(k), Superlinear) for k in turned):
         raise InputError(
-            " = 'harmonic': cannot tell how far actuated folds of the superlinear law are "
-            "from their rest angle; give the folds another law, or take stepped_sine",
+            " = 'harmonic': cannot tell how far actuated folds (or heated bends) of the "
+            "superlinear law are from their rest angle; give another law, or take stepped_sine",
             "method",
         )
     hinges = _Hinges(system)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.materials import HingeLaw
 from foldyn.mechanics.attached import (
     Attached,
     AttachedWork,
@@ -203,19 +204,23 @@ class AttachedBody(Body):
         """See `Body`."""
         return self.inner.soft_tangent(q, slope)
 
-    # ------------------------------------------------------------------ folds
+    # ------------------------------------------------------------------ rest angles
     @property
-    def fold_rest(self) -> NDArray:
+    def rest_angles(self) -> NDArray:
         """See `Body`."""
-        return self.inner.fold_rest
+        return self.inner.rest_angles
+
+    def rest_law(self, number: int) -> HingeLaw:
+        """See `Body`."""
+        return self.inner.rest_law(number)
 
     def folded(self, rest: NDArray) -> AttachedBody:
         """See `Body`."""
         return self._with(self.inner.folded(rest))
 
-    def actuated(self, folds: NDArray) -> tuple[AttachedBody, NDArray, NDArray]:
+    def actuated(self, numbers: NDArray) -> tuple[AttachedBody, NDArray, NDArray]:
         """See `Body`."""
-        inner, rows, place = self.inner.actuated(folds)
+        inner, rows, place = self.inner.actuated(numbers)
         return self._with(inner), rows, place
 
     def turned(self) -> tuple[NDArray, NDArray]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.materials import HingeLaw
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity
 
@@ -73,7 +74,7 @@ class Blocks(Protocol):
 
 
 class Body(ABC):
-    """A structure with its rest angles, m dofs, nf folds.
+    """A structure with its rest angles, m dofs.
 
     What has a default here is that of a body without hinges and hidden dofs.
 
@@ -169,20 +170,24 @@ class Body(ABC):
         """Tangent (m, m) of these hinges alone, without moment and with given slopes / k (h,)."""
         return sparse.csr_array((self.size, self.size))
 
-    # ------------------------------------------------------------------ folds
+    # ------------------------------------------------------------------ rest angles
     @property
-    def fold_rest(self) -> NDArray:
-        """Rest angles of the folds (nf,), rad."""
+    def rest_angles(self) -> NDArray:
+        """Rest angles (nr,), rad, that loads may change: of the folds first."""
         return np.zeros(0)
 
+    def rest_law(self, number: int) -> HingeLaw:
+        """Law of what has one of these rest angles."""
+        raise IndexError(number)
+
     def folded(self, rest: NDArray) -> Body:
-        """The body with other rest angles of its folds (nf,), rad."""
+        """The body with other rest angles (nr,), rad."""
         return self
 
-    def actuated(self, folds: NDArray) -> tuple[Body, NDArray, NDArray]:
-        """A body whose rest angles may be changed in place, and what turns with folds (a,).
+    def actuated(self, numbers: NDArray) -> tuple[Body, NDArray, NDArray]:
+        """A body whose rest angles may be changed in place, and what turns with some (a,).
 
-        Rows (k,) of `kernels.folds_of`, and of each the place (k,) in `folds`.
+        Rows (k,) of `kernels.folds_of`, and of each the place (k,) in `numbers`.
         """
         return self, np.zeros(0, np.int64), np.zeros(0, np.int64)
 

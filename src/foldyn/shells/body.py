@@ -182,24 +182,28 @@ class ShellBody(Body):
         return super().soft_hinges(q)
 
     @property
-    def fold_rest(self) -> NDArray:
-        """See `Body`: the mean along each crease."""
+    def rest_angles(self) -> NDArray:
+        """See `Body`: of the folds, the mean along each crease."""
         return np.bincount(self._crease, self.model.piece_rest) / np.bincount(self._crease)
+
+    def rest_law(self, number: int) -> HingeLaw:
+        """See `Body`."""
+        return self._law
 
     def folded(self, rest: NDArray) -> ShellBody:
         """See `Body`."""
-        angle = self.model.piece_rest + (rest - self.fold_rest)[self._crease]
+        angle = self.model.piece_rest + (rest - self.rest_angles)[self._crease]
         parameters = self._law.parameters(angle).reshape(-1, 4)
         return self._with(self.model._replace(piece_rest=angle, piece_parameters=parameters))
 
-    def actuated(self, folds: NDArray) -> tuple[ShellBody, NDArray, NDArray]:
+    def actuated(self, numbers: NDArray) -> tuple[ShellBody, NDArray, NDArray]:
         """See `Body`."""
         model = self.model
         own = model._replace(
             piece_rest=model.piece_rest.copy(), piece_parameters=model.piece_parameters.copy()
         )
-        pieces = [np.flatnonzero(self._crease == fold) for fold in folds]
-        place = np.repeat(np.arange(len(folds)), [len(each) for each in pieces])
+        pieces = [np.flatnonzero(self._crease == fold) for fold in numbers]
+        place = np.repeat(np.arange(len(numbers)), [len(each) for each in pieces])
         return self._with(own), np.concatenate([np.zeros(0, np.int64), *pieces]), place
 
     def turned(self) -> tuple[NDArray, NDArray]:

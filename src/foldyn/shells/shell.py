@@ -30,6 +30,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
+from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
 
 MASSES = {"lumped": "centroid", "consistent": "consistent"}  # and the rules they are
@@ -131,6 +132,34 @@ class Shell(Discretized):
         """Number of rotations, which are dofs besides the displacements."""
         return self.sides.rotations
 
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """See `Discretized`.
+
+        Triangles have a free strain of their sides and a free rotation beta0 of the sheet at them
+        (see `shells.sides`): their energies are linear in those, which makes constant forces.
+        """
+        model, panel = self.model, self.triangle_panel
+        free = 0.5 * ((1.0 + strain[panel]) ** 2 - 1.0)
+        tension = -(model.membrane @ np.ones(3)) * free[:, None] * model.per_length2
+        corners = self.triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]]
+        turns = chord_turns(self.nodes[corners.reshape(-1, 3)]).reshape(-1, 3)
+        moment = np.einsum("tkm,tm->tk", model.bending, -curvature[panel, None] * turns)
+        has, turned = model.hinge >= 0, model.rotation >= 0
+        on_hinge = np.bincount(
+            model.hinge[has], (model.weight * moment)[has], minlength=len(model.hinges)
+        )
+        hidden = np.bincount(
+            model.rotation[turned], (model.sign * moment)[turned], minlength=model.rotations
+        )
+        return Swelling(
+            turns=np.zeros(len(self.folds)),
+            ends=corners[:, :, :2].reshape(-1, 2),
+            tension=tension.ravel(),
+            hinges=model.hinges,
+            moment=on_hinge,
+            hidden=model.per_reach * hidden,
+        )
+
     @cached_property
     def folds(self) -> NDArray:
         """Hinge row (nf, 4) of the first piece of each crease: axis j, k, wings i, l."""
@@ -161,7 +190,7 @@ class Shell(Discretized):
     @cached_property
     def fold_rest(self) -> NDArray:
         """Rest dihedrals of the folds (nf,), rad: the mean along each crease."""
-        return read_only(self.body.fold_rest)
+        return read_only(self.body.rest_angles)
 
     @cached_property
     def _reach(self) -> float:

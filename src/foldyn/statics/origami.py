@@ -25,7 +25,7 @@ AdaptiveLoad = Callable[[NDArray, float], NDArray]
 
 
 class Actuation:
-    """A body whose folds' rest angles change by `change` (nf,) per unit of the factor.
+    """A body whose rest angles change by `change` (nr,) per unit of the factor.
 
     A rest angle that leaves 0..2 pi becomes nan, which no solver accepts.
     """
@@ -36,8 +36,8 @@ class Actuation:
         self.body = lru_cache(maxsize=4)(self._folded)
 
     def rest(self, factor: float) -> NDArray:
-        """Rest angles (nf,), rad."""
-        angle = self._body.fold_rest + self._constant + factor * self._change
+        """Rest angles (nr,), rad."""
+        angle = self._body.rest_angles + self._constant + factor * self._change
         return np.where((angle >= 0.0) & (angle <= 2.0 * math.pi), angle, np.nan)
 
     def _folded(self, factor: float) -> Body:
@@ -90,9 +90,9 @@ class OrigamiProblem:
         self.growing = self._extended(_total(growing.load_terms, self._shape))
         self.motion = self._extended(_total(case.imposed_terms, self._shape))
         self._moves = self._extended(case.imposed).astype(bool)
-        folds = (len(structure.folds),)
+        angles = body.rest_angles.shape
         self.actuation = Actuation(
-            body, _total(growing.actuation_terms, folds), _total(steady.actuation_terms, folds)
+            body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
         )
         self._relief = Relief(case, self._rest[: structure.nodes.size]) if inertia_relief else None
         pins = self._relief.pins if self._relief else np.zeros(0, np.int64)

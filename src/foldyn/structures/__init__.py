@@ -1,6 +1,7 @@
 """Structures: a pattern as bars and hinges with stiffness and mass."""
 
 from foldyn.structures.discretize import discretize
+from foldyn.structures.laminate import Laminate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.sheet import PanelSheet, Sheet, sheet_from
@@ -8,6 +9,7 @@ from foldyn.structures.structure import ModelOptions, Structure
 
 __all__ = [
     "MASS_RULES",
+    "Laminate",
     "ModelOptions",
     "PanelSheet",
     "Sheet",

@@ -30,10 +30,10 @@ class BarsHingesBody(Body):
     Parameters
     ----------
     model : BarsHinges
-    folds : ndarray, shape (nf,)
-        Rows of the folds in `model.hinges`.
-    law : HingeLaw
-        Law of the folds.
+    turning : ndarray, shape (nr,)
+        Rows in `model.hinges` of the folds, then of the bends.
+    laws : tuple of (HingeLaw, int)
+        Laws of the folds and of the bends, and how many there are of each.
     like : BarsHingesBody, optional
         One whose elements have the same nodes.
     """
@@ -42,14 +42,15 @@ class BarsHingesBody(Body):
     has_discrete_gradient = True
 
     def __init__(
-        self, model: BarsHinges, folds: NDArray, law: HingeLaw, like: BarsHingesBody | None = None
-    ) -> None:
-        self.model, self._folds, self._law, self._like = model, folds, law, like
+        self, model: BarsHinges, turning: NDArray, laws: tuple[tuple[HingeLaw, int], ...],
+        like: BarsHingesBody | None = None,
+    ) -> None:  # fmt: skip
+        self.model, self._turning, self._laws, self._like = model, turning, laws, like
         self.size, self.rows = model.rest.size, len(model.rest)
 
     def _with(self, model: BarsHinges) -> BarsHingesBody:
         """Another body whose elements have the same nodes."""
-        return BarsHingesBody(model, self._folds, self._law, self)
+        return BarsHingesBody(model, self._turning, self._laws, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
         return np.ascontiguousarray(q, float).reshape(self.model.rest.shape)
@@ -155,23 +156,32 @@ class BarsHingesBody(Body):
         return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
 
     @property
-    def fold_rest(self) -> NDArray:
+    def rest_angles(self) -> NDArray:
+        """See `Body`: of the folds, then of the bends."""
+        return self.model.hinge_rest[self._turning]
+
+    def rest_law(self, number: int) -> HingeLaw:
         """See `Body`."""
-        return self.model.hinge_rest[self._folds]
+        (folds, count), (bends, _) = self._laws
+        return folds if number < count else bends
 
     def folded(self, rest: NDArray) -> BarsHingesBody:
         """See `Body`."""
         angle, parameters = self.model.hinge_rest.copy(), self.model.hinge_parameters.copy()
-        angle[self._folds], parameters[self._folds] = rest, self._law.parameters(rest)
+        angle[self._turning], start = rest, 0
+        for law, count in self._laws:
+            part = slice(start, start + count)
+            parameters[self._turning[part]] = law.parameters(rest[part])
+            start += count
         return self._with(self.model._replace(hinge_rest=angle, hinge_parameters=parameters))
 
-    def actuated(self, folds: NDArray) -> tuple[BarsHingesBody, NDArray, NDArray]:
+    def actuated(self, numbers: NDArray) -> tuple[BarsHingesBody, NDArray, NDArray]:
         """See `Body`."""
         model = self.model
         own = model._replace(
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy()
         )
-        return self._with(own), self._folds[folds], np.arange(len(folds))
+        return self._with(own), self._turning[numbers], np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
         """See `Body`."""
@@ -183,7 +193,7 @@ class BarsHingesBody(Body):
             return self, np.arange(self.rows)
         order = node_order(self.model)
         model, rows = renumber(self.model, order)
-        return BarsHingesBody(model, ranks(rows)[self._folds], self._law), order
+        return BarsHingesBody(model, ranks(rows)[self._turning], self._laws), order
 
     def _hinges_alone(self) -> BarsHingesBody:
         """The body without its bars."""

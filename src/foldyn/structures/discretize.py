@@ -20,6 +20,7 @@ from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure
+from foldyn.structures.swelling import panel_of_triangle
 from foldyn.values import choice, vector
 
 PER_NODE = 5000.0
@@ -106,6 +107,8 @@ def discretize(
 
     x = mesh.nodes
     clamps = clamp_rows(edges, mesh.triangles)
+    clamped_panel = panel_of_triangle(mesh.triangles, mesh.triangle_panel, clamps)
+    modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     return Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
@@ -123,7 +126,7 @@ def discretize(
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,
         clamps=clamps,
-        clamp_stiffness=clamp_stiffness(x, clamps, sheet),
+        clamp_stiffness=clamp_stiffness(x, clamps, modulus),
     ).marked()
 
 

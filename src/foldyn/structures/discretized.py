@@ -18,6 +18,7 @@ from foldyn.mechanics.body import Body
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.swelling import Swelling
 
 
 class HingeKind(NamedTuple):
@@ -133,6 +134,13 @@ class Discretized:
     def coarser(self) -> Discretized | None:
         """The same with a coarser mesh, for those that have one."""
         return None
+
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """What it gets where panels would, if they were free, stretch and curl.
+
+        strain, curvature : (np,) of each panel; curvature 1/m, positive towards the front.
+        """
+        raise InputError("this structure has no panels that could swell")
 
     @cached_property
     def surface(self) -> Surface:

@@ -25,6 +25,7 @@ from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.sheet import Sheet
+from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
@@ -138,21 +139,20 @@ class Structure(Discretized):
     @cached_property
     def body(self) -> Body:
         """What solvers take."""
-        body = BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+        rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
+        laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
+        body = BarsHingesBody(self.model, np.concatenate(rows), laws)
         if not len(self.clamps):
             return body
         bends = tuple(GROUPS).index("strain_bends")
         return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
 
-    @cached_property
-    def hinge_of_fold(self) -> NDArray:
-        """Row of each fold (nf,) in `model.hinges`, where folds and bends may be mixed."""
-        there = np.flatnonzero(self.model.hinge_group == 0)
+    def _rows(self, group: int, hinges: NDArray) -> NDArray:
+        """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be mixed there."""
+        there = np.flatnonzero(self.model.hinge_group == group)
         rows = np.empty(len(there), np.int64)
-        rows[np.lexsort(self.folds.T)] = there[
-            np.lexsort(self.model.hinges[there].astype(np.int64).T)
-        ]
-        return read_only(rows)
+        rows[np.lexsort(hinges.T)] = there[np.lexsort(self.model.hinges[there].astype(np.int64).T)]
+        return rows
 
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
@@ -178,6 +178,22 @@ class Structure(Discretized):
         for array in (mass.data, mass.indices, mass.indptr):
             read_only(array)
         return mass
+
+    def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
+        """See `Discretized`; a bar between panels takes their mean strain."""
+        turns = np.zeros(0)
+        for kind in self.hinge_kinds:
+            change = np.zeros(len(kind.nodes))
+            for wing in (2, 3):
+                corners = kind.nodes[:, [0, 1, wing]]
+                panel = panel_of_triangle(self.triangles, self.triangle_panel, corners)
+                change -= curvature[panel] * chord_turns(self.nodes[corners])
+            turns = np.concatenate([turns, change])
+        stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
+        free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
+        tension = -stiffness * self.bar_law.stress(1.0 + free)
+        none = np.zeros(0)
+        return Swelling(turns, self.bars, tension, np.zeros((0, 4), np.int64), none, none)
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
@@ -210,3 +226,14 @@ class Structure(Discretized):
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
+
+
+def _mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:
+    """Mean (k,) over the triangles (nt, 3) on each pair of nodes (k, 2) of their values (nt,)."""
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)).reshape(-1, 2)
+    size = int(triangles.max(initial=0)) + 1
+    key = np.sort(pairs) @ [size, 1]
+    place = np.searchsorted(np.sort(key), sides @ [size, 1])
+    order = np.argsort(key)[place]
+    count = np.bincount(order, minlength=len(pairs))
+    return np.bincount(order, np.repeat(value, 3), minlength=len(pairs)) / count

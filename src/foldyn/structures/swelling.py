@@ -1,0 +1,49 @@
+"""Panels that would, if they were free, stretch and curl: by heat, moisture or growth.
+
+A bar that would have the stretch 1 + e gets the constant second Piola-Kirchhoff stress -S(1 + e),
+S its law: it is free of force where it has that stretch.
+
+A panel that would curl to a paraboloid w = kappa r^2 / 2, towards its front, has no moment where
+each hinge inside it turns by what the paraboloid through its nodes has there. A wing at the
+distance h from an axis of the length L, s along it, then stands higher over the axis by
+kappa (h^2 + s^2 - s L) / 2, so that the dihedral of a hinge is smaller by the sum over its wings of
+
+    kappa (h - s (L - s) / h) / 2.
+
+The same holds of a fold, whose panels meet under their own tangents: the chords between its nodes
+are what its dihedral is made of.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Swelling(NamedTuple):
+    """What swollen panels add to a structure: k tensions, h moments, r hidden dofs."""
+
+    turns: NDArray  # (nr,) changes of rest angles, rad
+    ends: NDArray  # (k, 2) nodes of what would be longer
+    tension: NDArray  # (k,) constant force per length, N/m
+    hinges: NDArray  # (h, 4)
+    moment: NDArray  # (h,) on their dihedrals, N m
+    hidden: NDArray  # (r,) forces on the hidden dofs, N
+
+
+def chord_turns(corners: NDArray) -> NDArray:
+    """(h - s (L - s) / h) / 2 (n,), m, of corners (n, 3, 3): the ends of an axis and a wing."""
+    start, end, wing = np.moveaxis(corners, 1, 0)
+    axis, arm = end - start, wing - start
+    length = np.linalg.norm(axis, axis=1)
+    along = np.einsum("ni,ni->n", arm, axis) / length
+    reach = np.linalg.norm(np.cross(arm, axis), axis=1) / length
+    return 0.5 * (reach - along * (length - along) / reach)
+
+
+def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> NDArray:
+    """Panels of triangles `wanted` (n, 3), whatever the order of their corners."""
+    number = {tuple(t): p for t, p in zip(np.sort(triangles).tolist(), panel.tolist(), strict=True)}
+    return np.array([number[tuple(t)] for t in np.sort(wanted).tolist()], np.int64)
