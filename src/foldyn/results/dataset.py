@@ -88,7 +88,7 @@ def trajectory_dataset(
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
     histories = [getattr(part, "history", None) for part in (*case.supports, *case.loads)]
     known_kinds = (type(None), *HISTORIES.values())
-    called = any(not isinstance(history, known_kinds) for history in histories)
+    called = any(type(history) not in known_kinds for history in histories)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
     return result_dataset("trajectory", case, data, along, statistics, times)
