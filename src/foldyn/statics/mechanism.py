@@ -4,11 +4,11 @@ Hinges count with their stiffness k whatever their law (superlinear bends have n
 but they do resist), and forces in the structure do not count: what is judged is whether a motion
 stretches a bar or turns a hinge at all.
 
-Rigid motions follow from the supports alone, springs and clamped edges among them. For others the stiffness matrix is factorized; only
-where its smallest eigenvalue is suspicious are its softest modes computed, and a mode is a
-mechanism if the strain that it causes is rounding. Bars are judged by their elongations, which
-rounding leaves exact: soft modes of a large sheet are millions of times softer than its bars and
-still not free.
+Rigid motions follow from the supports alone, springs and clamped edges among them. For others the
+stiffness matrix is factorized; only where its smallest eigenvalue is suspicious are its softest
+modes computed, and a mode is a mechanism if the strain that it causes is rounding. Bars are judged
+by their elongations, which rounding leaves exact: soft modes of a large sheet are millions of times
+softer than its bars and still not free.
 """
 
 from __future__ import annotations

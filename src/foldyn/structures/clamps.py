@@ -1,15 +1,15 @@
 """Clamped edges: boundary edges along which a panel keeps its tangent in space.
 
-In bars and hinges a clamp is a hinge between the triangle (j, k, i) at the edge and its mirror image
-in its own plane, which does not turn. With L the length of the edge and h the distance of i from it,
-its stiffness is
+In bars and hinges a clamp is a hinge between the triangle (j, k, i) at the edge and its mirror
+image in its own plane, which does not turn. With L the length of the edge and h the distance of i
+from it, its stiffness is
 
     k = 2 D L / h,    D = E t^3 / 12 (1 - nu^2).
 
-That is a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces of length h
-with hinges between them bends like it if each hinge gathers the curvature of the half pieces on both
-of its sides, k = D L / h. At a clamp there is one half piece only: the panel and its mirror image
-would turn by twice the angle, with the same moment.
+That is a plate of width L in cylindrical bending, M = D L kappa. A chain of rigid pieces of length
+h with hinges between them bends like it if each hinge gathers the curvature of the half pieces on
+both of its sides, k = D L / h. At a clamp there is one half piece only: the panel and its mirror
+image would turn by twice the angle, with the same moment.
 """
 
 from __future__ import annotations
