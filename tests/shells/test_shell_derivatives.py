@@ -80,6 +80,8 @@ def bending_energy(s, u, x):
     rest = np.concatenate([s.nodes, found.wings])
     moved = rest.copy()
     moved[: len(u)] += u
+    for j, k, _, wing in found.hinges[found.hinges[:, 3] >= len(u)]:
+        moved[wing] += 0.5 * (u[j] + u[k])  # rides on its side
     for t, corners in enumerate(s.triangles):
         p = s.nodes[corners]
         normal = np.cross(p[1] - p[0], p[2] - p[0])

@@ -254,17 +254,27 @@ class AttachedBody(Body):
         return Unstrained(
             self._plus(inner.tangent, blocks),
             self._plus(inner.hinges, clamps),
-            partial(self._stretch, inner.stretch, self._springs_at(q, True)),
+            partial(self._stretch, inner.stretch, self._lines(q)),
         )
 
-    def _stretch(self, bars: Any, springs: NDArray, motion: NDArray) -> float:
-        """As `Unstrained.stretch`: of bars or of springs (s, 3, 3), whichever is larger."""
-        (ends, grounded), u = self._ends, self._nodal(motion)
+    def _lines(self, q: NDArray) -> NDArray:
+        """Unit vectors (s, 3) along all springs; zero for those that pull in all directions."""
+        ends, springs, u = self.springs.axial_ends, self.springs, self._nodal(q)
+        apart = springs.vector + u[ends[:, 1]] - u[ends[:, 0]]
+        apart[springs.stretch == springs.length] = 0.0
+        length = np.linalg.norm(apart, axis=1, keepdims=True)
+        return np.concatenate([springs.direction, apart / np.where(length > 0.0, length, 1.0)])
+
+    def _stretch(self, bars: Any, lines: NDArray, motion: NDArray) -> float:
+        """As `Unstrained.stretch`: the larger of bars' and springs', along lines (s, 3)."""
+        (ends, grounded), u, springs = self._ends, self._nodal(motion), self.springs
         first, second = u[ends[:, 0]], np.where(grounded[:, None], 0.0, u[ends[:, 1]])
+        stiffness = np.concatenate([springs.stiffness, springs.axial_stiffness])
         apart, most = first - second, np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1)
-        energy = float(np.einsum("sa,sab,sb->", apart, springs, apart))
-        whole = float((np.linalg.norm(springs, axis=(1, 2)) * most**2).sum())
-        return max(bars(motion), np.sqrt(max(energy, 0.0) / whole) if whole > 0.0 else 0.0)
+        along = np.where(lines.any(axis=1), np.einsum("sa,sa->s", apart, lines), most)
+        whole = float((stiffness * most**2).sum())
+        own = np.sqrt(float((stiffness * along**2).sum()) / whole) if whole > 0.0 else 0.0
+        return max(bars(motion), own)
 
 
 def _assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
