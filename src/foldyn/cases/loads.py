@@ -240,7 +240,8 @@ class Actuate(Load):
         closed = angles[(angles == 0.0) | (angles == 360.0)]
         if closed.size and not structure.fold_law.closed_at_rest:
             shut = float(closed[0])
-            said = {"angle": shut, "fold_angle": 180.0 - shut, "fraction": self.fraction}
+            turned = 180.0 - shut if isinstance(self.fold_angle, tuple) else self.fold_angle
+            said = {"angle": shut, "fold_angle": turned, "fraction": self.fraction}
             name = next(name for name in said if getattr(self, name) is not None)
             raise InputError(
                 f"{place}.{name} = {said[name]:g}: this fold law, free of stress at rest, has an "

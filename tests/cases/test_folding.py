@@ -1,0 +1,154 @@
+"""Creases that fold to an angle, a fold angle or a fraction: what is meant, and what is refused."""
+
+from __future__ import annotations
+
+from tomllib import loads
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cases.loads import load_from
+from foldyn.errors import InputError
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
+PATTERN = fd.patterns.miura((2, 1), dihedral=100)
+LETTERS = np.array(PATTERN.assignments)
+MAKERS = [fd.discretize, lambda *args, **options: fd.shell(*args, divisions=2, **options)]
+
+
+def reached(load: fd.Actuate, structure: fd.Structure | None = None) -> np.ndarray:
+    """Rest dihedrals (degrees) at factor 1; nan of creases that the load leaves alone."""
+    structure = structure or fd.discretize(PATTERN, SHEET)
+    case = fd.Case(structure, loads=[load])
+    ((change, _),) = case.actuation_terms
+    angles = np.degrees(structure.fold_rest + change)
+    angles[np.setdiff1d(np.arange(len(angles)), case.actuated_creases)] = np.nan
+    return angles
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_one_fold_angle_of_a_word_is_a_size(make):
+    s = make(PATTERN, SHEET)
+    found = reached(fd.Actuate("all", fold_angle=70), s)
+    np.testing.assert_allclose(found, np.where(LETTERS == "V", 110.0, 250.0), rtol=1e-14)
+    found = reached(fd.Actuate("mountain", fold_angle=70), s)
+    np.testing.assert_allclose(found, np.where(LETTERS == "V", np.nan, 250.0), rtol=1e-14)
+
+
+def test_fold_angles_of_numbers_have_their_sign():
+    found = reached(fd.Actuate([3, 0], fold_angle=-30))
+    np.testing.assert_allclose(found[[0, 3]], 210.0, rtol=1e-14)
+    found = reached(fd.Actuate([3, 0], fold_angle=[170, -170]))
+    np.testing.assert_allclose(found[[3, 0]], [10.0, 350.0], rtol=1e-13)
+
+
+def test_a_list_of_fold_angles_of_a_word_has_their_signs():
+    """The fold angles of another Miura, crease by crease."""
+    other = fd.patterns.miura((2, 1), dihedral=60)
+    found = reached(fd.Actuate("all", fold_angle=180.0 - np.degrees(other.dihedrals)))
+    np.testing.assert_allclose(found, np.degrees(other.dihedrals), rtol=1e-13)
+
+
+@pytest.mark.parametrize("fraction", [0.8, "80%", " 80 %", "8e1%"])
+def test_a_fraction_folds_each_crease_its_own_way(fraction):
+    found = reached(fd.Actuate("all", fraction=fraction))
+    np.testing.assert_allclose(found, np.where(LETTERS == "V", 36.0, 324.0), rtol=1e-13)
+    assert fd.Actuate("all", fraction=fraction).fraction == pytest.approx(0.8, rel=1e-15)
+
+
+@pytest.mark.parametrize("given", [{"fraction": 1}, {"fraction": "100%"}, {"fold_angle": 180}])
+def test_fully_folded_needs_a_law_that_allows_it(given):
+    with pytest.raises(InputError, match=r"loads\[0\]\.(fraction = 1|fold_angle = 180): this fold"):
+        reached(fd.Actuate("all", **given))
+    open_to_all = fd.discretize(PATTERN, SHEET, fold_law="linear")
+    found = reached(fd.Actuate("all", **given), open_to_all)
+    np.testing.assert_allclose(found, np.where(LETTERS == "V", 0.0, 360.0), atol=1e-13)
+
+
+def test_the_closed_mountain_is_named_by_its_own_fold_angle():
+    mountain = int(np.flatnonzero(LETTERS == "M")[0])
+    with pytest.raises(InputError, match=r"loads\[0\]\.fold_angle = -180: this fold law"):
+        reached(fd.Actuate(mountain, fold_angle=-180))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "angle: missing; give it"),
+        ({"angle": 90, "fraction": 0.5}, "fraction: give only one of angle and fraction"),
+        ({"fold_angle": 90, "fraction": 0.5}, "fraction: give only one of fold_angle and fraction"),
+        ({"fold_angle": 181}, "fold_angle = 181: must lie between -180 and 180 degrees"),
+        ({"fold_angle": [0, -200]}, r"fold_angle\[1\] = -200: must lie"),
+        ({"fraction": 1.2}, "fraction = 1.2: must be at most 1"),
+        ({"fraction": -0.1}, "fraction = -0.1: must be at least 0"),
+        ({"fraction": "120%"}, "fraction = 1.2: must be at most 1"),
+        ({"fraction": "80"}, 'fraction = "80": must be as in "80%"'),
+        ({"fraction": "most%"}, 'fraction = "most%": must be as in "80%"'),
+        ({"fraction": "nan%"}, "fraction = nan: must be a finite number"),
+        ({"fraction": [0.1, 0.2]}, "fraction = .*must be a number"),
+        ({"fraction": True}, "fraction = true: must be a number"),
+    ],
+)
+def test_wrong_arguments(given, message):
+    with pytest.raises(InputError, match=message):
+        fd.Actuate("all", **given)
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (fd.Actuate("valley", fold_angle=-10), r"loads\[0\].fold_angle = -10: is a size for creas"),
+        (fd.Actuate([0, 1], fold_angle=[1]), r"fold_angle = .*1 angles for 2 creases"),
+        (fd.Actuate([0, 1], fraction=0.5), r"loads\[0\].fraction: a crease is flat, so that it"),
+        (fd.Actuate("all", fraction=0.5), r"fraction: a crease is unassigned"),
+        (fd.Actuate("all", fold_angle=5), r"fold_angle: a crease is unassigned"),
+    ],
+)
+def test_creases_that_cannot_fold_so(load, message):
+    letters = ["F", "U", *PATTERN.assignments[2:]]
+    structure = fd.discretize(fd.Pattern(PATTERN.vertices, PATTERN.faces, letters), SHEET)
+    with pytest.raises(InputError, match=message):
+        fd.Case(structure, loads=[load])
+
+
+@pytest.mark.parametrize("key", ["angle = 100", "fold_angle = 80.5", 'fraction = "45%"',
+                                 "fold_angle = [80.5, -3]"])  # fmt: skip
+def test_from_a_table_and_back(key):
+    load = load_from(loads(f"creases = [0, 1]\n{key}"))
+    assert load_from(load.table()) == load
+    assert len(load.table()) == 2
+
+
+@pytest.mark.parametrize("kind", ["bars_and_hinges", "shell"])
+def test_from_a_case_file_to_a_result_and_back(tmp_path, kind):
+    path = tmp_path / "case.toml"
+    path.write_text(f"""
+[pattern]
+kind = "simple_fold"
+dihedral = 150
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1
+[model]
+kind = "{kind}"
+{"divisions = 2" if kind == "shell" else ""}
+[[supports]]
+nodes = [0, 1, 2]
+[[loads]]
+creases = "all"
+fraction = "25%"
+[analysis]
+kind = "statics"
+method = "displacement"
+load_factors = [0.5, 1]
+""")
+    result = fd.read_case(path).run()
+    fd.save(result, tmp_path / "result.nc")
+    case = fd.case_of(fd.load(tmp_path / "result.nc"))
+    assert case.loads == (fd.Actuate("all", fraction=0.25),)
+    np.testing.assert_array_equal(
+        case.actuation_terms[0][0], fd.read_case(path).case().actuation_terms[0][0]
+    )
