@@ -18,6 +18,7 @@ from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
 from foldyn.errors import Faults, InputError
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import Following
 from foldyn.structures.discretized import read_only
 from foldyn.values import brief, show
 
@@ -37,8 +38,8 @@ class Case:
     supports : sequence of Fix, Impose and BaseMotion
         Nodes held at rest or moved as prescribed, and motions of the base; none by default (free
         motion is legal in dynamics).
-    loads : sequence of Force, Gravity and Actuate
-        Forces, gravity and creases that fold by themselves; none by default.
+    loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
+        Forces, gravity, pressure, creases that fold by themselves; none by default.
     damping : Rayleigh
         Damping; none by default.
 
@@ -55,6 +56,8 @@ class Case:
         Forces on held nodes are kept: the reactions carry them.
     force_terms : tuple of (ndarray of shape (n, 3), History)
         The same of the forces on nodes alone, without gravity.
+    following_terms : tuple of (Following, History)
+        Forces that depend on the displacement, one term for each load that has them.
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
@@ -109,6 +112,8 @@ class Case:
                 load.loaded(self.structure, place)
             with faults.collected():
                 load.rest_changes(self.structure, place)
+            with faults.collected():
+                load.following(self.structure, place)
         faults.tell()
 
     @property
@@ -243,6 +248,12 @@ class Case:
             forces = load.forces(self.structure, place)
             if forces is not None:
                 yield forces, load.history
+
+    @cached_property
+    def following_terms(self) -> tuple[tuple[Following, History], ...]:
+        """Forces that depend on the displacement, of each load that has them, with its history."""
+        found = ((load.following(self.structure, place), load) for place, load in self._loads())
+        return tuple((part, as_history(load.history)) for part, load in found if part is not None)
 
     @cached_property
     def gravity_terms(self) -> Terms:
