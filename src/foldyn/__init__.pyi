@@ -28,6 +28,7 @@ from foldyn.cases import (
     Case as Case,
     Chirp as Chirp,
     Constant as Constant,
+    CreaseMoment as CreaseMoment,
     Fix as Fix,
     Force as Force,
     Function as Function,
@@ -35,7 +36,9 @@ from foldyn.cases import (
     HalfSine as HalfSine,
     Harmonic as Harmonic,
     Impose as Impose,
+    LineLoad as LineLoad,
     PointMass as PointMass,
+    Pressure as Pressure,
     Pulse as Pulse,
     Ramp as Ramp,
     Rayleigh as Rayleigh,
@@ -43,6 +46,7 @@ from foldyn.cases import (
     State as State,
     Step as Step,
     Table as Table,
+    TotalForce as TotalForce,
 )
 from foldyn.dynamics import (
     critical_step as critical_step,

@@ -126,7 +126,7 @@ BAD = {
     ),
     "creases with gravity": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0]\ngravity = [0, 0, -9.81]")],
-        "loads[0].creases: creases that fold are a load of their own; leave out gravity, or write",
+        "loads[0].gravity: acts on the whole structure; leave out creases, or write",
     ),
     "crease actuated twice": (
         [

@@ -25,12 +25,16 @@ class SingularTangentError(FoldynError):
     """The tangent cannot be factorized: it is singular to rounding, or not finite."""
 
 
-class Factorization(Protocol):
-    """A factorized symmetric matrix."""
+class Solution(Protocol):
+    """A factorized matrix."""
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b."""
         ...
+
+
+class Factorization(Solution, Protocol):
+    """A factorized symmetric matrix."""
 
     def pivots(self) -> NDArray | None:
         """Pivots whose signs are those of the eigenvalues; None if only their count is known."""
@@ -89,6 +93,22 @@ class SuperLU:
     def negative(self) -> int:
         """Count of negative eigenvalues."""
         return int((self.pivots() < 0.0).sum())
+
+
+PIVOT = 0.01  # of the largest entry in a column: what a pivot on the diagonal must have
+
+
+class Unsymmetric:
+    """Factorization of a matrix that is nearly symmetric: solutions alone."""
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        if not np.isfinite(matrix.data).all():
+            raise SingularTangentError("the tangent is not finite")
+        self._lu = factorize(matrix, pivot=PIVOT)
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b."""
+        return self._lu.solve(b)
 
 
 MOST_DENSE = 3000  # dofs up to which eigenvalues of a full matrix are affordable

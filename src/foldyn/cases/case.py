@@ -22,6 +22,7 @@ from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.attached import Springs
 from foldyn.mechanics.attached_body import GROUP, attached
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import Following
 from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.values import brief, show
@@ -42,8 +43,8 @@ class Case:
     supports : sequence of Fix, Impose, BaseMotion and Spring
         Nodes held at rest, moved as prescribed or held by springs, and motions of the base; none
         by default (free motion is legal in dynamics).
-    loads : sequence of Force, Gravity and Actuate
-        Forces, gravity and creases that fold by themselves; none by default.
+    loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
+        Forces, gravity, pressure, creases that fold by themselves; none by default.
     damping : Rayleigh
         Damping; none by default.
     masses : sequence of PointMass
@@ -62,6 +63,8 @@ class Case:
         Forces on held nodes are kept: the reactions carry them.
     force_terms : tuple of (ndarray of shape (n, 3), History)
         The same of the forces on nodes alone, without gravity.
+    following_terms : tuple of (Following, History)
+        Forces that depend on the displacement, one term for each load that has them.
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
@@ -126,6 +129,8 @@ class Case:
                 load.loaded(self.structure, place)
             with faults.collected():
                 load.rest_changes(self.structure, place)
+            with faults.collected():
+                load.following(self.structure, place)
         faults.tell()
 
     @cached_property
@@ -313,6 +318,12 @@ class Case:
                 forces = load.weight(self.nodal_mass)
             if forces is not None:
                 yield forces, load.history
+
+    @cached_property
+    def following_terms(self) -> tuple[tuple[Following, History], ...]:
+        """Forces that depend on the displacement, of each load that has them, with its history."""
+        found = ((load.following(self.structure, place), load) for place, load in self._loads())
+        return tuple((part, as_history(load.history)) for part, load in found if part is not None)
 
     @cached_property
     def gravity_terms(self) -> Terms:

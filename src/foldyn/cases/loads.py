@@ -2,70 +2,44 @@
 
 from __future__ import annotations
 
-import warnings
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.decode import given_keys
 from foldyn.cases.folding import (
     check_angles,
     check_fold_angles,
     check_fraction,
     dihedrals,
 )
+from foldyn.cases.following_loads import CreaseMoment, Pressure
 from foldyn.cases.history import History, as_history
+from foldyn.cases.load import Load, check_held
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
+from foldyn.cases.shared_loads import LineLoad, TotalForce
 from foldyn.cases.supports import signed
-from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.errors import InputError, within
 from foldyn.values import brief, show, vector
 
-__all__ = ["LOADS", "Actuate", "Force", "Gravity", "Load"]
+__all__ = [
+    "LOADS",
+    "Actuate",
+    "CreaseMoment",
+    "Force",
+    "Gravity",
+    "LineLoad",
+    "Load",
+    "Pressure",
+    "TotalForce",
+]
 
 STANDARD = 9.80665  # m/s2, standard gravity (3rd CGPM, 1901)
-
-
-class Load(Part):
-    """A load: a frozen dataclass that says what it does at factor 1 of its history.
-
-    A new kind is a subclass that is listed in `LOADS`; `place`, its place among the loads, is for
-    messages.
-
-    Attributes
-    ----------
-    apart : str
-        In messages: why it cannot share a table with another load.
-    arrows : bool
-        Whether pictures show its forces as arrows at the nodes.
-    moves : bool
-        Whether its history is that of a motion, whose velocity counts.
-    """
-
-    apart: ClassVar[str]
-    arrows: ClassVar[bool] = False
-    moves: ClassVar[bool] = False
-    history: Any
-
-    def forces(self, structure: Any, place: str) -> NDArray[np.float64] | None:
-        """Forces (n, 3), N, on all nodes; None if it is not a force."""
-        return None
-
-    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
-        """Nodes on which it acts; none if it acts on all, or on creases."""
-        return np.zeros(0, np.int64)
-
-    def rest_changes(
-        self, structure: Any, place: str
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-        """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
-        return None
-
-    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
-        """Refuse what the structure or its held dofs (n, 3) do not allow."""
 
 
 @brief
@@ -109,29 +83,8 @@ class Force(Load):
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a force that acts on held axes only; warn of one that does so in part."""
-        nodes = self.loaded(structure, place)
-        acts = np.flatnonzero(self.vector)
-        held = fixed[np.ix_(nodes, acts)]
-        if not held.any():
-            return
-        what = ", ".join(
-            f"{node} ({''.join('xyz'[a] for a in acts[row])})"
-            for node, row in zip(nodes, held, strict=True)
-            if row.any()
-        )
-        what = what if len(what) < 80 else what[:76] + " ..."
-        if held.all():
-            raise InputError(
-                f": the force {show(self.vector)} acts only where supports hold its nodes: "
-                f"{what}; load other nodes or axes, or free these",
-                place,
-            )
-        warnings.warn(
-            f"{place}: the force {show(self.vector)} acts in part where supports hold its nodes: "
-            f"{what}; that part only adds to the reactions",
-            FoldynWarning,
-            stacklevel=4,
-        )
+        nodes, acts = self.loaded(structure, place), np.flatnonzero(self.vector)
+        check_held(f"the force {show(self.vector)}", nodes, acts, fixed, place)
 
 
 @dataclass(frozen=True)
@@ -266,8 +219,17 @@ def _letters(structure: Any, creases: NDArray[np.int64]) -> NDArray[np.str_]:
     return np.array(list(letters), dtype="<U1")[creases]
 
 
-LOADS: tuple[type[Load], ...] = (Force, Gravity, Actuate)
-"""All kinds; where a case file gives keys of several in one table, the last is meant."""
+LOADS: tuple[type[Load], ...] = (
+    Force,
+    Gravity,
+    Actuate,
+    TotalForce,
+    LineLoad,
+    Pressure,
+    CreaseMoment,
+)
+"""All kinds. Which one a table of a case file means, its keys that no other kind has tell: where it
+has those of several, the last kind, where it has none, the first."""
 
 
 def load_from(table: Any, folder: Path | None = None) -> Load:
@@ -275,12 +237,15 @@ def load_from(table: Any, folder: Path | None = None) -> Load:
     given = given_keys(table, LOADS) - {"history"}
     if not given:
         raise InputError(f": give {', or '.join(' and '.join(kind.needed()) for kind in LOADS)}")
-    kind = next(kind for kind in reversed(LOADS) if given & set(kind.keys))
+    counts = Counter(key for kind in LOADS for key in kind.keys)
+    own = {key for key in given if counts[key] == 1}
+    kinds = [kind for kind in LOADS if own & set(kind.keys)]
+    kind = kinds[-1] if kinds else next(kind for kind in LOADS if given & set(kind.keys))
     others = [key for key in table if key in given and key not in kind.keys]
     if others:
-        own = next(key for key in kind.keys if key in given)
+        first = next(key for key in kind.keys if key in given)
         raise InputError(
             f": {kind.apart}; leave out {' and '.join(others)}, or write [[loads]] for each load",
-            f".{own}",
+            f".{first}",
         )
     return kind.of(table, folder)

@@ -104,10 +104,10 @@ def resolve_nodes(
         with within(f"{field} = "):
             return select(structure.nodes if pattern is None else pattern, nodes)
     check_nodes(nodes, field)
-    return _in_range(field, nodes, len(structure.nodes), "node")
+    return in_range(field, nodes, len(structure.nodes), "node")
 
 
-def _in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]:
+def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]:
     """Return numbers of nodes or creases, of which the structure has `count`, as an array."""
     chosen = np.atleast_1d(np.array(given, dtype=np.int64))
     bad = chosen[(chosen < 0) | (chosen >= count)]
@@ -170,7 +170,7 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
         )
     if isinstance(creases, str):
         return _assigned(structure.pattern, creases, name)
-    return _in_range(name, creases, count, "crease")
+    return in_range(name, creases, count, "crease")
 
 
 def _assigned(pattern: Any, word: str, name: str) -> NDArray[np.int64]:

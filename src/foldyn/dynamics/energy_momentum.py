@@ -3,7 +3,8 @@
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
     b = F + beta K0 (u1 - u0)/h - (p0 + p1)/2,
 
-with F the forces of `implicit.discrete_gradient`. Without damping and loads the energy of any
+with F the forces of `implicit.discrete_gradient`, and p at each end of the step those of all loads,
+also of those that depend on the displacement. Without damping and loads the energy of any
 structure and the momenta of a free one stay what they are, with any step, to the tolerance of the
 equations and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and
 Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
@@ -26,6 +27,7 @@ from foldyn.dynamics.system import Packed, carry
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
+from foldyn.mechanics.following import add_following
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
 ORDER = 2
@@ -73,6 +75,7 @@ class EnergyMomentum(Scheme):
         out[:] = 0.0
         discrete_gradient.add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, out)
         discrete_gradient.add_hinge_tangent(model, u0, u1, self.course.angle, FLOOR, slots, out)
+        matrix.add_following(u1, self.new.factor, 0.5)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
@@ -128,12 +131,18 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     loads = system.loads
     for k in range(loads.dof.size):
         bracket[loads.dof[k]] -= loads.value[k] * mean[loads.row[k], 0]
+    if system.follows:
+        before, after = flat(old.pushed), flat(new.pushed)
+        after[:] = 0.0
+        add_following(system.following, u1, s.factor, after)
+        for i in range(after.size):
+            bracket[i] -= 0.5 * (before[i] + after[i])
     times_mass(mass, s.moving, out)
     inertia = 0.0
     for i in range(q0.size):
         inertia += left[i] * left[i]
         left[i] += bracket[i]
-    return norms(system, out, inertia, mean)
+    return norms(system, out, inertia, mean, new.pushed)
 
 
 @kernel
@@ -152,7 +161,7 @@ def _works(system, mass, h, old, new, shift, s):
         along = moved.value[k] * (new.factor[row, 0] - old.factor[row, 0])
         du[dof] += along
         done += bracket[dof] * along
-    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
+    done = add_load_work(system.loads, old, new, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.displacement, s.displacement) / h
 
 

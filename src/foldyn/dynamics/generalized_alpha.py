@@ -107,6 +107,7 @@ class Alpha(Scheme):
         """See `Scheme`."""
         body, u = self.packed.body, self.moved()
         matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
+        matrix.add_following(u, self.new.factor, 1.0)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
@@ -165,12 +166,13 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
         slowed = drag(system.damping, (1.0 - af) * w1[i] + af * w0[i])
         x[i] = (1.0 - am) * a1[i] + am * a0[i] + slowed
     new.factor[:] = s.factor
+    new.pushed[:] = s.pushed
     times_mass(mass, s.moving, out)
     inertia = 0.0
     for i in range(q0.size):
         inertia += left[i] * left[i]
         left[i] += (1.0 - af) * b1[i] + af * b0[i]
-    return norms(system, out, inertia, s.factor)
+    return norms(system, out, inertia, s.factor, new.pushed)
 
 
 @kernel
@@ -216,7 +218,7 @@ def _works(system, mass, h, old, new, shift, s):
         du[dof] += along
         flat(s.velocity)[dof] += 0.5 * moved.value[k] * (old.factor[row, 1] + new.factor[row, 1])
         done += 0.5 * (b0[dof] + b1[dof]) * along
-    done = add_load_work(system.loads, old.factor, new.factor, s.displacement, done)
+    done = add_load_work(system.loads, old, new, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
 
 

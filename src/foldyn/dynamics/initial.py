@@ -17,6 +17,7 @@ from foldyn.dynamics.inertia import moving_energy
 from foldyn.dynamics.system import Packed, follow, place, scratch
 from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.following import following_force
 from foldyn.results.contents import check_variable
 
 AXES = "xyz"
@@ -141,7 +142,8 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: StepPlan, packed: Packed) ->
     if len(body.hidden):  # they stand where they are in balance
         if system.turns:
             turn(body.model, system.actuators, s.factor)
-        inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)])[body.hidden]
+        push = following_force(system.following, inward.ravel(), s.factor)
+        inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
     return Course(
         u=inward,
         v=by.inward(w),

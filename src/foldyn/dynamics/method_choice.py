@@ -19,6 +19,7 @@ from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
+from foldyn.mechanics.following import following_force
 
 AUTO = "auto"
 LONG = 30.0  # periods from which a motion that nothing damps calls for a method that conserves
@@ -155,6 +156,8 @@ def _applied(case: Case, u: NDArray) -> NDArray:
     force = -body.internal(u)
     for load, _ in case.load_terms:
         force += load.ravel()
+    for part, _ in case.following_terms:
+        force += following_force(part, u.ravel(), np.ones((1, 1)))
     change = np.zeros_like(body.rest_angles)
     for turn, _ in case.rest_terms:
         change += turn
@@ -177,6 +180,10 @@ def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
     internal = case.body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
     for load, history in case.load_terms:
+        force = force + history(start) * load
+        size = max(size, float(np.abs(load).max()))
+    for part, history in case.following_terms:
+        load = following_force(part, u.ravel(), np.ones((1, 1))).reshape(u.shape)
         force = force + history(start) * load
         size = max(size, float(np.abs(load).max()))
     return float(np.abs(force[~case.fixed]).max(initial=0.0)) > AT_REST * size

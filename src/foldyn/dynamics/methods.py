@@ -68,12 +68,13 @@ def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, moving
-    supports, actuated folds, the substitutions of a consistent mass matrix.
+    supports, actuated folds, loads that depend on the displacement, the substitutions of a
+    consistent mass matrix.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
-    alone = system.moves or system.turns or called or not packed.mass.lumped
-    return 1 if alone else packed.body.threads
+    alone = system.moves or system.turns or system.follows or called
+    return 1 if alone or not packed.mass.lumped else packed.body.threads
 
 
 class Integrator(NamedTuple):

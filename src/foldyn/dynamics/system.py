@@ -32,6 +32,7 @@ from foldyn.dynamics.inertia import (
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
+from foldyn.mechanics.following import Following, joined, push_following
 from foldyn.mechanics.kernels import energies_of, force_of
 from foldyn.mechanics.threads import wait
 
@@ -50,6 +51,7 @@ class System(NamedTuple):
     varies: bool  # whether there are histories,
     moves: bool  # supports that move,
     turns: bool  # rest angles that change
+    follows: bool  # loads that depend on the displacement
     rows: int  # of arrays: n, and those of the dofs beside displacements
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
@@ -60,6 +62,7 @@ class System(NamedTuple):
     moved: Entries  # S, m
     moved_mass: NDArray  # (h, h) S_k M S_l, kg m2
     actuators: Actuators
+    following: Following
 
 
 class Scratch(NamedTuple):
@@ -80,6 +83,7 @@ class Scratch(NamedTuple):
     stage: NDArray  # (3, n, 3) for methods of several stages
     loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes
     powers: NDArray  # (2,) in and out, at the last step, for methods that keep them, W
+    pushed: NDArray  # (n, 3) forces of loads that depend on the displacement, N; or none (0, 3)
 
 
 class Packed(NamedTuple):
@@ -111,14 +115,17 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     nodal = by.matrix(case.mass)
     mass = inertia(nodal, by.held(case.fixed))
     histories: list[History] = []
-    for term in (*case.load_terms, *case.imposed_terms, *case.base_terms, *case.rest_terms):
-        if term[1] not in histories:
-            histories.append(term[1])
+    forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
+    for _, history in (*forces, *supports, *case.base_terms, *case.rest_terms):
+        if history not in histories:
+            histories.append(history)
     moves = [
         (follow(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
     ]
     loads = [(by.inward(vector), history) for vector, history in case.load_terms]
+    parts = [(part, histories.index(history)) for part, history in case.following_terms]
+    following = joined(parts).placed(by.rank)
     callbacks = Callbacks()
     turns = _entries(case.rest_terms, histories)
     body, turned = actuators(body, *turns)
@@ -126,6 +133,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         varies=bool(histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
+        follows=following.acts,
         rows=by.rows,
         energies=len(body.energy_groups),
         order=by.order,
@@ -136,6 +144,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         moved=_ordered(_entries(moves, histories)),
         moved_mass=_moved_mass(nodal, moves, histories),
         actuators=turned,
+        following=following,
     )
     return Packed(body, system, mass, callbacks, by)
 
@@ -183,9 +192,10 @@ def scratch(system: System) -> Scratch:
     line, energy, factor = np.zeros(nodes), np.zeros(system.energies), np.zeros((histories, 3))
     never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
     stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
+    pushed = np.zeros((nodes if system.follows else 0, 3))
     return Scratch(
         force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
-        powers,
+        powers, pushed,
     )  # fmt: skip
 
 
@@ -262,6 +272,8 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         load = loads.value[k] * s.factor[loads.row[k], 0]
         force[dof] -= load
         power_in += load * speed[dof]
+    if system.follows:  # on one thread only
+        power_in += push_following(system.following, u, v, s.factor, s.pushed, s.force)
     if damping.data.size > 0:
         power_out += add_viscous(damping, speed, force, first, last)
         wait(work.team)  # others look at this member's velocities

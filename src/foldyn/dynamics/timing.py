@@ -138,7 +138,7 @@ def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) ->
 def histories(case: Case) -> Iterator[tuple[str, History]]:
     """Histories of a case that vary, each with what it drives."""
     driven = {
-        "a load": case.load_terms,
+        "a load": (*case.load_terms, *case.following_terms),
         "an imposed displacement": case.imposed_terms,
         "a base motion": case.base_terms,
         "an actuation": case.rest_terms,
@@ -155,7 +155,7 @@ def knots(case: Case) -> NDArray[np.float64]:
 def jumps(case: Case) -> tuple[float, ...]:
     """Times (s) at which loads jump, or may: those that the user names of a function."""
     times: set[float] = set()
-    for _, history in case.load_terms:
+    for _, history in (*case.load_terms, *case.following_terms):
         called = history.code == CALLED
         times.update((history.knots() or ()) if called else history.jumps())
     return tuple(sorted(times))

@@ -35,6 +35,7 @@ from foldyn.errors import FoldynWarning
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import brief, number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
@@ -57,8 +58,9 @@ class Linearized:
         Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
         that a shell has beside the displacements of its nodes.
     stiffness, mass, damping : (nf, nf)
-        Sparse and symmetric: tangent (N/m), mass (kg) and alpha M + beta K0 (N s/m). K0 is the
-        exact tangent at rest, or in this state where the damping says so.
+        Sparse and symmetric: tangent (N/m), mass (kg) and alpha M + beta K0 (N s/m). The tangent
+        has the symmetric part of what loads add that depend on the displacement. K0 is the exact
+        tangent of the structure at rest, or in this state where the damping says so.
     soft : int
         Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
         they count without stiffness. 0 with `secant`.
@@ -102,7 +104,8 @@ def linearize(
         equivalent to an oscillation of that amplitude (see `equivalent_slope`), all others keep
         their tangent.
     load_factor : float
-        How far actuated folds are folded in a given state.
+        How far actuated folds are folded in a given state, and the factor there of loads that
+        depend on the displacement.
 
     Raises
     ------
@@ -114,7 +117,8 @@ def linearize(
     Warns
     -----
     FoldynWarning
-        The state is no equilibrium; loads do not act at rest; hinges have no slope.
+        The state is no equilibrium; loads do not act at rest; hinges have no slope; the stiffness
+        of the loads is not symmetric.
     """
     amplitude = None
     if secant is not None:
@@ -136,6 +140,9 @@ def linearize(
             stacklevel=3,
         )
     stiffness = exact if change is None else sparse.csr_array(exact + change)
+    loads = point.load_stiffness()
+    if loads is not None:
+        stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
     mass = sparse.kron(case.mass, sparse.eye_array(3), format="csr")
     if len(body.hidden):
         massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
@@ -153,6 +160,19 @@ def linearize(
         residual=point.relative,
         unbalanced=point.balance.residual,
     )
+
+
+def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
+    """Symmetric part of the stiffness (m, m) of loads; warns where there is more to it."""
+    share = asymmetry(sparse.csr_array(loads[free][:, free]))
+    if share > ASYMMETRIC:
+        warnings.warn(
+            f"{NO_POTENTIAL.format(share)} modes and frequency responses take its symmetric part, "
+            "which misses how such a load may feed vibrations (flutter): simulated motions do not",
+            FoldynWarning,
+            stacklevel=4,
+        )
+    return sparse.csr_array(0.5 * (loads + loads.T))
 
 
 def _slope_change(

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases import Case, State
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.origami import drives, is_actuated, with_loads
 from foldyn.statics.problem import Balance, balance
@@ -26,11 +28,17 @@ class OperatingPoint(NamedTuple):
 
     displacement: NDArray  # (n, 3) m
     problem: OrigamiProblem
-    factor: float  # of actuated folds there
+    factor: float  # of actuated folds and of loads that depend on the displacement, there
     body: Body  # with its folds as they are actuated
     dofs: NDArray  # (m,) the state on all dofs of the body
     balance: Balance
     kind: str  # "rest", "equilibrium" or "state"
+
+    def load_stiffness(self) -> sparse.csr_array | None:
+        """What loads that depend on the displacement add to the stiffness (m, m), N/m."""
+        if self.kind == "rest" or not self.problem.following.acts:
+            return None
+        return self.problem.load_stiffness(self.dofs, self.factor)
 
     @property
     def relative(self) -> float:
@@ -75,8 +83,9 @@ def _equilibrium(case: Case) -> NDArray:
     nodes, body = case.structure.nodes, case.body
     holds = body.holds(np.zeros(body.size))
     free = free_rigid_motions(nodes, case.fixed.ravel(), holds).shape[1] > 0
-    with warnings.catch_warnings():  # the linearization itself warns of unstable motions
-        warnings.filterwarnings("ignore", "the path loses stability", FoldynWarning)
+    with warnings.catch_warnings():  # the linearization itself warns of these
+        for told in ("the path loses stability", NO_POTENTIAL[:20]):
+            warnings.filterwarnings("ignore", told, FoldynWarning)
         path = trace(case, "newton", factors, inertia_relief=free)
     return path["displacement"].values[-1]
 
@@ -86,11 +95,12 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
 
     Forces that keep their direction have no part in the tangent, and a state does not say by
     which factor they act in it: each may have its own, the one that leaves the least residual.
+    Loads that depend on the displacement act by the factor of actuated folds.
     """
     problem = OrigamiProblem(case, (), displacement)
     body = problem.actuation.body(factor)
-    u, free = body.dofs(displacement), problem.free
-    residual = body.internal(u)
+    u, free = problem.dofs(displacement, factor), problem.free
+    residual = body.internal(u) - problem.following_force(u, factor)
     loads = _load_vectors(case, body)
     if kind == "equilibrium":
         residual = residual - loads.sum(axis=1)
@@ -112,11 +122,13 @@ def _load_vectors(case: Case, body: Body) -> NDArray:
 
 
 def _imbalance(point: OperatingPoint, case: Case) -> str:
+    driven = "actuated folds" if is_actuated(case) else ""
+    driven = "pressure and moments of creases" if case.following_terms else driven
     remedy = {
         "rest": "state = 'equilibrium' finds the equilibrium that belongs to it",
         "equilibrium": "the loads of a free body must balance, or it accelerates",
         "state": "take it from a path of this case"
-        + (", and give the load_factor of its actuated folds" if is_actuated(case) else ""),
+        + (f", and give the load_factor of its {driven}" if driven else ""),
     }[point.kind]
     what = "the rest state" if point.kind == "rest" else "the state"
     return (

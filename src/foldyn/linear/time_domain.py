@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from foldyn.cases import (
     Force,
     History,
     Impose,
+    Load,
     State,
     Table,
     resolve_nodes,
@@ -66,7 +67,8 @@ class Rig:
     """A case held in a state by its loads, ready to be driven.
 
     The loads of the case act as the constant forces that balance the state, so that nothing moves
-    without the drive, whatever the tolerance with which the state was found.
+    without the drive, whatever the tolerance with which the state was found. Actuated folds and
+    loads that depend on the displacement stay what they are.
     """
 
     def __init__(
@@ -78,13 +80,15 @@ class Rig:
         self.drive, self.integration = drive, integration
         massless = case.structure.massless
         self.integrator = integration.integrator or ("generalized_alpha" if massless else "rk4")
-        folded = [load for load in case.loads if isinstance(load, Actuate)]
         history = Table([0.0, 1.0], [point.factor, point.factor])
-        holding = point.body.internal(point.dofs)[: self.state.size]
+        kept = [load for load in case.loads if _moves_along(load, case)]
+        holding = point.body.internal(point.dofs)
+        holding -= point.problem.following_force(point.dofs, point.factor)
+        holding = holding[: self.state.size]
         holding[case.supported_dofs] = 0.0
         holding[np.abs(holding) <= point.problem.force_rounding] = 0.0
-        self._loads: list[Force | Actuate] = [
-            *(replace(load, history=history) for load in folded if point.factor != 0.0),
+        self._loads: list[Load] = [
+            *(replace(cast(Any, load), history=history) for load in kept if point.factor != 0.0),
             *forces(holding.reshape(-1, 3)),
         ]
         self._supports = self._held()
@@ -127,6 +131,11 @@ class Rig:
             initial or State(self.state), tolerance=tolerance, start=start,
         ).samples(progress)  # fmt: skip
         return time, displacement - self.state, State(displacement[-1], velocity[-1])
+
+
+def _moves_along(load: Load, case: Case) -> bool:
+    """Whether a load folds creases or depends on the displacement."""
+    return isinstance(load, Actuate) or load.following(case.structure, "loads") is not None
 
 
 def forces(vectors: NDArray, history: History | None = None) -> list[Force]:

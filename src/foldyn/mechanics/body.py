@@ -100,8 +100,11 @@ class Body(ABC):
     has_discrete_gradient: ClassVar[bool] = False
 
     # ------------------------------------------------------------------ mechanics
-    def dofs(self, displacement: NDArray) -> NDArray:
-        """Vector (m,) of displacements (n, 3), the hidden dofs in balance."""
+    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
+        """Vector (m,) of displacements (n, 3), the hidden dofs in balance.
+
+        push : forces (m,), N, of which those on the hidden dofs count; none by default.
+        """
         return np.asarray(displacement, float).ravel()
 
     @abstractmethod

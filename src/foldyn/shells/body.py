@@ -79,10 +79,11 @@ class ShellBody(Body):
         """Pattern of the tangent."""
         return self._like.sparsity if self._like else shell_pattern(self.model)
 
-    def dofs(self, displacement: NDArray) -> NDArray:
+    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
         """See `Body`."""
         u = np.ascontiguousarray(displacement, float).reshape(-1, 3)
-        return np.concatenate([u.ravel(), balanced_rotations(self.model, self.sparsity, u)])
+        push = None if push is None else push[self.hidden]
+        return np.concatenate([u.ravel(), balanced_rotations(self.model, self.sparsity, u, push)])
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
@@ -222,8 +223,12 @@ def positions(model: ShellModel) -> NDArray:
     return points
 
 
-def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> NDArray:
-    """Dofs (r,), m, of the rotations without moment at displacement u (n, 3), by Newton's method.
+def balanced_rotations(
+    model: ShellModel, pattern: ShellPattern, u: NDArray, push: NDArray | None = None
+) -> NDArray:
+    """Dofs (r,), m, of the rotations in balance at displacement u (n, 3), by Newton's method.
+
+    push : forces (r,), N, on them; none by default.
 
     Raises
     ------
@@ -234,6 +239,8 @@ def balanced_rotations(model: ShellModel, pattern: ShellPattern, u: NDArray) -> 
     force, couple = np.empty_like(u), np.empty_like(x)
     for _ in range(ITERATIONS):
         shell_force(model, u, x, force, couple, work)
+        if push is not None:
+            couple -= push
         if not couple.any():
             return x
         stiffness = shell_tangent(model, pattern, u, x, FLOOR)[u.size :][:, u.size :]

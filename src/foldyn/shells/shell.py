@@ -27,7 +27,7 @@ from foldyn.structures.calibration import check_sheet
 from foldyn.structures.clamps import clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import check_kinds
-from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, FoldPieces, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
 from foldyn.structures.swelling import Swelling, chord_turns
@@ -168,13 +168,26 @@ class Shell(Discretized):
         rows[crease] = self.sides.hinges[self.sides.piece_hinge[first]]
         return read_only(rows)
 
+    @property
+    def fold_pieces(self) -> FoldPieces:
+        """See `Discretized`."""
+        ends = self.sides
+        hinges = ends.hinges[ends.piece_hinge]
+        turned = self.nodes.size + ends.piece_rotations
+        turn = np.full(len(hinges), 1.0 / self._reach)
+        return FoldPieces(hinges, ends.piece_crease, self._piece_shares, turned, turn)
+
+    @cached_property
+    def _piece_shares(self) -> NDArray:
+        """Length of each piece of a crease (c,) over that of the whole crease."""
+        ends = self.sides
+        length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
+        whole = np.bincount(ends.piece_crease, length, len(self.fold_stiffness))
+        return length / whole[ends.piece_crease]
+
     @cached_property
     def edge_nodes(self) -> NDArray:
-        """Nodes along each edge (ne, divisions + 1), from its lower to its higher vertex.
-
-        The creases come first, in their order, then the boundary edges in that of
-        `pattern.boundary`.
-        """
+        """See `Discretized`; p is divisions + 1."""
         ends = np.concatenate([self.pattern.creases, self.pattern.boundary]).reshape(-1, 2)
         count = self.options.divisions - 1
         inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)

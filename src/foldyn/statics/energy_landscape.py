@@ -179,6 +179,11 @@ class _Walker:
         self.problem, self.solver = problem, solver
         if problem.actuation.acts:
             raise InputError("path: is driven by folds; a landscape needs forces or moved supports")
+        if problem.following.acts:
+            raise InputError(
+                "path: has loads that depend on the displacement (pressure, moments of creases); a "
+                "landscape needs forces that keep their direction, or moved supports"
+            )
         self.by_motion = bool(problem.motion.any())
         if self.by_motion == bool(problem.growing.any()):
             raise InputError(
@@ -228,7 +233,7 @@ class _Walker:
         if self.by_motion:
             stable = self.rigidity(station) > 0.0 and station.point.negative <= 0
         else:
-            stable = station.stiffness.factors.negative() == 0
+            stable = station.stiffness.symmetric.negative() == 0
         displacement = self.problem.displacement(station.point.u).copy()
         energy = self.energy(station) - float(base)
         return Equilibrium(displacement, self.stroke(station), energy, stable)

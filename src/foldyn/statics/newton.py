@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from scipy import sparse
 
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import Factorization, SingularTangentError
+from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
 from foldyn.errors import InputError
 from foldyn.statics.problem import Balance, Problem, balance, converged
 from foldyn.values import number, whole
@@ -36,6 +37,7 @@ STALL = 10  # iterations without a new least residual after which an attempt is 
 SLACK = 0.5  # of the residual along a step that a line search leaves
 SHIFT = 1e-13  # of the mean diagonal, added to a tangent that is singular to rounding
 
+S = TypeVar("S", bound=Solution)
 # df from (motion since the start of the step, a, b); nan where the rule cannot be met
 Rule = Callable[[NDArray, NDArray, NDArray], float]
 
@@ -119,10 +121,29 @@ class Tally:
 
 
 class Stiffness:
-    """The factorized tangent at one state."""
+    """The factorized tangent at one state.
 
-    def __init__(self, problem: Problem, matrix: sparse.csr_array, factors: Factorization) -> None:
-        self.problem, self.matrix, self.factors = problem, matrix, factors
+    Parameters
+    ----------
+    problem : Problem
+    matrix : csr_array, shape (m, m)
+    factors : Solution
+        Of the block of the free dofs.
+    symmetric : callable
+        Makes those of its symmetric part, whose eigenvalues are counted.
+    """
+
+    def __init__(
+        self, problem: Problem, matrix: sparse.csr_array, factors: Solution,
+        symmetric: Callable[[], Factorization],
+    ) -> None:  # fmt: skip
+        self.problem, self.matrix, self._factors = problem, matrix, factors
+        self._symmetric = symmetric
+
+    @cached_property
+    def symmetric(self) -> Factorization:
+        """Factors of the symmetric part of the free dofs' block."""
+        return self._symmetric()
 
     def solve(self, force: NDArray, motion: NDArray) -> NDArray:
         """Motion (m,) of all dofs under a force (m,) on the free ones while the held ones move."""
@@ -132,7 +153,7 @@ class Stiffness:
         load = force[problem.free]
         if motion.any():
             load = load - (self.matrix @ full)[problem.free]
-        full[problem.free] = self.factors.solve(load)
+        full[problem.free] = self._factors.solve(load)
         return full
 
     def response(self, u: NDArray, factor: float) -> NDArray:
@@ -161,16 +182,16 @@ class Solver:
         matrix = sparse.csr_array(self.problem.tangent(u, factor, before))
         block = self.reduce(matrix)
         self.tally.factorizations += 1
-        try:
-            factors = self._factorize(block)
-        except SingularTangentError:
-            diagonal = np.abs(block.diagonal())
-            if not np.isfinite(diagonal).all():
-                raise
-            shift = SHIFT * float(diagonal.mean()) or 1.0
-            shifted = block + shift * sparse.eye_array(block.shape[0], format="csc")
-            factors = self._factorize(sparse.csc_array(shifted))
-        return Stiffness(self.problem, matrix, factors)
+        if block.is_symmetric:
+            own = _factorized(block.exact, self._factorize)
+            return Stiffness(self.problem, matrix, own, lambda: own)
+        factors = _factorized(block.exact, Unsymmetric)
+
+        def symmetric() -> Factorization:
+            self.tally.factorizations += 1
+            return _factorized(block.symmetric, self._factorize)
+
+        return Stiffness(self.problem, matrix, factors, symmetric)
 
     def correct(
         self, u: NDArray, factor: float, rule: Rule | None = None,
@@ -248,3 +269,16 @@ class Solver:
             low, high = (share, high) if along * start > 0.0 else (low, share)
             share = 0.5 * (low + high)
         return share
+
+
+def _factorized(block: sparse.csc_array, factorize: Callable[[sparse.csc_array], S]) -> S:
+    """Factors of a block, shifted where it is singular to rounding."""
+    try:
+        return factorize(block)
+    except SingularTangentError:
+        diagonal = np.abs(block.diagonal())
+        if not np.isfinite(diagonal).all():
+            raise
+        shift = SHIFT * float(diagonal.mean()) or 1.0
+        shifted = block + shift * sparse.eye_array(block.shape[0], format="csc")
+        return factorize(sparse.csc_array(shifted))

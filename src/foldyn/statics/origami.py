@@ -16,6 +16,7 @@ from scipy import sparse
 from foldyn.cases import Actuate, Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
 
@@ -70,6 +71,8 @@ class OrigamiProblem:
         Displacements (m) imposed per unit of the factor.
     actuation : Actuation
         The body at each factor.
+    following : Following
+        Forces that depend on the displacement: at every factor in row 0, growing in row 1.
     """
 
     def __init__(
@@ -82,10 +85,12 @@ class OrigamiProblem:
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
         self._work = body.workspaces(1)[0]
         self._shape = structure.nodes.shape
-        self._rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
         loads, chosen = range(len(case.loads)), set(constant)
         steady = with_loads(case, [i for i in loads if i in chosen])
         growing = with_loads(case, [i for i in loads if i not in chosen])
+        kinds = enumerate((steady, growing))
+        self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
+        self._rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
         self.constant = self._extended(_total(steady.load_terms, self._shape))
         self.growing = self._extended(_total(growing.load_terms, self._shape))
         self.motion = self._extended(_total(case.imposed_terms, self._shape))
@@ -105,6 +110,11 @@ class OrigamiProblem:
         """Values (n, 3) as those of all dofs (m,), zero at the hidden ones."""
         return np.concatenate([np.asarray(values, float).ravel(), np.zeros(self._hidden)])
 
+    def dofs(self, displacement: NDArray, factor: float) -> NDArray:
+        """State (m,) with displacements (n, 3) of the nodes, the hidden dofs in balance."""
+        push = self.external(self._extended(displacement), factor)
+        return self.actuation.body(factor).dofs(displacement, push)
+
     def displacement(self, u: NDArray) -> NDArray:
         """Displacements (n, 3) of the nodes in a state (m,)."""
         return u[: math.prod(self._shape)].reshape(self._shape)
@@ -120,6 +130,8 @@ class OrigamiProblem:
     def external(self, u: NDArray, factor: float) -> NDArray:
         """External forces (m,), N."""
         force = self.constant + factor * self.growing
+        if self.following.acts:
+            force = force + self.following_force(u, factor)
         if self._adaptive is not None:
             added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
             if added.shape != self._shape:
@@ -139,12 +151,25 @@ class OrigamiProblem:
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""
-        return self.actuation.body(factor).step_tangent(u, before)
+        matrix = self.actuation.body(factor).step_tangent(u, before)
+        if not self.following.acts:
+            return matrix
+        return sparse.csr_array(matrix + self.load_stiffness(u, factor))
+
+    def following_force(self, u: NDArray, factor: float) -> NDArray:
+        """Forces (m,), N, of loads that depend on the displacement."""
+        return following_force(self.following, u, _factors(1.0, factor))
+
+    def load_stiffness(self, u: NDArray, factor: float) -> sparse.csr_array:
+        """Part (m, m) of the tangent, N/m, of loads that depend on the displacement."""
+        return following_tangent(self.following, u, _factors(1.0, factor))
 
     def rate(self, u: NDArray, factor: float) -> NDArray:
         """Derivative (3n,) of the residual with respect to the factor at fixed u."""
         if not self.actuation.acts and self._adaptive is None and self._relief is None:
-            return -self.growing
+            if not self.following.acts:
+                return -self.growing
+            return -self.growing - following_force(self.following, u, _factors(0.0, 1.0))
         ahead, behind = self.residual(u, factor + PROBE), self.residual(u, factor - PROBE)
         return (ahead - behind) / (2.0 * PROBE)
 
@@ -168,6 +193,11 @@ class OrigamiProblem:
             return 0.0
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
         return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
+
+
+def _factors(steady: float, growing: float) -> NDArray:
+    """Factors (2, 1) of loads that are constant, and of those that grow."""
+    return np.array([[steady], [growing]])
 
 
 def with_loads(case: Case, chosen: Sequence[int]) -> Case:

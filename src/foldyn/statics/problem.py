@@ -56,11 +56,12 @@ class Problem(Protocol):
         ...
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> Any:
-        """Symmetric sparse (m, m) derivative of the residual, slopes floored where they vanish.
+        """Sparse (m, m) derivative of the residual, slopes floored where they vanish.
 
-        Only for steps and for the count of negative eigenvalues; the residual never sees a floor.
-        With `before`, the state from which the last step came, it may be another matrix that
-        serves the next step better; without, it is the derivative.
+        Symmetric, but for loads that have no potential. Only for steps and, its symmetric part, for
+        the count of negative eigenvalues; the residual never sees a floor. With `before`, the state
+        from which the last step came, it may be another matrix that serves the next step better;
+        without, it is the derivative.
         """
         ...
 

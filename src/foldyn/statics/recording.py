@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.errors import ComputationError, FoldynWarning, MotionInterrupted
+from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
 from foldyn.statics.newton import Solver
 from foldyn.statics.origami import OrigamiProblem
@@ -171,6 +173,8 @@ def _dataset(
     message = stability_warning(points, from_rest, METHODS[facts["method"]].rule is not None)
     if message:
         warnings.warn(message, FoldynWarning, stacklevel=5)
+    if message := _asymmetry_warning(points[-1], problem):
+        warnings.warn(message, FoldynWarning, stacklevel=5)
     residuals = [problem.residual(p.u, p.factor) for p in points]
     energies = np.array([problem.energies(p.u, p.factor) for p in points])
     own = "an adaptive load, a function of the user's own, acted on it"
@@ -200,6 +204,20 @@ def _dataset(
             **stability_facts(points, from_rest),
         },
         (own,) if adaptive else (),
+    )
+
+
+def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:
+    """Warning where stability is judged without what loads have that is not symmetric."""
+    if point.negative < 0 or not problem.following.acts:
+        return ""
+    loads = problem.load_stiffness(point.u, point.factor)
+    share = asymmetry(sparse.csr_array(loads[problem.free][:, problem.free]))
+    if share <= ASYMMETRIC:
+        return ""
+    return (
+        f"{NO_POTENTIAL.format(share)} the equilibria are exact, but negative eigenvalues are "
+        "those of the symmetric part of the tangent, and flutter is not looked for"
     )
 
 

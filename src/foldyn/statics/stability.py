@@ -127,7 +127,7 @@ def _crossing(section: Section, low: Mark, high: Mark) -> Station | None:
     kind = "bifurcation" if section.climbs(low) == section.climbs(high) else "limit"
     count = min(low.negative, high.negative)
     single = abs(high.negative - low.negative) == 1
-    if single and low.station.stiffness.factors.pivots() is not None:
+    if single and low.station.stiffness.symmetric.pivots() is not None:
         critical = _zero_of_determinant(section, low, high)
     else:
         critical = _bisected(section, low, high)
@@ -150,7 +150,7 @@ def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | N
 
 
 def _log_determinant(mark: Mark) -> float:
-    pivots = mark.station.stiffness.factors.pivots()
+    pivots = mark.station.stiffness.symmetric.pivots()
     with np.errstate(divide="ignore"):
         return float(np.log(np.abs(pivots)).sum()) if pivots is not None else np.nan
 
@@ -167,8 +167,8 @@ def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
 def critical_modes(solver: Solver, station: Station, count: int = 1) -> tuple[NDArray, NDArray]:
     """Eigenvalues (k,) of the tangent nearest to zero, N/m, and their oriented shapes (m, k)."""
     problem = solver.problem
-    matrix = solver.reduce(station.stiffness.matrix)
-    values, vectors = softest_modes(matrix, station.stiffness.factors, count, dense=300)
+    matrix = solver.reduce(station.stiffness.matrix).symmetric
+    values, vectors = softest_modes(matrix, station.stiffness.symmetric, count, dense=300)
     nearest = np.argsort(np.abs(values))[:count]
     shapes = np.zeros((len(problem.free) + len(problem.held), len(nearest)))
     shapes[problem.free] = vectors[:, nearest]

@@ -85,7 +85,7 @@ Walk = Iterator[Station]
 def arrive(solver: Solver, attempt: Attempt) -> Station:
     """Station at the equilibrium that a correction found."""
     stiffness = solver.stiffness(attempt.u, attempt.factor)
-    negative = stiffness.factors.negative() if solver.settings.stability else -1
+    negative = stiffness.symmetric.negative() if solver.settings.stability else -1
     relative = attempt.balance.relative
     point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
     return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))

@@ -20,6 +20,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 
 
@@ -63,8 +64,11 @@ class StepMatrix:
     def __init__(self, packed: Packed, symmetric: bool) -> None:
         mass, system = packed.mass, packed.system
         self.blocks = packed.body.blocks()
-        nodes = system.rows
+        nodes, self._following, self._symmetric = system.rows, system.following, symmetric
+        row, column = following_places(system.following)
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
+        if len(row):
+            nodal = _with_zeros(nodal, row // 3, column // 3)
         masses_at = block_keys(nodal.indptr, nodal.indices)
         self.pattern = joined(self.blocks.pattern, masses_at)
         own = block_keys(self.pattern.indptr, self.pattern.indices)
@@ -74,6 +78,8 @@ class StepMatrix:
         damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
         damping.sort_indices()
         viscous[np.searchsorted(own, block_keys(damping.indptr, damping.indices))] = damping.data
+        block = np.searchsorted(own, (row // 3) * nodes + column // 3)
+        self._follow = 9 * block + 3 * (row % 3) + column % 3
         self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
@@ -81,6 +87,7 @@ class StepMatrix:
         along = self.blocks.order
         self.free = along[~held[along]]
         filled = self.blocks.filled(self.pattern) | (masses != 0.0)
+        filled.reshape(-1)[self._follow] = True
         row, column, take = _entries(self.pattern, self.free, filled)
         size, width = len(self.free), int(np.abs(row - column).max(initial=0))
         self._sparse = _Sparse(row, column, take, size, symmetric)
@@ -90,6 +97,17 @@ class StepMatrix:
         self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
         self.factorizations = 0
+
+    def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
+        """Add a share of the stiffness of loads that depend on the displacement u (n, 3).
+
+        factor : (h, 3) of the histories. A symmetric matrix gets the symmetric part.
+        """
+        if not self._following.acts:
+            return
+        values = np.empty(len(self._follow))
+        put_following(self._following, u.reshape(-1), factor, self._symmetric, values)
+        np.add.at(self.stiffness.reshape(-1), self._follow, share * values)
 
     def factorize(self, weights: Weights) -> None:
         """Make the matrix from the stiffness as it stands, and factorize it.
@@ -169,6 +187,14 @@ class _Sparse:
         _gather(weights, matrices, self._take, put, data)
         shape = (self._size, self._size)
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
+
+
+def _with_zeros(nodal: sparse.csr_array, row: NDArray, column: NDArray) -> sparse.csr_array:
+    """A nodal matrix with entries, zero unless it has them, at further places."""
+    own = nodal.tocoo()
+    data = np.concatenate([own.data, np.zeros(len(row))])
+    places = np.concatenate([own.row, row]), np.concatenate([own.col, column])
+    return sparse.coo_array((data, places), nodal.shape).tocsr()
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -71,6 +71,7 @@ class Phase(NamedTuple):
     a: NDArray  # m/s2
     force: NDArray  # F_int + beta K0 v - p, N
     factor: NDArray  # (h, 3) of the histories
+    pushed: NDArray  # forces of loads that depend on the displacement, N; or none (0, 3)
 
 
 class Scheme(ABC):
@@ -106,9 +107,11 @@ class Scheme(ABC):
         self.shift = np.zeros(shape)  # new.q - old.q: their difference would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
-        self.old = Phase(course.u, course.v, course.carry, np.zeros(shape), np.zeros(histories))
+        pushed = self.scratch.pushed
+        rest = np.zeros(shape), np.zeros(histories), np.zeros_like(pushed)
+        self.old = Phase(course.u, course.v, course.carry, *rest)
         q, w, a, force = (np.zeros(shape) for _ in range(4))
-        self.new = Phase(q, w, a, force, np.zeros(histories))
+        self.new = Phase(q, w, a, force, np.zeros(histories), np.zeros_like(pushed))
         # mean velocity of the last step, and its change per time from the middle of one to another
         self._speed, self._growth, self._last = course.v.copy(), np.zeros(shape), 0.0
         self.massless = packed.mass.diagonal <= 0.0
@@ -162,7 +165,7 @@ class Scheme(ABC):
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
-        old.force[:], old.factor[:] = s.force, s.factor
+        old.force[:], old.factor[:], old.pushed[:] = s.force, s.factor, s.pushed
         self.folds[:] = self.work.fold_angle
 
     def hinge_forces(self) -> float:
@@ -293,13 +296,14 @@ class Newton:
 
 
 @kernel
-def norms(system, force, inertia, factor):
+def norms(system, force, inertia, factor, following):
     """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
 
     The force becomes zero at the supports, where it is a reaction.
 
     inertia : sum of squares of the inertial forces, N2.
     factor : (h, 3) of the histories, for the loads.
+    following : forces of loads that depend on the displacement (n, 3), N; or none (0, 3).
     """
     values, reactions, pushed, left = flat(force), 0.0, 0.0, 0.0
     for k in range(system.supported.size):
@@ -310,17 +314,22 @@ def norms(system, force, inertia, factor):
     for k in range(loads.dof.size):
         load = loads.value[k] * factor[loads.row[k], 0]
         pushed += load * load
+    for load in flat(following):
+        pushed += load * load
     for i in range(values.size):
         left += values[i] * values[i]
     return np.sqrt(left), np.sqrt(max(inertia, reactions, pushed))
 
 
 @kernel
-def add_load_work(loads, before, after, shift, work):
-    """`work` (J) and that of the loads along a shift (n, 3), for factors (h, 3) at its ends."""
-    along = flat(shift)
+def add_load_work(loads, old, new, shift, work):
+    """`work` (J) and that of the loads along a shift (n, 3), between two phases."""
+    along, before, after = flat(shift), old.factor, new.factor
     for k in range(loads.dof.size):
         row = loads.row[k]
         mean = 0.5 * (before[row, 0] + after[row, 0])
         work += loads.value[k] * mean * along[loads.dof[k]]
+    one, other = flat(old.pushed), flat(new.pushed)
+    for i in range(one.size):
+        work += 0.5 * (one[i] + other[i]) * along[i]
     return work

@@ -1,0 +1,136 @@
+"""Loads that follow the sheet: pressure on panels, moments of creases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.history import History, as_history
+from foldyn.cases.load import Load
+from foldyn.cases.regions import check_panels, resolve_panels
+from foldyn.cases.selection import check_creases, resolve_creases
+from foldyn.errors import InputError
+from foldyn.mechanics.following import Following, moments, pressures
+from foldyn.values import brief, number, number_or_list, show
+
+
+@brief
+@dataclass(frozen=True)
+class Pressure(Load):
+    """Pressure on panels, which stays normal to them as they move, times a history.
+
+    It acts along the normal of the panels' fronts: a positive pressure inflates a closed body whose
+    fronts are outside. The force on a triangle is the pressure times its present area.
+
+    Parameters
+    ----------
+    pressure : float
+        Pa; negative towards the front.
+    panels : int, sequence of int, or "all"
+        Panels by number; all by default.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    pressure: float
+    panels: int | str | Sequence[int] = "all"
+    history: History | Callable[[Any], Any] | None = None
+
+    keys = {"pressure": "pressure", "panels": "panels"}
+    apart = "a pressure acts on panels"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "pressure", number("pressure", self.pressure, unit="Pa"))
+        object.__setattr__(self, "panels", check_panels("panels", self.panels))
+        object.__setattr__(self, "history", as_history(self.history))
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`."""
+        chosen = resolve_panels(structure, self.panels, f"{place}.panels")
+        pressure = np.full(len(chosen), self.pressure)
+        return pressures(structure.nodes, structure.triangles[chosen], pressure)
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse a pressure on panels whose nodes are all held."""
+        nodes = np.unique(self.following(structure, place).triangles)
+        if fixed[nodes].all():
+            raise InputError(
+                f".panels = {show(self.panels)}: supports hold all nodes of these panels along "
+                "all axes; load other panels, or free these",
+                place,
+            )
+
+
+@brief
+@dataclass(frozen=True)
+class CreaseMoment(Load):
+    """Moments of creases, times a history: pairs of equal and opposite moments on their panels.
+
+    The moment does work as the dihedral grows: a positive one opens a valley. A crease whose fold
+    law is linear, M = k (angle - rest), comes to rest at rest + moment / k.
+
+    Parameters
+    ----------
+    creases : int, sequence of int, or {"all", "mountain", "valley"}
+        Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
+        "valley", or "all", which are all but the flat ones.
+    moment : float or sequence of float
+        N m of each whole crease, of all these creases or of each.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    creases: int | str | Sequence[int]
+    moment: float | Sequence[float]
+    history: History | Callable[[Any], Any] | None = None
+
+    keys = {"creases": "creases", "moment": "moment"}
+    apart = "acts on creases"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "creases", check_creases("creases", self.creases))
+        object.__setattr__(self, "moment", number_or_list("moment", self.moment, "crease"))
+        object.__setattr__(self, "history", as_history(self.history))
+
+    def of_creases(self, structure: Any, place: str) -> tuple[NDArray, NDArray]:
+        """Its creases (k,), and the moment (k,), N m, of each."""
+        creases = resolve_creases(structure, self.creases, f"{place}.creases")
+        moment = np.array(self.moment)
+        if moment.ndim and len(moment) != len(creases):
+            raise InputError(
+                f" = {show(self.moment)}: {len(moment)} moments for {len(creases)} creases; give "
+                "one, or one for each",
+                f"{place}.moment",
+            )
+        return creases, np.broadcast_to(moment, creases.shape)
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`; a shell's pieces of a crease take their part of it by their length."""
+        creases, moment = self.of_creases(structure, place)
+        each = np.zeros(len(structure.folds))
+        each[creases] = moment
+        pieces = structure.fold_pieces
+        chosen = np.isin(pieces.fold, creases)
+        part = (each[pieces.fold] * pieces.share)[chosen]
+        return moments(
+            structure.nodes, pieces.hinges[chosen], part, pieces.turned[chosen], pieces.turn[chosen]
+        )
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse moments of creases between panels that are held."""
+        creases, _ = self.of_creases(structure, place)
+        pieces = structure.fold_pieces
+        held = fixed[pieces.hinges].all(axis=(1, 2)) & (pieces.turned < 0).all(axis=1)
+        still = np.intersect1d(creases, pieces.fold[held])
+        if still.size:
+            raise InputError(
+                f".creases = {show(self.creases)}: supports hold the panels on both sides of "
+                f"crease {still[0]}; leave it out, or free these",
+                place,
+            )

@@ -1,0 +1,97 @@
+"""What every load is: a frozen dataclass that says what it does at factor 1 of its history."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.decode import Part
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.following import Following
+
+
+class Load(Part):
+    """A load: a frozen dataclass that says what it does at factor 1 of its history.
+
+    A new kind is a subclass that is listed in `LOADS`; `place`, its place among the loads, is for
+    messages.
+
+    Attributes
+    ----------
+    apart : str
+        In messages: why it cannot share a table with another load.
+    arrows : bool
+        Whether pictures show its forces as arrows at the nodes.
+    moves : bool
+        Whether its history is that of a motion, whose velocity counts.
+    """
+
+    apart: ClassVar[str]
+    arrows: ClassVar[bool] = False
+    moves: ClassVar[bool] = False
+    history: Any
+
+    def forces(self, structure: Any, place: str) -> NDArray[np.float64] | None:
+        """Forces (n, 3), N, on all nodes; None if it is not a force."""
+        return None
+
+    def loaded(self, structure: Any, place: str) -> NDArray[np.int64]:
+        """Nodes on which it acts; none if it acts on all, or on creases."""
+        return np.zeros(0, np.int64)
+
+    def rest_changes(
+        self, structure: Any, place: str
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+        """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
+        return None
+
+    def following(self, structure: Any, place: str) -> Following | None:
+        """Forces that depend on the displacement, at factor 1; None if it has none."""
+        return None
+
+    def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
+        """Refuse what the structure or its held dofs (n, 3) do not allow."""
+
+
+def check_held(
+    what: str, nodes: NDArray[np.int64], acts: NDArray[np.int64], fixed: NDArray[np.bool_],
+    place: str, told: bool = True,
+) -> None:  # fmt: skip
+    """Refuse a load that acts on held axes only.
+
+    Parameters
+    ----------
+    what : str
+        The load, in messages: "the force [0, 0, 1]".
+    nodes, acts : ndarray of int
+        Nodes and axes on which it acts.
+    fixed : ndarray of bool, shape (n, 3)
+    place : str
+    told : bool
+        Whether one that acts on held axes in part is warned of.
+    """
+    held = fixed[np.ix_(nodes, acts)]
+    if not held.any():
+        return
+    listed = ", ".join(
+        f"{node} ({''.join('xyz'[a] for a in acts[row])})"
+        for node, row in zip(nodes, held, strict=True)
+        if row.any()
+    )
+    listed = listed if len(listed) < 80 else listed[:76] + " ..."
+    if held.all():
+        raise InputError(
+            f": {what} acts only where supports hold its nodes: {listed}; load other nodes or "
+            "axes, or free these",
+            place,
+        )
+    if told:
+        warnings.warn(
+            f"{place}: {what} acts in part where supports hold its nodes: {listed}; that part "
+            "only adds to the reactions",
+            FoldynWarning,
+            stacklevel=5,
+        )

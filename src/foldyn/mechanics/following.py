@@ -1,0 +1,290 @@
+"""Loads that depend on the displacement: pressure, moments of creases, tension of bars.
+
+Each entry holds what it needs of the rest geometry, its value at factor 1 and the number of its
+history. With x the positions of its nodes and p, M, N its value times the factor:
+
+- a triangle with corners x1, x2, x3 under pressure p: p/6 (x2 - x1) x (x3 - x1) on each corner.
+  On a closed surface this is p times the gradient of the volume inside;
+- a hinge with moment M: M times the gradient of its angle, the dihedral less `turn` times the two
+  hidden dofs `turned` (the rotations of a shell's sides). Potential -M angle;
+- a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force over the rest length):
+  -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2.
+
+The derivative of a pressure's forces is not symmetric triangle by triangle; on a closed surface,
+and on an open one whose rim is held, the sum is (Hibbitt, Int. J. Solids Struct. 15, 1979).
+
+Vectors of dofs are flat, 3 node + axis and then the hidden ones, or arrays of rows of three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
+
+ASYMMETRIC = 1e-3  # share of the stiffness of loads that is not symmetric and not to be overlooked
+NO_POTENTIAL = (
+    "the pressure acts on panels with free edges and has no potential: {:.0%} of its stiffness is "
+    "not symmetric;"
+)
+
+
+class Following(NamedTuple):
+    """Entries of t triangles, h hinges, b bars; `row` numbers histories."""
+
+    triangles: NDArray  # (t, 3) nodes, counter-clockwise from the front
+    sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
+    pressure: NDArray  # (t,) Pa, positive along the front's normal
+    pressure_row: NDArray  # (t,)
+    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
+    corners: NDArray  # (h, 4, 3) their rest positions from any origin nearby, m
+    turned: NDArray  # (h, 2) hidden dofs; -1 for none
+    turn: NDArray  # (h,) rad/m
+    moment: NDArray  # (h,) N m, positive where it opens the dihedral
+    moment_row: NDArray  # (h,)
+    bars: NDArray  # (b, 2) nodes
+    vectors: NDArray  # (b, 3) rest vectors from the first to the second, m
+    tension: NDArray  # (b,) N/m
+    tension_row: NDArray  # (b,)
+
+    @property
+    def acts(self) -> bool:
+        """Whether there are entries."""
+        return bool(len(self.pressure) + len(self.moment) + len(self.tension))
+
+    def placed(self, rank: NDArray) -> Following:
+        """The same for nodes that stand at the places rank (n,)."""
+        return self._replace(
+            triangles=_whole(rank[self.triangles]),
+            hinges=_whole(rank[self.hinges]),
+            bars=_whole(rank[self.bars]),
+        )
+
+
+def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
+    """Pressure (t,), Pa, on triangles (t, 3) of nodes at x (n, 3)."""
+    corners = x[triangles]
+    return _none()._replace(
+        triangles=_whole(triangles),
+        sides=_real(corners[:, 1:] - corners[:, :1]),
+        pressure=_real(pressure),
+        pressure_row=np.zeros(len(triangles), np.int64),
+    )
+
+
+def moments(
+    x: NDArray, hinges: NDArray, moment: NDArray, turned: NDArray, turn: NDArray
+) -> Following:
+    """Moments (h,), N m, on hinges (h, 4) of nodes at x (n, 3); `turned`, `turn`: `Following`."""
+    corners = x[hinges]
+    return _none()._replace(
+        hinges=_whole(hinges),
+        corners=_real(corners - corners.mean(axis=1, keepdims=True)),
+        turned=_whole(turned),
+        turn=_real(turn),
+        moment=_real(moment),
+        moment_row=np.zeros(len(hinges), np.int64),
+    )
+
+
+def tensions(x: NDArray, bars: NDArray, tension: NDArray) -> Following:
+    """Tension (b,), N/m, of bars (b, 2) between nodes at x (n, 3)."""
+    return _none()._replace(
+        bars=_whole(bars),
+        vectors=_real(x[bars[:, 1]] - x[bars[:, 0]]),
+        tension=_real(tension),
+        tension_row=np.zeros(len(bars), np.int64),
+    )
+
+
+def joined(parts: Iterable[tuple[Following, int]]) -> Following:
+    """All entries of several, each part with the number of its history."""
+    numbered = [_none()]
+    for part, row in parts:
+        rows = {
+            name: np.full_like(getattr(part, name), row)
+            for name in ("pressure_row", "moment_row", "tension_row")
+        }
+        numbered.append(part._replace(**rows))
+    return Following(*map(np.concatenate, zip(*numbered, strict=True)))
+
+
+def _none() -> Following:
+    def real(*shape: int) -> NDArray:
+        return np.zeros((0, *shape))
+
+    def whole(*shape: int) -> NDArray:
+        return np.zeros((0, *shape), np.int64)
+
+    return Following(
+        whole(3), real(2, 3), real(), whole(),
+        whole(4), real(4, 3), whole(2), real(), real(), whole(),
+        whole(2), real(3), real(), whole(),
+    )  # fmt: skip
+
+
+def _whole(values: NDArray) -> NDArray:
+    return np.ascontiguousarray(values, np.int64)
+
+
+def _real(values: NDArray) -> NDArray:
+    return np.ascontiguousarray(values, float)
+
+
+def following_force(loads: Following, u: NDArray, factor: NDArray) -> NDArray:
+    """Forces (m,), N, on all dofs at u (m,) for the factors (h, k) of histories, in column 0."""
+    out = np.zeros(u.size)
+    add_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, out)
+    return out
+
+
+def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.csr_array:
+    """Minus the derivative (m, m) of `following_force`, N/m: what adds to a stiffness."""
+    row, column = following_places(loads)
+    values = np.empty(len(row))
+    put_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, False, values)
+    return sparse.coo_array((values, (row, column)), (u.size, u.size)).tocsr()
+
+
+def asymmetry(matrix: sparse.csr_array) -> float:
+    """Norm of the antisymmetric part of a matrix over its own; 0 of a matrix of zeros."""
+    whole = float(np.linalg.norm(matrix.data))
+    apart = sparse.csr_array(matrix - matrix.T)
+    return 0.5 * float(np.linalg.norm(apart.data)) / whole if whole else 0.0
+
+
+def following_places(loads: Following) -> tuple[NDArray, NDArray]:
+    """Row and column (e,) of each entry that `put_following` gives."""
+    rows, columns = [], []
+    for nodes in (loads.triangles, loads.hinges, loads.bars):
+        width = 3 * nodes.shape[1]
+        dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, width)
+        rows.append(np.repeat(dofs, width, axis=1).ravel())
+        columns.append(np.tile(dofs, (1, width)).ravel())
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+@kernel
+def _edges(loads, u, t, a, b):
+    """Vectors from the first corner of a triangle to the others, to a and b (3,)."""
+    first, second, third = loads.triangles[t, 0], loads.triangles[t, 1], loads.triangles[t, 2]
+    for c in range(3):
+        a[c] = loads.sides[t, 0, c] + u[3 * second + c] - u[3 * first + c]
+        b[c] = loads.sides[t, 1, c] + u[3 * third + c] - u[3 * first + c]
+
+
+@kernel
+def _hinge(loads, u, h, points, gradient):
+    """Corners of a hinge and the gradient of its dihedral, (4, 3) both."""
+    for v in range(4):
+        for c in range(3):
+            points[v, c] = loads.corners[h, v, c] + u[3 * loads.hinges[h, v] + c]
+    p, g = flat(points), flat(gradient)
+    found = dihedral_gradient(
+        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+    )
+    for k in range(12):
+        g[k] = found[1 + k]
+
+
+@kernel
+def add_following(loads, u, factor, out):
+    """Add the forces (N) at u for the factors (h, k), in column 0, to `out`; all flat."""
+    a, b = np.empty(3), np.empty(3)
+    points, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for t in range(loads.pressure.size):
+        p = loads.pressure[t] * factor[loads.pressure_row[t], 0] / 6.0
+        _edges(loads, u, t, a, b)
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            push = p * (a[d] * b[e] - a[e] * b[d])
+            for v in range(3):
+                out[3 * loads.triangles[t, v] + c] += push
+    for h in range(loads.moment.size):
+        moment = loads.moment[h] * factor[loads.moment_row[h], 0]
+        _hinge(loads, u, h, points, gradient)
+        for v in range(4):
+            for c in range(3):
+                out[3 * loads.hinges[h, v] + c] += moment * gradient[v, c]
+        for k in range(2):
+            if loads.turned[h, k] >= 0:
+                out[loads.turned[h, k]] -= moment * loads.turn[h]
+    for e in range(loads.tension.size):
+        pull = loads.tension[e] * factor[loads.tension_row[e], 0]
+        first, second = loads.bars[e, 0], loads.bars[e, 1]
+        for c in range(3):
+            along = pull * (loads.vectors[e, c] + u[3 * second + c] - u[3 * first + c])
+            out[3 * first + c] += along
+            out[3 * second + c] -= along
+
+
+@kernel
+def push_following(loads, u, v, factor, pushed, bracket):
+    """Take the forces at u from `bracket`, keep them in `pushed`; returns their power on v, W.
+
+    All (rows, 3).
+    """
+    force, left, speed = flat(pushed), flat(bracket), flat(v)
+    for i in range(force.size):
+        force[i] = 0.0
+    add_following(loads, flat(u), factor, force)
+    power = 0.0
+    for i in range(force.size):
+        left[i] -= force[i]
+        power += force[i] * speed[i]
+    return power
+
+
+@kernel
+def put_following(loads, u, factor, symmetric, out):
+    """Minus the derivative of the forces, in the order of `following_places`, to out (e,).
+
+    symmetric : whether only its symmetric part is wanted.
+    """
+    a, b, side = np.empty(3), np.empty(3), np.empty((3, 3))
+    points, gradient, block = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3, 4, 3))
+    at = 0
+    for t in range(loads.pressure.size):
+        p = loads.pressure[t] * factor[loads.pressure_row[t], 0] / 6.0
+        _edges(loads, u, t, a, b)
+        for c in range(3):  # the side that faces each corner: d(a x b) = sum of s x dx
+            side[0, c], side[1, c], side[2, c] = b[c] - a[c], -b[c], a[c]
+        for v in range(3):
+            for c in range(3):
+                for w in range(3):
+                    for d in range(3):
+                        value = _cross(side, w, c, d)
+                        if symmetric:
+                            value = 0.5 * (value + _cross(side, v, d, c))
+                        out[at] = -p * value
+                        at += 1
+    for h in range(loads.moment.size):
+        _hinge(loads, u, h, points, gradient)
+        block[:] = 0.0
+        add_hessian(points, gradient, -loads.moment[h] * factor[loads.moment_row[h], 0], block)
+        values = flat(block)
+        for k in range(values.size):
+            out[at + k] = values[k]
+        at += values.size
+    for e in range(loads.tension.size):
+        pull = loads.tension[e] * factor[loads.tension_row[e], 0]
+        for p in range(6):
+            for q in range(6):
+                out[at] = 0.0 if p % 3 != q % 3 else pull if p == q else -pull
+                at += 1
+
+
+@kernel
+def _cross(side, w, c, d):
+    """Entry (c, d) of the matrix of the cross product with row w of `side`."""
+    if c == d:
+        return 0.0
+    other = 3 - c - d
+    return -side[w, other] if (c + 1) % 3 == d else side[w, other]
