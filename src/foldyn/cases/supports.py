@@ -1,4 +1,4 @@
-"""Supports: nodes held at rest, nodes moved as prescribed, and a base that moves."""
+"""Supports: nodes held at rest or moved as prescribed, a base that moves; the registry of all."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from foldyn.cases.dashpots import AXES, DIRECTIONS, Dashpot
 from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
 from foldyn.values import brief, choice, number, number_or_list, show
-
-AXES = "xyz"
-DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 
 
 @brief
@@ -116,8 +114,8 @@ class BaseMotion(Part):
         object.__setattr__(self, "value", number("value", self.value))
 
 
-Support = Fix | Impose | BaseMotion
-SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion)
+Support = Fix | Impose | BaseMotion | Dashpot
+SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Dashpot)
 
 
 def support_from(table: Any, folder: Path | None = None) -> Support:
@@ -125,9 +123,20 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
     given = given_keys(table, SUPPORTS)
     if not given:
         raise InputError(
-            ": give nodes and axes (held), nodes, axis and displacement (moved), or base and "
-            "history (a base that moves)"
+            ": give nodes and axes (held), nodes, axis and displacement (moved), base and "
+            "history (a base that moves), or nodes and dashpot (damped)"
         )
+    if "dashpot" in given:
+        strange = [key for key in table if key not in Dashpot.keys]
+        if strange:
+            raise InputError(
+                f": damps the motion of nodes; leave out {strange[0]}, and write [[supports]] for "
+                "each support",
+                ".dashpot",
+            )
+        return Dashpot.of(table, folder)
+    if given & {"between", "direction"}:
+        raise InputError(": missing; between and direction are those of a dashpot", ".dashpot")
     if "base" in given:
         strange = [key for key in ("nodes", "axes", "axis") if key in given]
         check_axis(".base", table["base"])

@@ -4,11 +4,11 @@ The response to a moving base is the absolute displacement over that of the base
 t the unit translation of all nodes along the axis of the base, y the motion of the base and z the
 motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
 
-    M z'' + C z' + K z = -(M t)_f (y'' + alpha y'),
+    M z'' + C z' + K z = -(M t)_f (y'' + alpha y') - (C_g t)_f y',
 
-because a translation strains nothing: K t = 0, and so is what beta K0 makes of it. Rayleigh's
-alpha M damps the absolute motion, as air does, and therefore drags at the moving body; beta K0
-damps the strain. For one mass m on a spring k
+because a translation strains nothing: K t = 0, and so is what beta K0, creases, dashpots between
+nodes and modal damping make of it. Rayleigh's alpha M and the dashpots to the ground, C_g, damp the
+absolute motion, as air does, and therefore drag at the moving body; beta K0 damps the strain. For one mass m on a spring k
 
     x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
 
@@ -183,11 +183,19 @@ def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
     return shape
 
 
-def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
-    """Factor on the shape of the load at an angular frequency (rad/s)."""
+def drive_terms(
+    system: Linearized, drive: Drive, omega: float
+) -> list[tuple[NDArray[np.float64], complex]]:
+    """Load per unit of the drive at an angular frequency (rad/s): vectors (nf,) and their factors.
+
+    Only a base that moves a body with dashpots to the ground has a second one.
+    """
+    shape = drive_shape(system, drive)
     if drive.axis is None:
-        return 1.0
-    return omega**2 - 1j * omega * system.case.damping.alpha
+        return [(shape, 1.0)]
+    terms = [(shape, omega**2 - 1j * omega * system.case.rayleigh.alpha)]
+    dragged = system.drag[:, AXES.index(drive.axis)]
+    return [*terms, (dragged, -1j * omega)] if dragged.any() else terms
 
 
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:

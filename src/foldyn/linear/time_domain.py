@@ -14,7 +14,6 @@ from foldyn.cases import (
     Actuate,
     BaseMotion,
     Case,
-    Fix,
     Force,
     History,
     Impose,
@@ -92,7 +91,8 @@ class Rig:
 
     def _held(self) -> list[Support]:
         """Supports that stay where the state puts them; a base of the case's own stands still."""
-        held: list[Support] = [s for s in self.case.supports if isinstance(s, Fix)]
+        still = (s for s in self.case.supports if not isinstance(s, Impose | BaseMotion))
+        held: list[Support] = list(still)
         for support in self.case.supports:
             if isinstance(support, Impose):
                 nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn import __version__
-from foldyn.cases import HISTORIES, Case, Fix
+from foldyn.cases import HISTORIES, Case
 from foldyn.cases.document import Document, to_document
 from foldyn.results.quantities import (
     ESTIMATES,
@@ -86,7 +86,7 @@ def trajectory_dataset(
     known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
     values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
-    varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
+    varying = [part for part in (*case.supports, *case.loads) if hasattr(part, "history")]
     called = any(type(part.history) not in HISTORIES.values() for part in varying)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from foldyn import mechanics
 from foldyn.errors import ComputationError, InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, SoftHinges, largest_turn
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, largest_turn
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.kernels import ShellModel, ShellWork, shell_energy, shell_force, shell_work
@@ -164,6 +164,13 @@ class ShellBody(Body):
     def fold_rest(self) -> NDArray:
         """See `Body`: the mean along each crease."""
         return np.bincount(self._crease, self.model.piece_rest) / np.bincount(self._crease)
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `Body`: the pieces of the creases."""
+        model = self.model
+        nodes = model.hinges[model.piece_hinge]
+        hidden = self._nodal + model.piece_rotations
+        return FoldHinges(self._crease, nodes, model.rest[nodes], hidden, model.per_reach)
 
     def folded(self, rest: NDArray) -> ShellBody:
         """See `Body`."""

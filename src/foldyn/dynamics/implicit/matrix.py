@@ -1,5 +1,8 @@
 """The matrix of one iteration: stiffness, mass and damping with the weights of a step.
 
+Modal damping, a product with rows of all dofs, would fill the matrix. It is added to what is
+factorized, A, by the formula of Woodbury: (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1.
+
 All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
 puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
 along the sheet or, where that would be too wide, a sparse matrix.
@@ -17,18 +20,11 @@ from scipy import sparse
 from foldyn.algebra.banded import BandLU, Cholesky
 from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.dynamics.implicit.damping import ElementBlocks, ModalTerm, Weights
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.tangent import Sparsity, block_keys
-
-
-class Weights(NamedTuple):
-    """Factors of the matrices in that of an iteration."""
-
-    stiffness: float
-    mass: float  # 1/s2
-    damping: float  # 1/s, of beta K0
 
 
 class Matrices(NamedTuple):
@@ -36,7 +32,7 @@ class Matrices(NamedTuple):
 
     stiffness: NDArray
     mass: NDArray
-    damping: NDArray  # beta K0
+    damping: NDArray  # beta K0, dashpots and creases
 
 
 class StepMatrix:
@@ -65,21 +61,24 @@ class StepMatrix:
         self.blocks = packed.body.blocks()
         nodes = system.rows
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
-        self.pattern, where = _with_mass(self.blocks.pattern, nodal)
-        shape = (len(self.pattern.indices), 3, 3)
-        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
-        masses[where] = nodal.data[:, None, None] * np.eye(3)
         damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
         damping.sort_indices()
-        own = block_keys(self.pattern.indptr, self.pattern.indices)
-        viscous[np.searchsorted(own, block_keys(damping.indptr, damping.indices))] = damping.data
+        self._elements = ElementBlocks(system.damping.elements, nodes)
+        others = (nodal, damping, self._elements.blocks)
+        self.pattern, where = _with(self.blocks.pattern, *others)
+        shape = (len(self.pattern.indices), 3, 3)
+        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
+        masses[where[0]] = nodal.data[:, None, None] * np.eye(3)
+        viscous[where[1]] = damping.data
+        self._elements.settle(viscous, where[2])
         self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[self.blocks.unused] = True
         along = self.blocks.order
         self.free = along[~held[along]]
-        filled = self.blocks.filled(self.pattern) | (masses != 0.0)
+        filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
+        filled |= self._elements.filled(shape)
         row, column, take = _entries(self.pattern, self.free, filled)
         size, width = len(self.free), int(np.abs(row - column).max(initial=0))
         self._sparse = _Sparse(row, column, take, size, symmetric)
@@ -88,6 +87,7 @@ class StepMatrix:
             self._band = _Band(row, column, take, size, width, symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
+        self._modal = ModalTerm(system.damping.modal[:, self.free])
         self.factorizations = 0
 
     def factorize(self, weights: Weights) -> None:
@@ -100,14 +100,21 @@ class StepMatrix:
         """
         self._factors = None
         self.factorizations += 1
+        self._factors = self._modal(weights, self._factorized(weights))
+
+    def _factorized(self, weights: Weights) -> Any:
+        """Factors of the matrix without modal damping."""
         if self._band is not None:
             try:
-                self._factors = self._band(weights, self._matrices)
-                return
+                return self._band(weights, self._matrices)
             except SingularTangentError:  # not definite: the motion leaves an unstable state
                 if not np.isfinite(self.stiffness).all():
                     raise
-        self._factors = self._sparse(weights, self._matrices)
+        return self._sparse(weights, self._matrices)
+
+    def follow(self, u: NDArray) -> None:
+        """Make the damping of elements that follow the motion what it is at u (n, 3)."""
+        self._elements.put(u, self._matrices.damping)
 
     def forget(self) -> None:
         """Give up the factors."""
@@ -170,18 +177,18 @@ class _Sparse:
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
 
 
-def _with_mass(pattern: Sparsity, nodal: sparse.csr_array) -> tuple[Sparsity, NDArray]:
-    """Pattern with the entries of a nodal matrix too, and where these stand."""
-    nodes = nodal.shape[0]
-    own, other = (block_keys(each.indptr, each.indices) for each in (pattern, nodal))
-    both = np.union1d(own, other)
-    moved = np.searchsorted(both, own)
+def _with(pattern: Sparsity, *others: Any) -> tuple[Sparsity, list[NDArray]]:
+    """Pattern with the entries of other ones too, and where these stand."""
+    nodes = len(pattern.indptr) - 1
+    own, *keys = (block_keys(each.indptr, each.indices) for each in (pattern, *others))
+    every = np.unique(np.concatenate([own, *keys]))
+    moved = np.searchsorted(every, own)
     return Sparsity(
-        np.searchsorted(both // nodes, np.arange(nodes + 1)).astype(np.int32),
-        (both % nodes).astype(np.int32),
+        np.searchsorted(every // nodes, np.arange(nodes + 1)).astype(np.int32),
+        (every % nodes).astype(np.int32),
         moved[pattern.bar_slots],
         moved[pattern.hinge_slots],
-    ), np.searchsorted(both, other)
+    ), [np.searchsorted(every, each) for each in keys]
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:
