@@ -249,31 +249,33 @@ def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
 
 
 def damping_from(table: Mapping[str, Any]) -> Damping | tuple[Damping, ...]:
-    """Damping from its table; without any it is Rayleigh's, of nothing."""
+    """Damping from its stored table; without any it is Rayleigh's, of nothing."""
     nested = {kind.key: kind for kind in DAMPINGS if kind.key}
     own = {key: value for key, value in table.items() if key not in nested}
     parts: list[Damping] = [Rayleigh.of(own)] if own else []
     for key, kind in nested.items():
         if key in table:
-            parts += _parts(key, table[key], kind)
+            parts += dampings_of(kind, table[key])
     return dampings(parts)
 
 
-def _parts(key: str, value: Any, kind: Any) -> list[Damping]:
+def dampings_of(kind: Any, value: Any) -> list[Damping]:
     """Dampings of a kind: from a table, from several, or from its first argument alone."""
-    tables = isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
-    if not tables or not kind.several:
-        return [_part(f".{key}", value, kind)]
-    return [_part(f".{key}[{i}]", item, kind) for i, item in enumerate(value)]
+    if kind.several and isinstance(value, list) and value and isinstance(value[0], Mapping):
+        parts = []
+        for i, item in enumerate(value):
+            with within(f"[{i}]"):
+                parts.append(_damping_of(kind, item))
+        return parts
+    return [_damping_of(kind, value)]
 
 
-def _part(place: str, value: Any, kind: Any) -> Damping:
+def _damping_of(kind: Any, value: Any) -> Damping:
+    if isinstance(value, Mapping):
+        check_keys(value, kind.keys)
+        return kind.of(value)
     first = next(iter(kind.keys))
-    with within(place):
-        if isinstance(value, Mapping):
-            check_keys(value, kind.keys)
-            return kind.of(value)
-        try:
-            return kind.of({first: value})
-        except InputError as error:  # the value stands in the place of its table
-            raise InputError(error.reason, error.field.removeprefix(f".{first}")) from None
+    try:
+        return kind.of({first: value})
+    except InputError as error:  # the value stands in the place of its table
+        raise InputError(error.reason, error.field.removeprefix(f".{first}")) from None
