@@ -15,7 +15,7 @@ import numpy as np
 
 import foldyn as fd
 from foldyn.linear import linearize
-from foldyn.linear.eigen import Pencil, lowest
+from foldyn.algebra.eigen import Pencil, lowest
 from foldyn.linear.modes import rigid_space, unresisted
 
 

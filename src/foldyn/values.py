@@ -63,7 +63,7 @@ def _written(value: Any, depth: int) -> str:
 def plain(value: Any) -> Any:
     """Return a value of plain Python: lists instead of tuples, no numbers of NumPy."""
     if isinstance(value, tuple):
-        return list(value)
+        return [plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
 
 

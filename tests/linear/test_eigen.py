@@ -9,8 +9,8 @@ import pytest
 from scipy import sparse
 
 from foldyn.errors import ComputationError, InputError
-from foldyn.linear import eigen
-from foldyn.linear.eigen import Pencil
+from foldyn.algebra import eigen
+from foldyn.algebra.eigen import Pencil
 
 N = 150
 SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(

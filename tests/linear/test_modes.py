@@ -13,7 +13,8 @@ from scipy.linalg import eigh
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear import eigen, linearize, modes
+from foldyn.algebra import eigen
+from foldyn.linear import linearize, modes
 
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}
 

@@ -9,7 +9,8 @@ from scipy.linalg import eigh
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.linear import eigen, linearize, mac, modes
+from foldyn.algebra import eigen
+from foldyn.linear import linearize, mac, modes
 from foldyn.shells import shell
 
 CASE2 = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]

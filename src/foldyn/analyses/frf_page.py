@@ -143,7 +143,7 @@ def _notes(
 ) -> str:
     """Notes on the numbers."""
     notes = [
-        f"Damping: alpha {case.damping.alpha:g} 1/s, beta {case.damping.beta:g} s. The result "
+        f"Damping: alpha {case.rayleigh.alpha:g} 1/s, beta {case.rayleigh.beta:g} s. The result "
         "carries its own case."
     ]
     soft = int(response.attrs.get("soft", 0))

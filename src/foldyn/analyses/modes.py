@@ -235,10 +235,11 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
         f"Modes are small vibrations about {_about(modes)}, shapes of the modal mass 1. The result "
         "carries its own case."
     ]
-    if case.damping.alpha or case.damping.beta:
+    rayleigh = case.rayleigh
+    if rayleigh.alpha or rayleigh.beta:
         notes.append(
-            f"Damping: C = alpha M + beta K0 with alpha {case.damping.alpha:g} 1/s and beta "
-            f"{case.damping.beta:g} s gives the ratio of each mode."
+            f"Damping: C = alpha M + beta K0 with alpha {rayleigh.alpha:g} 1/s and beta "
+            f"{rayleigh.beta:g} s gives the ratio of each mode."
         )
     soft = int(modes.attrs["soft_hinges"])
     if soft:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray
 
     from foldyn.analyses.casefile import CaseFile
+    from foldyn.cases import Case
 
 UNITS: Mapping[str, str] = {
     "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
@@ -37,7 +38,7 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
         ["sheet", _listed(_given(case_file.sheet))],
         ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
         *([["mesh", mesh]] if mesh else []),
-        ["damping", _listed(_given(case.damping))],
+        ["damping", damping_text(case)],
         ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
     ]
     if command:
@@ -49,6 +50,16 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     if case_file.text:
         sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
     return sections
+
+
+def damping_text(case: Case) -> str:
+    """The damping of a case and its dashpots, in words."""
+    parts = []
+    for part in case.dampings:
+        name = part.key or "Rayleigh"
+        parts.append(f"{name}: {_listed(_given(part))}" if part.key else _listed(_given(part)))
+    parts += [f"dashpot: {_listed(_given(dashpot))}" for _, dashpot in case.dashpots]
+    return "; ".join(parts)
 
 
 def mesh_error(result: xarray.Dataset) -> str:

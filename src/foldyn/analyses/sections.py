@@ -15,7 +15,15 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
-from foldyn.cases.damping import STATES, Rayleigh
+from foldyn.cases.damping import (
+    STATES,
+    CreaseDamping,
+    Damping,
+    ModalDamping,
+    Rayleigh,
+    dampings,
+    dampings_of,
+)
 from foldyn.cases.decode import check_keys, law_from
 from foldyn.cases.loads import load_from
 from foldyn.cases.masses import mass_from
@@ -265,13 +273,20 @@ def _ratios(value: Any) -> list[list[float]]:
     return array.tolist()
 
 
+def _dampings(kind: Any) -> PlainValidator:
+    """Accept what stands under the key of a kind of damping."""
+    return PlainValidator(lambda value: dampings_of(kind, value))
+
+
 class DampingSection(Section):
-    """[damping]: Rayleigh coefficients, or two damping ratios."""
+    """[damping]: Rayleigh coefficients, or two damping ratios; modes and creases."""
 
     alpha: Annotated[float, Field(ge=0)] = 0.0
     beta: Annotated[float, Field(ge=0)] = 0.0
     ratios: Annotated[Any, PlainValidator(_ratios)] = None
     state: Annotated[str, one_of(STATES)] = "rest"
+    modal: Annotated[Any, _dampings(ModalDamping)] = ()
+    creases: Annotated[Any, _dampings(CreaseDamping)] = ()
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -282,8 +297,14 @@ class DampingSection(Section):
             )
         return self
 
-    def made(self) -> Rayleigh:
+    def made(self) -> Damping | tuple[Damping, ...]:
         """The damping."""
+        others = [*self.modal, *self.creases]
+        if others and not self.model_fields_set & {"alpha", "beta", "ratios"}:
+            return dampings(others)
+        return dampings([self._rayleigh(), *others])
+
+    def _rayleigh(self) -> Rayleigh:
         if self.ratios is None:
             return Rayleigh(self.alpha, self.beta, self.state)
         (f1, z1), (f2, z2) = self.ratios

@@ -2,7 +2,8 @@
 
 from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
-from foldyn.cases.damping import Rayleigh
+from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh
+from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
@@ -15,9 +16,12 @@ __all__ = [
     "SUPPORTS",
     "BaseMotion",
     "Case",
+    "CreaseDamping",
+    "Dashpot",
     "Fix",
     "Function",
     "Impose",
+    "ModalDamping",
     "PointMass",
     "Rayleigh",
     "Spring",

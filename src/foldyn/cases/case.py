@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.cases.damping import Rayleigh
+from foldyn.cases.damped import Damped
+from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
@@ -33,25 +34,27 @@ Summands = Iterable[tuple[NDArray[np.float64], Any]]
 
 @brief
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(Damped):
     """A structure with supports, loads and damping.
 
     Parameters
     ----------
     structure : Structure
         The discretized pattern.
-    supports : sequence of Fix, Impose, BaseMotion and Spring
-        Nodes held at rest, moved as prescribed or held by springs, and motions of the base; none
-        by default (free motion is legal in dynamics).
+    supports : sequence of Fix, Impose, BaseMotion and the other kinds of `SUPPORTS`
+        Nodes held at rest, moved as prescribed, held by springs or damped, and motions of the base;
+        none by default (free motion is legal in dynamics).
     loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
         Forces, gravity, pressure, creases that fold by themselves; none by default.
-    damping : Rayleigh
-        Damping; none by default.
+    damping : Rayleigh, ModalDamping, CreaseDamping, or a sequence of them
+        Damping; none by default. Several add up.
     masses : sequence of PointMass
         What nodes carry beside the mass of the sheet; none by default.
 
     Attributes
     ----------
+    rayleigh, modal_damping, crease_damping, dashpots, damped
+        See `Damped`.
     fixed : ndarray of bool, shape (n, 3)
         True where a node is held along an axis, by `Fix` or by `Impose`.
     imposed : ndarray of bool, shape (n, 3)
@@ -95,17 +98,14 @@ class Case:
     structure: Any
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
-    damping: Rayleigh = field(default_factory=Rayleigh)
+    damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)
     masses: Sequence[PointMass] = ()
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         for name, kinds in (("supports", SUPPORTS), ("loads", LOADS), ("masses", (PointMass,))):
             object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
-        if not isinstance(self.damping, Rayleigh):
-            raise InputError(
-                f"damping = {show(self.damping)}: must be Rayleigh(alpha=..., beta=...)"
-            )
+        object.__setattr__(self, "damping", dampings(self.damping))
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         for place, load in self._loads():
@@ -120,10 +120,12 @@ class Case:
         for place, support in self._supports(Fix, Impose):
             with faults.collected():
                 self._nodes_of(place, support)
-        with faults.collected():
-            _ = self.springs
-        with faults.collected():
-            _ = self.point_masses
+        for place, dashpot in self.dashpots:
+            with faults.collected():
+                dashpot.ends(self.structure, place)
+        for name in ("springs", "point_masses", "crease_damping"):
+            with faults.collected():
+                getattr(self, name)
         for place, load in self._loads():
             with faults.collected():
                 load.loaded(self.structure, place)

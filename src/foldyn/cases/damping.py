@@ -1,13 +1,22 @@
-"""Damping: how a case loses energy."""
+"""Damping: how a case loses energy, and the registry of all kinds.
+
+Viscous dampers between nodes are supports (`dashpots`).
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
 
-from foldyn.errors import InputError
-from foldyn.values import choice, number
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.selection import check_creases, resolve_creases
+from foldyn.errors import InputError, within
+from foldyn.values import brief, choice, number, number_or_list, show, whole
 
 STATES = ("rest", "start")
 
@@ -32,6 +41,9 @@ class Rayleigh:
     alpha: float = 0.0
     beta: float = 0.0
     state: str = "rest"
+
+    key: ClassVar[str] = ""
+    several: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -87,6 +99,15 @@ class Rayleigh:
         beta = (z2 * f2 - z1 * f1) / (math.pi * apart)
         return cls(max(alpha, 0.0), max(beta, 0.0), state)
 
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Rayleigh:
+        """Make it from its table."""
+        return cls(**table)
+
+    def table(self) -> dict[str, Any]:
+        """Its table of plain values."""
+        return asdict(self)
+
     def matrix(self, mass: Any, stiffness: Any) -> Any:
         """C from M (kg) and K0 (N/m)."""
         damping = mass * self.alpha
@@ -95,3 +116,166 @@ class Rayleigh:
     def rate(self, omega: Any) -> Any:
         """Damping (1/s) of a mode with angular frequency omega (rad/s) and modal mass 1 kg m2."""
         return self.alpha + self.beta * omega**2
+
+
+@brief
+@dataclass(frozen=True)
+class ModalDamping(Part):
+    """Damping ratios of the lowest modes, C = M Phi diag(2 zeta omega) Phi' M, phi' M phi = 1.
+
+    Small motions in a mode that is listed have its ratio, those in all other modes none. The matrix
+    is constant (E. L. Wilson and J. Penzien, Int. J. Numer. Methods Eng. 4, 1972; R. W. Clough and
+    J. Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3), and damps deformation alone:
+    where supports move, it is the motion relative to where they would slowly bring the structure.
+    Rigid motions, and modes that nothing resists, are not counted and not damped.
+
+    Parameters
+    ----------
+    ratios : float or sequence of float
+        Damping ratio (0.02 is 2 %, at least 0) of `count` modes, or of each from the lowest on.
+    count : int, optional
+        How many of the lowest modes have the ratio, if it is one number; all by default.
+    state : {"rest", "start"}
+        Whose modes: at the structure's rest, or where a motion starts (for modes and frequency
+        responses: those of the state about which it vibrates).
+    """
+
+    ratios: float | Sequence[float]
+    count: int | None = None
+    state: str = "rest"
+
+    keys = {"ratios": "ratios", "count": "count", "state": "state"}
+    key: ClassVar[str] = "modal"
+    several: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        ratios = number_or_list("ratios", self.ratios, "mode")
+        listed = isinstance(ratios, tuple)
+        for i, ratio in enumerate(ratios if listed else (ratios,)):
+            number(f"ratios[{i}]" if listed else "ratios", ratio, least=0.0)
+        object.__setattr__(self, "ratios", ratios)
+        choice("state", self.state, STATES)
+        if self.count is None:
+            return
+        if listed:
+            raise InputError(
+                f" = {show(self.count)}: {len(ratios)} ratios are those of {len(ratios)} modes; "
+                "leave count out, or give one ratio",
+                "count",
+            )
+        object.__setattr__(self, "count", whole("count", self.count, least=1, what="modes"))
+
+    @property
+    def modes(self) -> int | None:
+        """How many modes it damps; None for all."""
+        return len(self.ratios) if isinstance(self.ratios, tuple) else self.count
+
+
+@brief
+@dataclass(frozen=True)
+class CreaseDamping(Part):
+    """A moment against the rate at which creases fold: M = c L d theta / dt on each, nothing else.
+
+    theta is the dihedral now, so that it is right for any motion; rigid motions dissipate nothing.
+    Where several damp one crease, their coefficients add up.
+
+    Parameters
+    ----------
+    coefficient : float
+        Damping c of a crease, N m s/rad per m of its length L at rest, at least 0.
+    creases : int, sequence of int, or {"all", "mountain", "valley"}
+        Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
+        "valley", or "all", which are all but the flat ones.
+    """
+
+    coefficient: float
+    creases: int | str | Sequence[int] = "all"
+
+    keys = {"coefficient": "coefficient", "creases": "creases"}
+    key: ClassVar[str] = "creases"
+    several: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        coefficient = number("coefficient", self.coefficient, least=0.0)
+        object.__setattr__(self, "coefficient", coefficient)
+        object.__setattr__(self, "creases", check_creases("creases", self.creases))
+
+    def per_length(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """Coefficients (nf,) of all folds, N m s/rad per m."""
+        damped = np.zeros(len(structure.folds))
+        damped[resolve_creases(structure, self.creases, f"{place}.creases")] = self.coefficient
+        return damped
+
+
+Damping = Rayleigh | ModalDamping | CreaseDamping
+DAMPINGS: tuple[type[Damping], ...] = (Rayleigh, ModalDamping, CreaseDamping)
+"""All kinds. In a table of damping each stands under its `key`, without one in the table itself."""
+
+
+def dampings(given: Any) -> Damping | tuple[Damping, ...]:
+    """Return one kind of damping as it is, several as a tuple, none as Rayleigh's of nothing.
+
+    Raises
+    ------
+    InputError
+        Something else, or a kind twice of which there can be one only.
+    """
+    parts = tuple(given) if isinstance(given, list | tuple) else (given,)
+    names = " or ".join(f"{kind.__name__}(...)" for kind in DAMPINGS)
+    for part in parts:
+        if not isinstance(part, DAMPINGS):
+            raise InputError(f"damping = {show(part)}: must be {names}, or a list of them")
+    for kind in DAMPINGS:
+        if not kind.several and sum(isinstance(part, kind) for part in parts) > 1:
+            raise InputError(f"damping: give one {kind.__name__}, not several")
+    if len(parts) > 1:
+        return parts
+    return parts[0] if parts else Rayleigh()
+
+
+def damping_table(parts: Sequence[Damping]) -> dict[str, Any]:
+    """Table of some dampings, of plain values."""
+    table: dict[str, Any] = {}
+    for part in parts:
+        if not part.key:
+            table |= part.table()
+        elif part.several:
+            table.setdefault(part.key, []).append(part.table())
+        else:
+            table[part.key] = part.table()
+    return table
+
+
+def damping_from(table: Mapping[str, Any]) -> Damping | tuple[Damping, ...]:
+    """Damping from its stored table; without any it is Rayleigh's, of nothing."""
+    nested = {kind.key: kind for kind in DAMPINGS if kind.key}
+    own = {key: value for key, value in table.items() if key not in nested}
+    parts: list[Damping] = [Rayleigh.of(own)] if own else []
+    for key, kind in nested.items():
+        if key in table:
+            parts += dampings_of(kind, table[key])
+    return dampings(parts)
+
+
+def dampings_of(kind: Any, value: Any) -> list[Damping]:
+    """Dampings of a kind: from a table, from several, or from its first argument alone."""
+    if kind.several and isinstance(value, list) and value and isinstance(value[0], Mapping):
+        parts = []
+        for i, item in enumerate(value):
+            with within(f"[{i}]"):
+                parts.append(_damping_of(kind, item))
+        return parts
+    return [_damping_of(kind, value)]
+
+
+def _damping_of(kind: Any, value: Any) -> Damping:
+    if isinstance(value, Mapping):
+        check_keys(value, kind.keys)
+        return kind.of(value)
+    first = next(iter(kind.keys))
+    try:
+        return kind.of({first: value})
+    except InputError as error:  # the value stands in the place of its table
+        raise InputError(error.reason, error.field.removeprefix(f".{first}")) from None

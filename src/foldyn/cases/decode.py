@@ -149,7 +149,7 @@ def _checked(place: str, value: Any, hint: Any) -> Any:
 
 
 class Part:
-    """A load or a support.
+    """A load, a support or a kind of damping.
 
     Attributes
     ----------
@@ -194,8 +194,9 @@ class Part:
         return [key for key, name in cls.keys.items() if name in names]
 
     def table(self) -> dict[str, Any]:
-        """Its table of plain values, without the history."""
-        return {key: plain(getattr(self, argument)) for key, argument in self.keys.items()}
+        """Its table of plain values, without the history and what is None."""
+        given = {key: getattr(self, argument) for key, argument in self.keys.items()}
+        return {key: plain(value) for key, value in given.items() if value is not None}
 
 
 def given_keys(table: Any, kinds: Iterable[type[Part]]) -> set[str]:

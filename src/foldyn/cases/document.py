@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.case import Case
-from foldyn.cases.damping import Rayleigh
+from foldyn.cases.damping import damping_from, damping_table
 from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
 from foldyn.cases.history import as_history
@@ -109,7 +109,7 @@ class _Writer:
             "nodes": self._store("rest_position", structure.nodes),
             "sheet": self._sheet(structure.sheet),
             "model": self._model(structure),
-            "damping": dataclasses.asdict(case.damping),
+            "damping": damping_table(case.dampings),
             "supports": [self._part(support) for support in case.supports],
             "loads": [self._part(load) for load in case.loads],
         }
@@ -229,7 +229,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
-        return Case(structure, supports, loads, Rayleigh(**sections["damping"]), masses)
+        return Case(structure, supports, loads, damping_from(sections["damping"]), masses)
 
 
 def _structure(sections: Mapping[str, Any]) -> Any:

@@ -165,8 +165,7 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
     count = len(structure.folds)
     if count == 0:
         raise InputError(
-            f"{name} = {show(creases)}: this structure has no folds to actuate; give a pattern "
-            "with creases"
+            f"{name} = {show(creases)}: this structure has no folds; give a pattern with creases"
         )
     if isinstance(creases, str):
         return _assigned(structure.pattern, creases, name)

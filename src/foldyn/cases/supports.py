@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from foldyn.cases.dashpots import AXES, DIRECTIONS, Dashpot
 from foldyn.cases.decode import Part, given_keys
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError
 from foldyn.values import brief, choice, indices, number, number_or_list, show, vector
-
-AXES = "xyz"
-DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 
 
 @brief
@@ -158,6 +156,7 @@ class Spring(Part):
         "rest_length": "rest_length",
     }
     missing = {"stiffness": "give it (N/m) for each spring"}
+    apart = "springs are a support of their own"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -196,8 +195,8 @@ class Spring(Part):
         return written
 
 
-Support = Fix | Impose | BaseMotion | Spring
-SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring)
+Support = Fix | Impose | BaseMotion | Spring | Dashpot
+SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring, Dashpot)
 OF_SPRINGS = ("stiffness", "between", "direction", "rest_length")
 """Keys that only springs have."""
 
@@ -207,18 +206,24 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
     given = given_keys(table, SUPPORTS)
     if not given:
         raise InputError(
-            ": give nodes and axes (held), nodes, axis and displacement (moved), nodes or between "
-            "and stiffness (springs), or base and history (a base that moves)"
+            ": give nodes and axes (held), nodes, axis and displacement (moved), base and history "
+            "(a base that moves), or nodes or between with stiffness (springs) or dashpot (damped)"
         )
-    if own := [key for key in OF_SPRINGS if key in given]:
-        strange = [key for key in table if key in given and key not in Spring.keys]
+    for own, kind in (("stiffness", Spring), ("dashpot", Dashpot)):
+        if own not in given:
+            continue
+        strange = [key for key in table if key in given and key not in kind.keys]
         if strange:
             raise InputError(
-                f": springs are a support of their own; leave out {' and '.join(strange)}, or "
-                "write [[supports]] for each",
-                f".{own[0]}",
+                f": {kind.apart}; leave out {' and '.join(strange)}, or write [[supports]] for "
+                "each",
+                f".{own}",
             )
-        return Spring.of(table, folder)
+        return kind.of(table, folder)
+    if left := [key for key in table if key in ("between", "direction", "rest_length")]:
+        raise InputError(
+            f": {left[0]} is for springs and dashpots: give stiffness (N/m) or dashpot (N s/m)"
+        )
     if "base" in given:
         strange = [key for key in ("nodes", "axes", "axis") if key in given]
         check_axis(".base", table["base"])

@@ -1,7 +1,9 @@
-"""Rayleigh damping in compiled loops: C v with C = alpha M + beta K0, and the power that it takes.
+"""Damping in compiled loops: C v, and the power that it takes.
 
 alpha M v, the *drag*, is never assembled: it slows every mass by alpha v, and takes v alpha M v or
-2 alpha times the kinetic energy. beta K0 v, the *viscous* force, is a product with a sparse matrix.
+2 alpha times the kinetic energy. beta K0 v and what else is constant and sparse, the *viscous*
+force, is a product with a matrix. The *dampers* are the rows of modal damping, g' (g v), and
+elements that follow the motion; motions with any of them run on one thread.
 Where supports move, free nodes are slowed by the velocity w without S f' (see `system`), and the
 drag on S f' itself is overcome by whatever moves the supports.
 
@@ -17,22 +19,33 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case
+from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
+from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Numbering
+from foldyn.mechanics.viscous import Viscous, add_viscous_elements, viscous_elements_work
 
 
 class Damping(NamedTuple):
-    """Rayleigh damping of a case."""
+    """Damping of a case."""
 
     alpha: float  # 1/s
-    indptr: NDArray  # beta K0 by rows, of dofs 3 place + axis; none if beta = 0
-    indices: NDArray
+    indptr: NDArray  # beta K0 and dashpots of fixed directions by rows, of dofs 3 place + axis;
+    indices: NDArray  # nothing without them
     data: NDArray
+    modal: NDArray  # (r, dofs) rows g of modal damping, C = g' g
+    modal_rate: float  # 1/s, of the fastest of them
+    elements: Viscous
+
+    @property
+    def follows(self) -> bool:
+        """Whether there are dampers, which keep a motion on one thread."""
+        return len(self.modal) > 0 or len(self.elements.coefficient) > 0
 
     def viscous(self, size: int) -> sparse.csr_array:
-        """beta K0 as a matrix of so many dofs."""
+        """The constant sparse part as a matrix of so many dofs."""
         if not self.data.size:
             return sparse.csr_array((size, size))
         return sparse.csr_array((self.data, self.indices, self.indptr), (size, size))
@@ -40,17 +53,35 @@ class Damping(NamedTuple):
 
 def damping_of(case: Case, by: Numbering, start: NDArray | None) -> Damping:
     """Damping of a case as it stands in memory, for a motion from `start` (n, 3), or from rest."""
-    matrix, body = sparse.csr_array((0, 0)), case.body
-    if case.damping.beta > 0.0:
-        state = start if case.damping.state == "start" else None
+    matrix, body, rayleigh = sparse.csr_array((0, 0)), case.body, case.rayleigh
+    if rayleigh.beta > 0.0:
+        state = start if rayleigh.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state
-        matrix = by.matrix(body.tangent(body.dofs(state))) * case.damping.beta
+        matrix = by.matrix(body.tangent(body.dofs(state))) * rayleigh.beta
+    more = dampers(case)
+    if more.constant.nnz:
+        fixed = by.matrix(more.constant)
+        matrix = sparse.csr_array(matrix + fixed if matrix.nnz else fixed)
+    modal = modal_rows(case, start)
+    modal.warn()
     return Damping(
-        alpha=float(case.damping.alpha),
+        alpha=float(rayleigh.alpha),
         indptr=matrix.indptr.astype(np.int64),
         indices=matrix.indices.astype(np.int64),
         data=np.asarray(matrix.data, float),
+        modal=_placed(modal.rows, by),
+        modal_rate=modal.rate,
+        elements=more.placed(by),
     )
+
+
+def _placed(rows: NDArray, by: Numbering) -> NDArray:
+    """Rows (r, m) of dofs as they stand in memory, (r, 3 rows there)."""
+    nodal = 3 * len(by.order)
+    out = np.zeros((len(rows), 3 * by.rows))
+    out[:, by.dofs(np.arange(nodal))] = rows[:, :nodal]
+    out[:, nodal : rows.shape[1]] = rows[:, nodal:]
+    return out
 
 
 @scalar
@@ -84,7 +115,7 @@ def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
 
 @scalar
 def viscous_row(damping, velocity, i):
-    """beta K0 v at one dof, N, of flat velocities."""
+    """Viscous force at one dof, N, of flat velocities."""
     force = 0.0
     for k in range(damping.indptr[i], damping.indptr[i + 1]):
         force += damping.data[k] * velocity[damping.indices[k]]
@@ -93,7 +124,7 @@ def viscous_row(damping, velocity, i):
 
 @scalar
 def add_viscous(damping, velocity, force, first, last):
-    """Add beta K0 v to the dofs first to last of a force, all flat; returns the power taken, W."""
+    """Add it to the dofs first to last of a force, all flat; returns the power taken, W."""
     power = 0.0
     for i in range(first, last):
         viscous = viscous_row(damping, velocity, i)
@@ -104,8 +135,43 @@ def add_viscous(damping, velocity, force, first, last):
 
 @kernel
 def viscous_work(damping, velocity, shift):
-    """Work (J) of beta K0 v along a shift, both (n, 3)."""
+    """Work (J) of the viscous force along a shift, both (n, 3)."""
     work, v, along = 0.0, flat(velocity), flat(shift)
     for i in range(damping.indptr.size - 1):
         work += viscous_row(damping, v, i) * along[i]
+    return work
+
+
+@scalar
+def has_dampers(damping):
+    """Whether there are any."""
+    return damping.modal.shape[0] > 0 or damping.elements.coefficient.size > 0
+
+
+@kernel
+def add_dampers(damping, u, v, force):
+    """Add the dampers' forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
+    power = add_viscous_elements(damping.elements, u, v, force)
+    speed, out = flat(v), flat(force)
+    for k in range(damping.modal.shape[0]):
+        rate, row = 0.0, damping.modal[k]
+        for i in range(row.size):
+            rate += row[i] * speed[i]
+        for i in range(row.size):
+            out[i] += rate * row[i]
+        power += rate * rate
+    return power
+
+
+@kernel
+def dampers_work(damping, u, v, shift):
+    """Work (J) of the dampers' forces at u and v along a shift, all (rows, 3)."""
+    work = viscous_elements_work(damping.elements, u, v, shift)
+    speed, along = flat(v), flat(shift)
+    for k in range(damping.modal.shape[0]):
+        rate, change, row = 0.0, 0.0, damping.modal[k]
+        for i in range(row.size):
+            rate += row[i] * speed[i]
+            change += row[i] * along[i]
+        work += rate * change
     return work

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
-from foldyn.cases import Case, Rayleigh, State
+from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
@@ -117,9 +117,10 @@ def simulate(
 
     Notes
     -----
-    Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. Damping is
-    C = alpha M + beta K0, K0 the tangent at rest or, with the damping's state = "start", at the
-    initial displacement.
+    Histories are evaluated at every stage time t_n + c dt with t_n = start + n dt. The damping
+    matrices alpha M + beta K0 and of modes are constant: K0 the tangent, and the modes those, at
+    rest or, with the damping's state = "start", at the initial displacement. Dashpots between nodes
+    and damped creases follow the motion.
     """
     motion = prepare(
         case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius, sample
@@ -242,13 +243,21 @@ def _plan(
 
 
 def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float) -> None:
-    """Say so where stiffness-proportional damping makes an explicit step very small."""
-    if case.damping.beta == 0.0 or not math.isfinite(critical):
+    """Say so where damping other than alpha makes an explicit step very small."""
+    if not math.isfinite(critical) or not case.damped:
         return
-    without = method.critical_step(replace(case, damping=Rayleigh(case.damping.alpha)), u)
+    fast = [f"beta = {case.rayleigh.beta:g} s"] if case.rayleigh.beta > 0.0 else []
+    fast += ["the dashpots"] if case.dashpots else []
+    fast += ["the damping of the creases"] if case.crease_damping.any() else []
+    if not fast:
+        return
+    supports = [support for support in case.supports if not isinstance(support, Dashpot)]
+    slow = replace(case, damping=Rayleigh(case.rayleigh.alpha), supports=supports)
+    without = method.critical_step(slow, u)
     if without > DAMPING_COST * critical:
         warnings.warn(
-            f"beta = {case.damping.beta:g} s makes the critical step {without / critical:.0f} "
+            f"{' and '.join(fast)} make{'' if len(fast) > 1 or not case.rayleigh.beta else 's'} "
+            f"the critical step {without / critical:.0f} "
             f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
             "resolve the damping of the fastest vibration; an implicit one need not: "
             'method = "generalized_alpha" (alpha costs nothing)',

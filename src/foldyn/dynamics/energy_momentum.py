@@ -1,11 +1,12 @@
 """The conserving method: midpoint rule with forces that do exactly the work of the strain energy.
 
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
-    b = F + beta K0 (u1 - u0)/h - (p0 + p1)/2,
+    b = F + C (u1 - u0)/h - (p0 + p1)/2,
 
-with F the forces of `implicit.discrete_gradient`, and p at each end of the step those of all loads,
-also of those that depend on the displacement. Without damping and loads the energy of any
-structure and the momenta of a free one stay what they are, with any step, to the tolerance of the
+with F the forces of `implicit.discrete_gradient`, C the damping but for alpha M, that of elements
+that follow the motion at (u0 + u1)/2 (a rigid motion dissipates nothing), and p at each end of the
+step those of all loads, also of those that depend on the displacement. Without damping and loads
+the energy of any structure and the momenta of a free one stay what they are, with any step, to the tolerance of the
 equations and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and
 Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
 """
@@ -18,7 +19,15 @@ from numpy.typing import NDArray
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.damping import add_viscous, drag, drag_works, viscous_work
+from foldyn.dynamics.damping import (
+    add_dampers,
+    add_viscous,
+    dampers_work,
+    drag,
+    drag_works,
+    has_dampers,
+    viscous_work,
+)
 from foldyn.dynamics.implicit import discrete_gradient
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
@@ -76,11 +85,14 @@ class EnergyMomentum(Scheme):
         discrete_gradient.add_bar_tangent(model, u0, u1, stress, pattern.bar_slots, out)
         discrete_gradient.add_hinge_tangent(model, u0, u1, self.course.angle, FLOOR, slots, out)
         matrix.add_following(u1, self.new.factor, 0.5)
+        matrix.follow(0.5 * (u0 + u1))
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
         (model, system, mass), old, new = self.packed.arrays, self.old, self.new
         done, lost = _works(system, mass, h, old, new, self.shift, self.scratch)
+        if system.damping.follows:
+            lost += _taken(system, h, old, new, self.scratch)
         if system.turns:
             u0, u1 = self.displacement(), self.moved()
             done += _actuation(model, system, old, new, u0, u1, self.scratch)
@@ -128,6 +140,9 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
         for i in range(speed.size):
             speed[i] = (u1[i] - u0[i]) / h
         add_viscous(system.damping, speed, bracket, 0, speed.size)
+    if has_dampers(system.damping):
+        _halfway(h, s)
+        add_dampers(system.damping, s.stage[0], s.product, new.force)
     loads = system.loads
     for k in range(loads.dof.size):
         bracket[loads.dof[k]] -= loads.value[k] * mean[loads.row[k], 0]
@@ -143,6 +158,29 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
         inertia += left[i] * left[i]
         left[i] += bracket[i]
     return norms(system, out, inertia, mean, new.pushed)
+
+
+@kernel
+def _halfway(h, s):
+    """Middle and mean velocity of a step from s.displacement to s.velocity: s.stage[0], s.product."""
+    u0, u1, middle, speed = (
+        flat(s.displacement),
+        flat(s.velocity),
+        flat(s.stage[0]),
+        flat(s.product),
+    )
+    for i in range(u0.size):
+        middle[i] = 0.5 * (u0[i] + u1[i])
+        speed[i] = (u1[i] - u0[i]) / h
+
+
+@kernel
+def _taken(system, h, old, new, s):
+    """Energy that dampers dissipate in a step."""
+    carry(system.moved, old.factor, 0, old.q, s.displacement)
+    carry(system.moved, new.factor, 0, new.q, s.velocity)
+    _halfway(h, s)
+    return h * dampers_work(system.damping, s.stage[0], s.product, s.product)
 
 
 @kernel

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.banded import substitute
 from foldyn.dynamics.actuation import actuator_power, turn
 from foldyn.dynamics.course import Course
-from foldyn.dynamics.damping import drag, drag_works, viscous_work
+from foldyn.dynamics.damping import dampers_work, drag, drag_works, viscous_work
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import (
     GO_ON,
@@ -41,7 +41,7 @@ from foldyn.dynamics.implicit.scheme import (
     norms,
 )
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.system import Packed, acceleration
+from foldyn.dynamics.system import Packed, acceleration, carry
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 
@@ -108,11 +108,14 @@ class Alpha(Scheme):
         body, u = self.packed.body, self.moved()
         matrix.blocks.put(body, matrix.pattern, u, before, again, matrix.stiffness)
         matrix.add_following(u, self.new.factor, 1.0)
+        matrix.follow(u)
 
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; forces are averaged, so that a linear system's balance closes exactly."""
         model, system, mass = self.packed.arrays
         done, lost = _works(system, mass, h, self.old, self.new, self.shift, self.scratch)
+        if system.damping.follows:
+            lost += _taken(system, self.old, self.new, self.scratch)
         if system.turns:
             done += _actuation(model, system, self.old, self.new, self.folds, self.work.fold_angle)
         return done, lost
@@ -220,6 +223,17 @@ def _works(system, mass, h, old, new, shift, s):
         done += 0.5 * (b0[dof] + b1[dof]) * along
     done = add_load_work(system.loads, old, new, s.displacement, done)
     return done, lost + viscous_work(system.damping, s.velocity, s.displacement)
+
+
+@kernel
+def _taken(system, old, new, s):
+    """Energy that dampers dissipate in a step, after `_works`: their mean force along it."""
+    work = 0.0
+    for phase in (old, new):
+        carry(system.moved, phase.factor, 0, phase.q, s.product)
+        carry(system.moved, phase.factor, 1, phase.w, s.moving)
+        work += 0.5 * dampers_work(system.damping, s.product, s.moving, s.displacement)
+    return work
 
 
 @kernel

@@ -93,7 +93,7 @@ def check_steady(case: Case, start: float, end: float) -> None:
 
 def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
     """Warn where damping follows the stiffness at the start u (n, 3), and this is not positive."""
-    if case.damping.beta == 0.0 or case.damping.state != "start":
+    if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
         return
     free = np.asarray(case.free_dofs)
     body = case.body

@@ -38,7 +38,7 @@ def choose(
 
     dt, every and tolerance are those of `simulate`, default what implicit methods take without.
     """
-    conserved = case.damping.alpha == case.damping.beta == 0.0 and not any(histories(case))
+    conserved = not case.damped and not any(histories(case))
     conserved = conserved and case.body.has_discrete_gradient
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if massless := case.structure.massless:

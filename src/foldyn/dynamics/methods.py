@@ -19,7 +19,14 @@ from foldyn.dynamics import (
 )
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
-from foldyn.dynamics.stability import MARGIN, Growth, largest_frequency, stability_limit
+from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics.stability import (
+    MARGIN,
+    Growth,
+    damper_rate,
+    largest_frequency,
+    stability_limit,
+)
 from foldyn.dynamics.system import Packed, scratches
 from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
@@ -68,12 +75,12 @@ def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, moving
-    supports, actuated folds, loads that depend on the displacement, the substitutions of a
+    supports, actuated folds, loads that depend on the displacement, dampers, the substitutions of a
     consistent mass matrix.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
-    alone = system.moves or system.turns or system.follows or called
+    alone = system.moves or system.turns or system.follows or called or system.damping.follows
     return 1 if alone or not packed.mass.lumped else packed.body.threads
 
 
@@ -133,7 +140,12 @@ class Integrator(NamedTuple):
         """See `critical_step`."""
         if self.growth is None:
             return np.inf
-        return MARGIN * stability_limit(self.growth, largest_frequency(case, u), case.damping)
+        omega, rate = (
+            largest_frequency(case, u),
+            damper_rate(case, u)
+            + modal_rows(case, None if u is None else np.asarray(u, float)).rate,
+        )
+        return MARGIN * stability_limit(self.growth, omega, case.rayleigh, rate)
 
 
 def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
@@ -209,8 +221,9 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
 
     Notes
     -----
-    With the damped spectrum s^2 + (alpha + beta w^2) s + w^2 = 0, the limit is the largest dt
-    with which no vibration grows, for all frequencies w up to the highest of the structure: for
+    With the damped spectrum s^2 + (alpha + beta w^2 + r) s + w^2 = 0, the limit is the largest dt
+    with which no vibration grows, for all frequencies w up to the highest of the structure and all
+    r from 0 to the largest rate at which modal damping, dashpots and creases damp any motion: for
     RK4 ``|R(s dt)| <= 1``.
     """
     return suited(method, case).critical_step(case, u)

@@ -17,7 +17,13 @@ from foldyn.dynamics.initial import begin
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
-from foldyn.dynamics.stability import MARGIN, is_stable, largest_frequency, stability_limit
+from foldyn.dynamics.stability import (
+    MARGIN,
+    damper_rate,
+    is_stable,
+    largest_frequency,
+    stability_limit,
+)
 from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import expected_samples
 from foldyn.errors import (
@@ -176,9 +182,10 @@ class Motion:
     def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
         omega, growth = largest_frequency(self.case, u), self.method.growth
+        rate = damper_rate(self.case, u) + self._packed.system.damping.modal_rate
         assert growth is not None  # of explicit methods
-        if not is_stable(growth, omega, self.case.damping, self.plan.dt):
-            limit = stability_limit(growth, omega, self.case.damping)
+        if not is_stable(growth, omega, self.case.rayleigh, self.plan.dt, rate):
+            limit = stability_limit(growth, omega, self.case.rayleigh, rate)
             self._stop(
                 f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
                 f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "

@@ -1,6 +1,9 @@
 """The largest stable time step of an explicit method, and the frequency that it depends on.
 
-A step is stable where the free vibrations of a damped linear system do not grow.
+A step is stable where the free vibrations of a damped linear system do not grow. Each of these has
+s^2 + c s + k = 0 with the quotients c = phi* C phi and k = phi* K phi of its complex shape, phi* M
+phi = 1, in which a method sees no more of it. So a step is stable if it is for all k between 0 and
+the largest eigenvalue, and all c that the parts of the damping may add up to.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from scipy.sparse import linalg
 
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case, Rayleigh
+from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError
 
@@ -22,6 +26,7 @@ _DENSE = 60  # dofs below which a dense eigensolver is quicker and safer
 # of frequencies (n,), damping (n,) and a step: largest factor of a free vibration in a step (n,)
 Growth = Callable[[NDArray, NDArray, float], NDArray]
 _FRACTIONS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 400)])
+_RATES = np.linspace(0.0, 1.0, 5)[:, None]
 ROUNDING = 1e-7  # of a factor of 1: the eigenvalues of a rigid motion are double
 
 
@@ -33,27 +38,38 @@ def roots(omega: NDArray, damping: NDArray) -> NDArray:
     return np.stack([fast, slow])
 
 
-def is_stable(growth: Growth, omega: float, damping: Rayleigh, dt: float) -> bool:
+def is_stable(
+    growth: Growth, omega: float, damping: Rayleigh, dt: float, rate: float = 0.0
+) -> bool:
     """Whether no free vibration of a frequency up to `omega` (rad/s) grows with steps of dt.
 
-    The spectrum is s^2 + c s + w^2 = 0, c the damping rate at w, for all w from 0 to omega.
+    The spectrum is s^2 + c s + w^2 = 0, c the damping rate at w and up to `rate` (1/s) more, for
+    all w from 0 to omega.
     """
+    w, c = _spectrum(omega, damping, rate)
+    return bool((growth(w, c, dt) <= 1.0 + ROUNDING).all())
+
+
+def _spectrum(omega: float, damping: Rayleigh, rate: float) -> tuple[NDArray, NDArray]:
+    """Frequencies (k,), rad/s, and damping (k,), 1/s, for which a step must be stable."""
     w = omega * _FRACTIONS
-    return bool((growth(w, damping.rate(w), dt) <= 1.0 + ROUNDING).all())
+    if rate == 0.0:
+        return w, damping.rate(w)
+    w, more = np.broadcast_arrays(w[::4], rate * _RATES)
+    return w.ravel(), damping.rate(w.ravel()) + more.ravel()
 
 
-def stability_limit(growth: Growth, omega: float, damping: Rayleigh) -> float:
+def stability_limit(growth: Growth, omega: float, damping: Rayleigh, rate: float = 0.0) -> float:
     """Largest dt that is stable in the sense of `is_stable`.
 
     Infinite for a system that neither vibrates nor decays.
     """
-    if omega <= 0.0 and damping.alpha <= 0.0:
+    if omega <= 0.0 and damping.alpha <= 0.0 and rate <= 0.0:
         return np.inf
-    w = omega * _FRACTIONS
-    low, high = 0.0, 10.0 / np.abs(roots(w, damping.rate(w))).max()
+    low, high = 0.0, 10.0 / np.abs(roots(*_spectrum(omega, damping, rate))).max()
     for _ in range(45):
         middle = 0.5 * (low + high)
-        stable = is_stable(growth, omega, damping, middle)
+        stable = is_stable(growth, omega, damping, middle, rate)
         low, high = (middle, high) if stable else (low, middle)
     return low
 
@@ -64,21 +80,36 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     Hinges count with at least their nominal stiffness, so that superlinear bends, which have
     none at rest, cannot make the answer too small.
     """
-    structure, free = case.structure, np.asarray(case.free_dofs)
-    if not len(free):
+    return float(
+        np.sqrt(max(_largest_quotient(case, case.body.tangent(_state(case, u), 1.0)), 0.0))
+    )
+
+
+def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
+    """Largest rate (1/s) at which dashpots and creases damp a motion about u (n, 3)."""
+    return _largest_quotient(case, dampers(case).matrix(case.body.dofs(_state(case, u))))
+
+
+def _state(case: Case, u: ArrayLike | None) -> NDArray:
+    return np.zeros_like(case.structure.nodes) if u is None else np.asarray(u, float)
+
+
+def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
+    """Largest eigenvalue of a matrix (m, m) over the mass, on the free dofs."""
+    free = np.asarray(case.free_dofs)
+    k = sparse.csr_array(matrix[free][:, free])
+    if not k.count_nonzero():
         return 0.0
-    state = np.zeros_like(structure.nodes) if u is None else np.asarray(u, float)
-    k = case.body.tangent(state, 1.0)[free][:, free]
     m = sparse.kron(case.mass, sparse.eye_array(3), format="csr")[free][:, free]
     try:
-        return _largest_frequency(k, m)
+        return _largest_eigenvalue(k, m)
     except (RuntimeError, np.linalg.LinAlgError, SingularTangentError) as error:
         raise ComputationError(
             f"the largest frequency, which the critical step needs, cannot be computed: {error}"
         ) from error
 
 
-def _largest_frequency(k: sparse.csr_array, m: sparse.csr_array) -> float:
+def _largest_eigenvalue(k: sparse.csr_array, m: sparse.csr_array) -> float:
     if k.shape[0] <= _DENSE:
         values = _dense(k.toarray(), m.toarray())
     elif is_lumped(m):
@@ -87,7 +118,7 @@ def _largest_frequency(k: sparse.csr_array, m: sparse.csr_array) -> float:
     else:
         solve = factorize(sparse.csc_array(m), symmetric=False).solve
         values = _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
-    return float(np.sqrt(max(values, 0.0)))
+    return float(values)
 
 
 def _dense(k: NDArray, m: NDArray) -> float:

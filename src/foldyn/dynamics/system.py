@@ -20,7 +20,15 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
 from foldyn.dynamics.actuation import Actuators, actuator_power, actuators, turn
-from foldyn.dynamics.damping import Damping, add_viscous, damping_of, drag, drag_power
+from foldyn.dynamics.damping import (
+    Damping,
+    add_dampers,
+    add_viscous,
+    damping_of,
+    drag,
+    drag_power,
+    has_dampers,
+)
 from foldyn.dynamics.inertia import (
     Inertia,
     inertia,
@@ -277,6 +285,8 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     if damping.data.size > 0:
         power_out += add_viscous(damping, speed, force, first, last)
         wait(work.team)  # others look at this member's velocities
+    if has_dampers(damping):  # on one thread only
+        power_out += add_dampers(damping, u, v, s.force)
     if not mass.lumped:  # on one thread only
         substitute(mass, s.force, out, s.line)
     accelerated, relative = flat(out)[first:last], flat(w)[first:last]

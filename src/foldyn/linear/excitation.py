@@ -4,12 +4,13 @@ The response to a moving base is the absolute displacement over that of the base
 t the unit translation of all nodes along the axis of the base, y the motion of the base and z the
 motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free dofs becomes
 
-    M z'' + C z' + K z = -(M t)_f (y'' + alpha y'),
+    M z'' + C z' + K z = -(M t)_f (y'' + alpha y') - (C_g t)_f y',
 
-because a translation strains nothing: K t = 0, and so is what beta K0 makes of it. (Springs that
-stand on the ground do resist it; their -K t (y + beta y') is added.) Rayleigh's
-alpha M damps the absolute motion, as air does, and therefore drags at the moving body; beta K0
-damps the strain. For one mass m on a spring k
+because a translation strains nothing: K t = 0, and so is what beta K0, creases, dashpots between
+nodes and modal damping make of it. (Springs that stand on the ground do resist it; their
+-K t (y + beta y') is added.) Rayleigh's alpha M and the dashpots to the ground, C_g, damp the
+absolute motion, as air does, and therefore drag at the moving body; beta K0 damps the strain. For
+one mass m on a spring k
 
     x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
 
@@ -180,26 +181,26 @@ class Term(NamedTuple):
 def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     """Load per unit of the drive: forces per N, or what a moving base does.
 
-    The base accelerates masses, and drags at them; springs that stand on the ground, which does
-    not move with it, hold back.
+    The base accelerates masses, and drags at them; springs and dashpots that stand on the ground,
+    which does not move with it, hold back.
     """
     if drive.axis is None:
         return [Term(_on_free(system, drive.vector / drive.value), lambda omega: 1.0)]
-    axis, damping = AXES.index(drive.axis), system.case.damping
+    axis, damping = AXES.index(drive.axis), system.case.rayleigh
     load = np.zeros_like(drive.vector)
     load[:, axis] = system.case.nodal_mass
-    inertia = Term(
-        _on_free(system, load), lambda omega: omega**2 - 1j * omega * damping.alpha
-    )  # fmt: skip
-    springs = system.case.springs
-    held = np.zeros_like(drive.vector)
+    terms = [Term(_on_free(system, load), lambda omega: omega**2 - 1j * omega * damping.alpha)]
+    held, springs = np.zeros_like(load), system.case.springs
     if springs is not None:
         stands = springs.ends[:, 1] < 0
         pull = springs.stiffness[stands] * springs.direction[stands, axis]
         np.add.at(held, springs.ends[stands, 0], pull[:, None] * springs.direction[stands])
-    if not held.any():
-        return [inertia]
-    return [inertia, Term(_on_free(system, held), lambda omega: -1.0 - 1j * omega * damping.beta)]
+    if held.any():
+        terms.append(Term(_on_free(system, held), lambda omega: -1.0 - 1j * omega * damping.beta))
+    dragged = system.drag[:, axis]
+    if dragged.any():
+        terms.append(Term(dragged, lambda omega: -1j * omega))
+    return terms
 
 
 def _on_free(system: Linearized, vectors: NDArray) -> NDArray[np.float64]:

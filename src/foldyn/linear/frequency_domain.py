@@ -5,6 +5,7 @@ The static response of the modes left out completes those superposed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
+from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
-from foldyn.linear.eigen import Pencil, Spectrum, lowest
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
@@ -37,7 +38,7 @@ class Direct:
 def direct(
     system: Linearized, drive: Drive, frequency: NDArray, options: Direct, report: Reporter
 ) -> Answer:
-    """Solve (K - w^2 M + i w C) x = f at each frequency.
+    """Solve (K - w^2 M + i w (C + G'G)) x = f at each frequency, G the rows of modal damping.
 
     The response is nan where the matrix is singular to rounding: at a resonance without damping,
     and at 0 Hz of a body that is free to move.
@@ -51,9 +52,10 @@ def direct(
     response = np.zeros((len(frequency), len(system.free)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
+        matrix = dynamic_stiffness(system, omega)
         for term in terms:
-            solution = solve(dynamic_stiffness(system, omega), term.shape)
-            response[k] += solution * term.factor(omega)
+            motion = solution(matrix, system.modal, omega, term.shape)
+            response[k] += motion * term.factor(omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {}, {})
@@ -63,6 +65,23 @@ def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
     """K - w^2 M + i w C at an angular frequency (rad/s)."""
     undamped = system.stiffness - omega**2 * system.mass
     return sparse.csc_array(undamped + 1j * omega * system.damping)
+
+
+def solution(
+    matrix: sparse.csc_array, rows: NDArray, omega: float, load: NDArray
+) -> NDArray[np.complex128]:
+    """Solution x (nf,) of (A + i w G'G) x = load, A a sparse matrix, G the rows (r, nf).
+
+    With y = sqrt(i w) G x / s as further unknowns the matrix stays sparse, and symmetric, and may
+    be solved where A alone is singular: [A, a G'; a G, -s^2] with a = s sqrt(i w), any s > 0.
+    """
+    if not len(rows) or omega == 0.0:
+        return solve(matrix, load)
+    scale = math.sqrt(omega) * float(np.abs(rows).sum(axis=1).max()) or 1.0
+    across = sparse.csc_array(scale * np.sqrt(1j * omega) * rows)
+    corner = -(scale**2) * sparse.eye_array(len(rows))
+    bordered = sparse.block_array([[matrix, across.T], [across, corner]], format="csc")
+    return solve(bordered, np.concatenate([load, np.zeros(len(rows))]))[: len(load)]
 
 
 @dataclass(frozen=True)
@@ -94,8 +113,8 @@ def modal(
 ) -> Answer:
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
-    The matrix of the modal damping is taken whole: modes that damping couples (beta K0 about a
-    state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
+    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and creases,
+    beta K0 about a state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
     is the response of all other modes at the squared frequency s: 0, or slightly below for a body
     that is free to move (mode acceleration: Craig and Kurdila, Fundamentals of Structural
     Dynamics, 2nd ed. 2006, chapter 11).
@@ -111,6 +130,9 @@ def modal(
     count = pencil.finite if options.count is None else int(options.count)
     modes = lowest(pencil, count, unresisted(system, rigid_space(system)))
     damping = modes.shapes.T @ (system.damping @ modes.shapes)
+    if len(system.modal):
+        own = system.modal @ modes.shapes
+        damping = damping + own.T @ own
     parts = []
     for term in drive_terms(system, drive):
         load, left = modes.shapes.T @ term.shape, np.zeros(pencil.size)
@@ -138,7 +160,10 @@ def _amplitudes(
     detuned = values - omega**2
     scale = np.sqrt(np.outer(own, own))
     if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
-        return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
+        try:
+            return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
+        except np.linalg.LinAlgError:
+            return np.full(len(load), np.nan, complex)
     resonant = (np.abs(detuned) <= noise) & (omega * own == 0.0)
     amplitudes = load / np.where(resonant, 1.0, detuned + 1j * omega * own)
     return np.where(resonant, np.nan, amplitudes)

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
-from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness
+from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness, solution
 from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
@@ -98,8 +97,8 @@ def harmonic(
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
         load = np.sum([term.shape * (drive.value * term.factor(omega)) for term in terms], axis=0)
-        iteration = _Balance(hinges, dynamic_stiffness(system, omega), load, options)
-        motion, slope = iteration.solution(_ahead(done, float(f), hinges.reference))
+        iteration = _Balance(hinges, system, omega, load, options)
+        motion, slope = iteration.balanced(_ahead(done, float(f), hinges.reference))
         spent += iteration.iterations
         if motion is None:
             converged[k] = False
@@ -154,12 +153,14 @@ class _Balance:
     """The iteration for the slopes at one frequency."""
 
     def __init__(
-        self, hinges: _Hinges, stiffness: sparse.csc_array, load: NDArray, options: HarmonicBalance
-    ) -> None:
-        self.hinges, self.stiffness, self.load = hinges, stiffness, load
+        self, hinges: _Hinges, system: Linearized, omega: float, load: NDArray,
+        options: HarmonicBalance,
+    ) -> None:  # fmt: skip
+        self.hinges, self.stiffness = hinges, dynamic_stiffness(system, omega)
+        self.modal, self.omega, self.load = system.modal, omega, load
         self.options, self.iterations = options, 0
 
-    def solution(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
+    def balanced(self, start: NDArray) -> tuple[NDArray | None, NDArray]:
         """Motion (nf,), None without convergence, and the slopes in it.
 
         Accelerated first (Anderson), which may run in circles near the end of a branch, or find
@@ -182,7 +183,7 @@ class _Balance:
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
             matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
-            motion = solve(matrix, self.load)
+            motion = solution(matrix, self.modal, self.omega, self.load)
             if np.isnan(motion).any() or not len(slope):
                 return motion, slope
             if before is not None:

@@ -1,5 +1,7 @@
 """A case linearized about a state: M q'' + C q' + K q = f on its free dofs.
 
+C is a sparse matrix, and the rows of modal damping.
+
 Superlinear hinges may take the slope that is equivalent to an oscillation of finite amplitude.
 A hinge that swings about its angle in the state, d = d0 + A cos(phi) from its rest angle, has the
 moment M(d) = k sgn(d) |d|^p with p = 4/3. The harmonic in phase with the motion is that of a linear
@@ -30,7 +32,9 @@ from scipy.special import gamma, hyp2f1
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
+from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import check_mass
+from foldyn.dynamics.modal_damping import modal_rows, rows_of, soft_slopes
 from foldyn.errors import FoldynWarning
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
@@ -38,8 +42,6 @@ from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import brief, number
 
-SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
-# (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
 POWER = 4.0 / 3.0
 AT_REST = float(2.0 / np.sqrt(np.pi) * gamma(0.5 * POWER + 1.0) / gamma(0.5 * POWER + 1.5))
 
@@ -58,9 +60,15 @@ class Linearized:
         Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
         that a shell has beside the displacements of its nodes.
     stiffness, mass, damping : (nf, nf)
-        Sparse and symmetric: tangent (N/m), mass (kg) and alpha M + beta K0 (N s/m). The tangent
-        has the symmetric part of what loads add that depend on the displacement. K0 is the exact
-        tangent of the structure at rest, or in this state where the damping says so.
+        Sparse and symmetric: tangent (N/m), mass (kg) and damping but for that of modes (N s/m):
+        alpha M + beta K0, dashpots and creases in the state. The tangent has the symmetric part of
+        what loads add that depend on the displacement. K0 is the exact tangent of the structure at
+        rest, or in this state where the damping says so.
+    modal : (r, nf)
+        Rows G of modal damping, which adds G' G.
+    drag : (nf, 3)
+        Forces on the free dofs per unit velocity of the whole along x, y, z, but for alpha M: those
+        of dashpots to the ground, N s/m.
     soft : int
         Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
         they count without stiffness. 0 with `secant`.
@@ -78,6 +86,8 @@ class Linearized:
     stiffness: sparse.csc_array
     mass: sparse.csc_array
     damping: sparse.csc_array
+    modal: NDArray
+    drag: NDArray
     soft: int
     secant: float | None
     residual: float = 0.0
@@ -148,13 +158,20 @@ def linearize(
         massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
         mass = sparse.block_diag([mass, massless], format="csr")
     mass = sparse.csr_array(mass)
+    more = dampers(case).matrix(point.dofs)
+    damping = case.rayleigh.matrix(mass, _reference(case, exact))
+    whole = np.zeros((body.size, 3))
+    whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
+    modal = _modal_rows(case, point.displacement, stiffness)
     return Linearized(
         case=case,
         displacement=point.displacement,
         free=free,
         stiffness=_block(stiffness, free),
         mass=_block(mass, free),
-        damping=_block(case.damping.matrix(mass, _reference(case, exact)), free),
+        damping=_block(damping + more if more.nnz else damping, free),
+        modal=modal[:, free],
+        drag=(more @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
@@ -179,19 +196,27 @@ def _slope_change(
     body: Body, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) for other slopes, and how many hinges are soft."""
+    if amplitude is None:
+        return soft_slopes(body, q)
     hinges = body.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
-    if amplitude is not None:
-        change, soft = equivalent_slope(hinges.offset, amplitude) - slope, 0
-    else:
-        at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
-        change, soft = np.where(at_rest, -slope, 0.0), int(at_rest.sum())
-    return (body.soft_tangent(q, change) if change.any() else None), soft
+    change = equivalent_slope(hinges.offset, amplitude) - slope
+    return (body.soft_tangent(q, change) if change.any() else None), 0
+
+
+def _modal_rows(case: Case, state: NDArray, stiffness: sparse.csr_array) -> NDArray:
+    """Rows (r, m) of the modal damping: of the modes in the state (n, 3), or of those at rest."""
+    damping = case.modal_damping
+    if damping is not None and damping.state == "start":
+        return rows_of(damping, case, stiffness, state).rows
+    modal = modal_rows(case)
+    modal.warn()
+    return modal.rows
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:
     """K0 of the damping (m, m), N/m: the exact tangent in the state, or that at rest."""
-    if case.damping.state != "rest" or case.damping.beta == 0.0:
+    if case.rayleigh.state != "rest" or case.rayleigh.beta == 0.0:
         return exact
     body = case.body
     return body.tangent(body.dofs(np.zeros_like(case.structure.nodes)))

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.cases import Case, State
 from foldyn.errors import FoldynWarning
-from foldyn.linear.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
@@ -132,6 +132,7 @@ def _variables(
     with np.errstate(invalid="ignore"):
         omega = np.sqrt(values)
     modal = np.einsum("ik,ik->k", shapes, linear.damping @ shapes)
+    modal = modal + ((linear.modal @ shapes) ** 2).sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(omega > 0.0, modal / (2.0 * omega), np.nan)
     share = rigid_share(linear, space, shapes)

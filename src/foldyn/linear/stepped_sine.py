@@ -59,9 +59,9 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     FoldynWarning
         Motions have not settled.
     """
-    if rig.case.damping.state == "start":
+    if "start" in {getattr(part, "state", "rest") for part in rig.case.dampings}:
         raise InputError(
-            'damping: with state = "start" each motion would take K0 where the one before has '
+            'damping: with state = "start" each motion would take K0 or modes where the one before has '
             'ended; use state = "rest", or method = "impulse" or "burst_random"'
         )
     response = np.empty((len(frequency), *rig.state.shape), complex)

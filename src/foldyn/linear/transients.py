@@ -120,7 +120,7 @@ def impulse(rig: Rig, frequency: NDArray, options: Impulse, report: Reporter) ->
     width = WIDTH / float(frequency[-1])
     pulse = width if options.pulse is None else options.pulse
     every = min(pulse, width) / PER_PULSE if options.every is None else options.every
-    record = record_of(frequency, rig.case.damping.alpha, 1.0, every, options.duration)
+    record = record_of(frequency, rig.case.rayleigh.alpha, 1.0, every, options.duration)
     check_records("duration", record, 1, len(rig.state))
     factor = _pulse(float(frequency[-1]), pulse, record)
     answer = respond(rig, [factor], record, options.window_rate, "h1", report)
@@ -158,7 +158,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     FoldynWarning
         Motions have not died away at the end.
     """
-    alpha = rig.case.damping.alpha
+    alpha = rig.case.rayleigh.alpha
     quiet = 1.0 - options.burst
     every = 1.0 / (PER_CYCLE * float(frequency[-1])) if options.every is None else options.every
     record = record_of(frequency, alpha, quiet, every, options.duration)

@@ -26,7 +26,15 @@ from foldyn.mechanics.attached import (
     no_springs,
     spring_energy,
 )
-from foldyn.mechanics.body import Blocks, Body, SoftHinges, Unstrained, largest_turn, unit_rows
+from foldyn.mechanics.body import (
+    Blocks,
+    Body,
+    FoldHinges,
+    SoftHinges,
+    Unstrained,
+    largest_turn,
+    unit_rows,
+)
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 
@@ -213,6 +221,10 @@ class AttachedBody(Body):
     def rest_law(self, number: int) -> HingeLaw:
         """See `Body`."""
         return self.inner.rest_law(number)
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `Body`."""
+        return self.inner.fold_hinges()
 
     def folded(self, rest: NDArray) -> AttachedBody:
         """See `Body`."""

@@ -41,6 +41,19 @@ class Unstrained(NamedTuple):
     stretch: Callable[[NDArray], float]  # of bars in a motion (m,), over what their ends could do
 
 
+class FoldHinges(NamedTuple):
+    """Hinges of the folds, k of them: a fold may have several in a row, each of them a part of it.
+
+    The angle by which a hinge folds is its dihedral, less `per_hidden` times its hidden dofs.
+    """
+
+    fold: NDArray  # (k,) number of the fold
+    nodes: NDArray  # (k, 4) axis j, k, wings i, l
+    corners: NDArray  # (k, 4, 3) where they are at rest, m
+    hidden: NDArray  # (k, 2) dofs; -1 without them
+    per_hidden: float  # rad/m
+
+
 class Blocks(Protocol):
     """A body's tangent as 3x3 blocks, for the matrix of an implicit step.
 
@@ -182,6 +195,11 @@ class Body(ABC):
     def rest_law(self, number: int) -> HingeLaw:
         """Law of what has one of these rest angles."""
         raise IndexError(number)
+
+    def fold_hinges(self) -> FoldHinges:
+        """Hinges of the folds, of which every fold has one at least."""
+        nodes, hidden = np.zeros((0, 4), np.int64), np.zeros((0, 2), np.int64)
+        return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0)
 
     def folded(self, rest: NDArray) -> Body:
         """The body with other rest angles (nr,), rad."""

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from foldyn import mechanics
 from foldyn.errors import ComputationError, InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, SoftHinges, largest_turn, unit_rows
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, largest_turn, unit_rows
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.kernels import (
@@ -190,6 +190,13 @@ class ShellBody(Body):
     def rest_law(self, number: int) -> HingeLaw:
         """See `Body`."""
         return self._law
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `Body`: the pieces of the creases."""
+        model = self.model
+        nodes = model.hinges[model.piece_hinge]
+        hidden = self._nodal + model.piece_rotations
+        return FoldHinges(self._crease, nodes, model.rest[nodes], hidden, model.per_reach)
 
     def folded(self, rest: NDArray) -> ShellBody:
         """See `Body`."""

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, SoftHinges, Unstrained, largest_turn
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Unstrained, largest_turn
 from foldyn.mechanics.energy import gradients
 from foldyn.mechanics.model import BarsHinges, node_order, ranks, renumber
 from foldyn.mechanics.step_tangent import BarsHingesBlocks, put_tangent
@@ -164,6 +164,12 @@ class BarsHingesBody(Body):
         """See `Body`."""
         (folds, count), (bends, _) = self._laws
         return folds if number < count else bends
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `Body`: one of each."""
+        nodes = self.model.hinges[self._turning[: self._laws[0][1]]].astype(np.int64)
+        none = np.full((len(nodes), 2), -1)
+        return FoldHinges(np.arange(len(nodes)), nodes, self.model.rest[nodes], none, 0.0)
 
     def folded(self, rest: NDArray) -> BarsHingesBody:
         """See `Body`."""

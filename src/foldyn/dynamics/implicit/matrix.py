@@ -1,5 +1,8 @@
 """The matrix of one iteration: stiffness, mass and damping with the weights of a step.
 
+Modal damping, a product with rows of all dofs, would fill the matrix. It is added to what is
+factorized, A, by the formula of Woodbury: (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1.
+
 All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
 puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
 along the sheet or, where that would be too wide, a sparse matrix.
@@ -17,6 +20,7 @@ from scipy import sparse
 from foldyn.algebra.banded import BandLU, Cholesky
 from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.dynamics.implicit.damping import ElementBlocks, ModalTerm, Weights
 from foldyn.dynamics.system import Packed
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
@@ -24,20 +28,12 @@ from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 
 
-class Weights(NamedTuple):
-    """Factors of the matrices in that of an iteration."""
-
-    stiffness: float
-    mass: float  # 1/s2
-    damping: float  # 1/s, of beta K0
-
-
 class Matrices(NamedTuple):
     """The three matrices as blocks, (nnz, 3, 3) each."""
 
     stiffness: NDArray
     mass: NDArray
-    damping: NDArray  # beta K0
+    damping: NDArray  # beta K0, dashpots and creases
 
 
 class StepMatrix:
@@ -67,26 +63,29 @@ class StepMatrix:
         nodes, self._following, self._symmetric = system.rows, system.following, symmetric
         row, column = following_places(system.following)
         nodal = sparse.csr_array((mass.data, mass.indices, mass.indptr), (nodes, nodes))
-        if len(row):
-            nodal = _with_zeros(nodal, row // 3, column // 3)
-        masses_at = block_keys(nodal.indptr, nodal.indices)
-        self.pattern = joined(self.blocks.pattern, masses_at)
-        own = block_keys(self.pattern.indptr, self.pattern.indices)
-        shape = (len(self.pattern.indices), 3, 3)
-        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
-        masses[np.searchsorted(own, masses_at)] = nodal.data[:, None, None] * np.eye(3)
         damping = system.damping.viscous(3 * nodes).tobsr((3, 3))
         damping.sort_indices()
-        viscous[np.searchsorted(own, block_keys(damping.indptr, damping.indices))] = damping.data
-        block = np.searchsorted(own, (row // 3) * nodes + column // 3)
-        self._follow = 9 * block + 3 * (row % 3) + column % 3
+        self._elements = ElementBlocks(system.damping.elements, nodes)
+        parts = (nodal, damping, self._elements.blocks)
+        keys = [block_keys(part.indptr, part.indices) for part in parts]
+        keys.append(row // 3 * nodes + column // 3)
+        self.pattern = joined(self.blocks.pattern, np.concatenate(keys))
+        own = block_keys(self.pattern.indptr, self.pattern.indices)
+        where = [np.searchsorted(own, each) for each in keys]
+        shape = (len(self.pattern.indices), 3, 3)
+        self.stiffness, masses, viscous = (np.zeros(shape) for _ in range(3))
+        masses[where[0]] = nodal.data[:, None, None] * np.eye(3)
+        viscous[where[1]] = damping.data
+        self._elements.settle(viscous, where[2])
+        self._follow = 9 * where[3] + 3 * (row % 3) + column % 3
         self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
         held[self.blocks.unused] = True
         along = self.blocks.order
         self.free = along[~held[along]]
-        filled = self.blocks.filled(self.pattern) | (masses != 0.0)
+        filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
+        filled |= self._elements.filled(shape)
         filled.reshape(-1)[self._follow] = True
         row, column, take = _entries(self.pattern, self.free, filled)
         size, width = len(self.free), int(np.abs(row - column).max(initial=0))
@@ -96,6 +95,7 @@ class StepMatrix:
             self._band = _Band(row, column, take, size, width, symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
+        self._modal = ModalTerm(system.damping.modal[:, self.free])
         self.factorizations = 0
 
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
@@ -119,14 +119,21 @@ class StepMatrix:
         """
         self._factors = None
         self.factorizations += 1
+        self._factors = self._modal(weights, self._factorized(weights))
+
+    def _factorized(self, weights: Weights) -> Any:
+        """Factors of the matrix without modal damping."""
         if self._band is not None:
             try:
-                self._factors = self._band(weights, self._matrices)
-                return
+                return self._band(weights, self._matrices)
             except SingularTangentError:  # not definite: the motion leaves an unstable state
                 if not np.isfinite(self.stiffness).all():
                     raise
-        self._factors = self._sparse(weights, self._matrices)
+        return self._sparse(weights, self._matrices)
+
+    def follow(self, u: NDArray) -> None:
+        """Make the damping of elements that follow the motion what it is at u (n, 3)."""
+        self._elements.put(u, self._matrices.damping)
 
     def forget(self) -> None:
         """Give up the factors."""
@@ -187,14 +194,6 @@ class _Sparse:
         _gather(weights, matrices, self._take, put, data)
         shape = (self._size, self._size)
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
-
-
-def _with_zeros(nodal: sparse.csr_array, row: NDArray, column: NDArray) -> sparse.csr_array:
-    """A nodal matrix with entries, zero unless it has them, at further places."""
-    own = nodal.tocoo()
-    data = np.concatenate([own.data, np.zeros(len(row))])
-    places = np.concatenate([own.row, row]), np.concatenate([own.col, column])
-    return sparse.coo_array((data, places), nodal.shape).tocsr()
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -185,8 +185,8 @@ class PanelShells:
             raise InputError("supports: this model takes `Fix` alone")
         if not all(isinstance(one, Force) for one in case.loads):
             raise InputError("loads: this model takes `Force` alone")
-        if case.damping.beta:
-            raise InputError(f"damping: beta = {case.damping.beta}: this model takes alpha alone")
+        if case.rayleigh.beta:
+            raise InputError(f"damping: beta = {case.rayleigh.beta}: this model takes alpha alone")
         if options.crease_stiffness is not None or options.crease_rest is not None:
             raise InputError("crease_stiffness, crease_rest: this model has those of the sheet")
         if case.structure.sheet.panels:
@@ -243,7 +243,7 @@ class PanelShells:
         self._prepare(
             domain, "ModifiedNewton"
         )  # a tangent a step: the same result in half the time
-        domain.rayleigh(self.case.damping.alpha, 0.0, 0.0, 0.0)
+        domain.rayleigh(self.case.rayleigh.alpha, 0.0, 0.0, 0.0)
         domain.integrator("Newmark", 0.5, 0.25)
         domain.analysis("Transient")
         return self._run(domain, times, every, (dt,))

@@ -1,0 +1,153 @@
+"""Damping ratios of modes as rows g_k of the dofs: C = sum of g_k' g_k.
+
+With M-orthonormal modes Phi on the free dofs f, C_ff = M Phi diag(2 zeta omega) Phi' M, a product
+with as many rows as there are modes (Wilson and Penzien, Int. J. Numer. Methods Eng. 4, 1972). What
+moves with the supports s is not damped: their motion brings the free dofs slowly to -K_ff^-1 K_fs
+u_s, and what is damped is the motion relative to that. Since Phi' K_ff = Lambda Phi' M_ff,
+
+    g_k = sqrt(2 zeta_k omega_k) (phi_k' M_ff,  phi_k' K_fs / lambda_k),
+
+which vanishes in translations of the whole.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.eigen import Pencil, Spectrum, lowest
+from foldyn.cases import Case, ModalDamping
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.materials import Superlinear
+from foldyn.mechanics.body import Body
+from foldyn.statics.rigid import free_rigid_motions
+
+SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
+# (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
+MOST_MODES = 2000  # free dofs of which all modes may be damped
+RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one,
+SLOW = 1e-6  # where its eigenvalue is less than that of the largest one found
+BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
+
+
+def soft_slopes(body: Body, q: NDArray) -> tuple[sparse.csr_array | None, int]:
+    """What to add to the tangent (m, m) so that hinges at rest have no slope, and how many do so.
+
+    Superlinear ones, whose slope at their rest angle is the root of rounding errors.
+    """
+    hinges = body.soft_hinges(q)
+    slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
+    at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
+    change = np.where(at_rest, -slope, 0.0)
+    return (body.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
+
+
+class ModalRows(NamedTuple):
+    """Modal damping as rows of the m dofs."""
+
+    rows: NDArray  # (r, m), sqrt(N s/m)
+    rate: float  # 1/s, the largest 2 zeta omega
+    soft: int  # hinges that have no slope in the state, so that modes are left out
+
+    def warn(self) -> None:
+        """Warn where modes are left out."""
+        if self.soft:
+            warnings.warn(
+                f"damping: {self.soft} hinges of the superlinear law stand at their rest angle, "
+                "where their slope vanishes: motions that only they resist are no modes, and modal "
+                'damping leaves them out; take bend_law = "linear", or Rayleigh beside it',
+                FoldynWarning,
+                stacklevel=5,
+            )
+
+
+def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
+    """Modal damping of a case for a motion from `start` (n, 3), or from rest.
+
+    Raises
+    ------
+    InputError
+        The state is unstable; there are not as many modes.
+    """
+    damping, body = case.modal_damping, case.body
+    if damping is None:
+        return ModalRows(np.zeros((0, body.size)), 0.0, 0)
+    state = start if damping.state == "start" else None
+    state = np.zeros_like(case.structure.nodes) if state is None else state
+    q = body.dofs(state)
+    change, soft = soft_slopes(body, q)
+    stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
+    return rows_of(damping, case, stiffness, state)._replace(soft=soft)
+
+
+def rows_of(
+    damping: ModalDamping, case: Case, stiffness: sparse.csr_array, state: NDArray
+) -> ModalRows:
+    """Modal damping for a stiffness (m, m) at a displacement (n, 3)."""
+    free = np.concatenate([case.free_dofs, case.body.hidden])
+    mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
+    mass.resize(stiffness.shape)
+    block = sparse.csc_array(mass[free][:, free])
+    pencil = Pencil(sparse.csc_array(stiffness[free][:, free]), block)
+    spectrum = _swinging(pencil, damping, case, state, free)
+    values, shapes = spectrum.values, spectrum.shapes
+    rows = np.zeros((len(values), stiffness.shape[0]))
+    rows[:, free] = (block @ shapes).T
+    held = case.supported_dofs
+    rows[:, held] = (stiffness[held][:, free] @ shapes).T / values[:, None]
+    rates = 2.0 * np.broadcast_to(damping.ratios, len(values)) * np.sqrt(values)
+    return ModalRows(rows * np.sqrt(rates)[:, None], float(rates.max(initial=0.0)), 0)
+
+
+def _swinging(
+    pencil: Pencil, damping: ModalDamping, case: Case, state: NDArray, free: NDArray
+) -> Spectrum:
+    """The lowest modes that swing, as many as are damped."""
+    wanted = damping.modes
+    if wanted is None and pencil.finite > MOST_MODES:
+        raise InputError(
+            f": all modes of {pencil.finite} free dofs are too many; give count, or a list of "
+            "ratios",
+            "damping.modal",
+        )
+    sought = pencil.finite if wanted is None else min(wanted + BEYOND, pencil.finite)
+    while True:
+        spectrum = lowest(pencil, sought, np.zeros((pencil.size, 0)))
+        if (spectrum.values < 0.0).any():
+            raise InputError(
+                f': the state "{damping.state}" is unstable ({int((spectrum.values < 0.0).sum())} '
+                "negative eigenvalues), and its modes do not swing; take another state, or "
+                "Rayleigh damping",
+                "damping.modal",
+            )
+        swings = (spectrum.values > 0.0) & ~_rigid(pencil, spectrum, case, state, free)
+        found = int(swings.sum())
+        if wanted is None or found >= wanted:
+            kept = np.flatnonzero(swings)[:wanted]
+            return Spectrum(spectrum.values[kept], spectrum.shapes[:, kept], math.nan, len(kept), 0)
+        if sought == pencil.finite:
+            raise InputError(
+                f": ratios of {wanted} modes, but only {found} swing; give fewer", "damping.modal"
+            )
+        sought = min(2 * sought, pencil.finite)
+
+
+def _rigid(
+    pencil: Pencil, spectrum: Spectrum, case: Case, state: NDArray, free: NDArray
+) -> NDArray:
+    """Which modes (k,) are rigid motions that next to nothing resists."""
+    motions = free_rigid_motions(case.structure.nodes + state, case.fixed.ravel())
+    space = np.zeros((pencil.size, motions.shape[1]))
+    nodal = free < len(motions)
+    space[nodal] = motions[free[nodal]]
+    if not space.shape[1]:
+        return np.zeros(len(spectrum.values), bool)
+    carried = pencil.mass @ space
+    within = np.linalg.solve(space.T @ carried, carried.T @ spectrum.shapes)
+    share = np.einsum("ik,ik->k", carried.T @ spectrum.shapes, within)
+    return (share > RIGID) & (spectrum.values < SLOW * spectrum.values.max())

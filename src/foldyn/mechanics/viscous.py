@@ -1,0 +1,155 @@
+"""Viscous elements whose direction follows the motion: axial dashpots and creases.
+
+Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with the force
+c (ds/dt) grad s, ds/dt = grad s . v. It takes the power c (ds/dt)^2, which is none in rigid motions,
+and its matrix in a state is c grad s grad s'. Grad s is sparse: the columns of `dofs`.
+
+The angle of a hinge is its dihedral less a multiple of two dofs beside displacements, if it has
+them, as a piece of a shell's crease does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.dihedral import dihedral_gradient
+
+WIDTH = 14  # dofs of an element at most: four nodes, and two beside displacements
+
+
+class Viscous(NamedTuple):
+    """Arrays of p axial elements and h hinges; dofs are 3 row + column of arrays (rows, 3)."""
+
+    dofs: NDArray  # (p + h, 14) of each element; the dof 0 with a gradient of 0 where it has fewer
+    axial: NDArray  # (p, 3) rest vector from the first node to the second, m
+    corners: NDArray  # (h, 4, 3) rest positions of the nodes j, k, i, l, m
+    per_hidden: NDArray  # (h,) what a unit of the last two dofs takes from the dihedral, rad/m
+    coefficient: NDArray  # (p + h,) N s/m, N m s/rad
+    gradient: NDArray  # (14,) memory of one element
+
+
+def viscous(
+    pairs: NDArray,
+    axial: NDArray,
+    axial_coefficient: NDArray,
+    hinges: NDArray,
+    corners: NDArray,
+    hidden: NDArray,
+    per_hidden: float,
+    hinge_coefficient: NDArray,
+) -> Viscous:
+    """Pack elements.
+
+    Parameters
+    ----------
+    pairs, axial : (p, 2), (p, 3)
+        Rows of the nodes, and the rest vector from the first to the second, m.
+    axial_coefficient : (p,)
+        N s/m.
+    hinges, corners : (h, 4), (h, 4, 3)
+        Rows of the nodes: axis j, k, wings i, l; where they are at rest, m.
+    hidden : (h, 2)
+        Dofs beside displacements; -1 without them.
+    per_hidden : float
+        rad/m.
+    hinge_coefficient : (h,)
+        N m s/rad.
+    """
+    axes, p, h = np.arange(3), len(pairs), len(hinges)
+    dofs = np.zeros((p + h, WIDTH), np.int64)
+    dofs[:p, :6] = (3 * pairs[:, :, None] + axes).reshape(p, 6)
+    dofs[p:, :12] = (3 * hinges[:, :, None] + axes).reshape(h, 12)
+    dofs[p:, 12:] = np.maximum(hidden, 0)
+    return Viscous(
+        dofs=dofs,
+        axial=np.array(axial, float).reshape(p, 3),
+        corners=np.array(corners, float).reshape(h, 4, 3),
+        per_hidden=np.where(hidden[:, 0] >= 0, per_hidden, 0.0),
+        coefficient=np.concatenate([axial_coefficient, hinge_coefficient]).astype(float),
+        gradient=np.zeros(WIDTH),
+    )
+
+
+@kernel
+def _gradient(elements, moved, e, out):
+    """Gradient (14,) of element e at flat displacements."""
+    dofs, p = elements.dofs[e], elements.axial.shape[0]
+    for c in range(14):
+        out[c] = 0.0
+    if e < p:
+        square = 0.0
+        for c in range(3):
+            out[3 + c] = elements.axial[e, c] + moved[dofs[3 + c]] - moved[dofs[c]]
+            square += out[3 + c] * out[3 + c]
+        length = math.sqrt(square)
+        for c in range(3):
+            out[3 + c] /= length
+            out[c] = -out[3 + c]
+        return
+    x = elements.corners[e - p]
+    found = dihedral_gradient(
+        x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
+        x[1, 0] + moved[dofs[3]], x[1, 1] + moved[dofs[4]], x[1, 2] + moved[dofs[5]],
+        x[2, 0] + moved[dofs[6]], x[2, 1] + moved[dofs[7]], x[2, 2] + moved[dofs[8]],
+        x[3, 0] + moved[dofs[9]], x[3, 1] + moved[dofs[10]], x[3, 2] + moved[dofs[11]],
+    )  # fmt: skip
+    for c in range(12):
+        out[c] = found[1 + c]
+    out[12] = out[13] = -elements.per_hidden[e - p]
+
+
+@kernel
+def add_viscous_elements(elements, u, v, force):
+    """Add their forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
+    power, moved, speed, out = 0.0, flat(u), flat(v), flat(force)
+    g = elements.gradient
+    for e in range(elements.coefficient.size):
+        _gradient(elements, moved, e, g)
+        rate = 0.0
+        for c in range(14):
+            rate += g[c] * speed[elements.dofs[e, c]]
+        resist = elements.coefficient[e] * rate
+        for c in range(14):
+            out[elements.dofs[e, c]] += resist * g[c]
+        power += resist * rate
+    return power
+
+
+@kernel
+def viscous_elements_work(elements, u, v, shift):
+    """Work (J) of their forces at u and v along a shift, all (rows, 3)."""
+    work, moved, speed, along, g = 0.0, flat(u), flat(v), flat(shift), elements.gradient
+    for e in range(elements.coefficient.size):
+        _gradient(elements, moved, e, g)
+        rate, change = 0.0, 0.0
+        for c in range(14):
+            rate += g[c] * speed[elements.dofs[e, c]]
+            change += g[c] * along[elements.dofs[e, c]]
+        work += elements.coefficient[e] * rate * change
+    return work
+
+
+@kernel
+def put_gradients(elements, u, out):
+    """Gradients of all elements at u, flat or (rows, 3), to out (p + h, 14)."""
+    moved = flat(u)
+    for e in range(elements.coefficient.size):
+        _gradient(elements, moved, e, out[e])
+
+
+def viscous_matrix(elements: Viscous, q: NDArray, size: int) -> sparse.csr_array:
+    """Sum of c grad s grad s' at the dofs q (m,), as a matrix (size, size), N s/m."""
+    gradients = np.zeros((len(elements.coefficient), WIDTH))
+    put_gradients(elements, np.ascontiguousarray(q, float), gradients)
+    row = np.repeat(np.arange(len(gradients)), WIDTH)
+    entries = (gradients.ravel(), (row, elements.dofs.ravel()))
+    rates = sparse.csr_array(entries, (len(gradients), size))
+    rates.eliminate_zeros()
+    return sparse.csr_array(rates.T @ (sparse.diags_array(elements.coefficient) @ rates))
