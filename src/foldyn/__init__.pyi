@@ -35,6 +35,7 @@ from foldyn.cases import (
     HalfSine as HalfSine,
     Harmonic as Harmonic,
     Impose as Impose,
+    Link as Link,
     Pulse as Pulse,
     Ramp as Ramp,
     Rayleigh as Rayleigh,

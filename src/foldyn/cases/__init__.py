@@ -1,4 +1,4 @@
-"""Cases: supports, loads, histories, damping, states."""
+"""Cases: supports, links, loads, histories, damping, states."""
 
 from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
@@ -8,7 +8,7 @@ from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
-from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose
+from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link
 
 __all__ = [
     "SUPPORTS",
@@ -17,6 +17,7 @@ __all__ = [
     "Fix",
     "Function",
     "Impose",
+    "Link",
     "Rayleigh",
     "State",
     "as_history",

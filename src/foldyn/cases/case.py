@@ -11,11 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.cases.constraints import Constraints
 from foldyn.cases.damping import Rayleigh
 from foldyn.cases.history import History, as_history
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Support
+from foldyn.cases.supports import (
+    AXES,
+    SUPPORTS,
+    BaseMotion,
+    Fix,
+    Impose,
+    Link,
+    Support,
+    unit_vector,
+)
+from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import Faults, InputError
 from foldyn.mechanics.body import Body
 from foldyn.structures.discretized import read_only
@@ -34,9 +45,9 @@ class Case:
     ----------
     structure : Structure
         The discretized pattern.
-    supports : sequence of Fix, Impose and BaseMotion
-        Nodes held at rest or moved as prescribed, and motions of the base; none by default (free
-        motion is legal in dynamics).
+    supports : sequence of Fix, Impose, BaseMotion and Link
+        Nodes held at rest or moved as prescribed, motions of the base, and nodes tied together;
+        none by default (free motion is legal in dynamics).
     loads : sequence of Force, Gravity and Actuate
         Forces, gravity and creases that fold by themselves; none by default.
     damping : Rayleigh
@@ -48,8 +59,13 @@ class Case:
         True where a node is held along an axis, by `Fix` or by `Impose`.
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
+    constraints : Constraints
+        What ties displacements together: directions that are held, links, rigid panels.
     free_dofs, supported_dofs : ndarray of int64
-        Numbers 3 * node + axis of the free and of the held ones, increasing.
+        Numbers 3 * node + axis of the free ones, on which all others depend, and of the held ones,
+        increasing.
+    reaction_dofs : ndarray of int64
+        The held ones and those on which supports act along a direction, increasing.
     load_terms : tuple of (ndarray of shape (n, 3), History)
         Forces (N) on all nodes with their history; loads with equal histories are one term.
         Forces on held nodes are kept: the reactions carry them.
@@ -58,8 +74,8 @@ class Case:
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
-        Displacements (m) at factor 1 of the imposed dofs, zero elsewhere, with their history;
-        equal histories are one term.
+        Displacements (m) at factor 1 of the imposed dofs and of those that constraints tie to
+        them, zero elsewhere, with their history; equal histories are one term.
     base_terms : tuple of (ndarray of shape (n, 3), History)
         The same of the dofs that `Fix` holds along the axis of a `BaseMotion`, from where they
         stand at the start of the motion.
@@ -101,7 +117,7 @@ class Case:
     def _check_selections(self) -> None:
         """Refuse nodes and creases that are not there, all at once."""
         faults = Faults()
-        for place, support in self._supports(Fix, Impose):
+        for place, support in self._supports(Fix, Impose, Link):
             with faults.collected():
                 self._nodes_of(place, support)
         for place, load in self._loads():
@@ -141,6 +157,8 @@ class Case:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Impose):
+            if support.axis is None:
+                continue
             nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
             for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
@@ -158,7 +176,7 @@ class Case:
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Fix):
             nodes = self._nodes_of(place, support)
-            for axis in support.axes:
+            for axis in support.axes or "":
                 mask[nodes, AXES.index(axis)] = True
         return mask
 
@@ -166,9 +184,25 @@ class Case:
         return resolve_nodes(self.structure, support.nodes, f"{place}.nodes")
 
     @cached_property
+    def constraints(self) -> Constraints:
+        """What ties displacements together: directions that are held, links, rigid panels."""
+        equations = equations_of(self.structure, self._supports(Fix, Impose, Link))
+        return Constraints(equations, self.fixed.ravel())
+
+    @property
     def free_dofs(self) -> NDArray[np.int64]:
-        """Numbers 3 * node + axis that are free, increasing."""
-        return np.flatnonzero(~self.fixed.ravel()).astype(np.int64)
+        """Numbers 3 * node + axis that are free, increasing; all others depend on them."""
+        return self.constraints.free
+
+    @property
+    def imposed_slaves(self) -> NDArray[np.int64]:
+        """Numbers of the dofs that `Impose` along a direction moves with others of their nodes."""
+        return self.constraints.slaves_of([place for place, _ in self._supports(Impose)])
+
+    @property
+    def reaction_dofs(self) -> NDArray[np.int64]:
+        """Numbers 3 * node + axis on which supports exert forces, increasing."""
+        return self.constraints.supported
 
     @cached_property
     def supported_dofs(self) -> NDArray[np.int64]:
@@ -183,8 +217,14 @@ class Case:
     def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
             vector = np.zeros((len(self.structure.nodes), 3))
-            vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
-            yield vector, support.history
+            if support.axis is not None:
+                vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
+            yield self._tied(vector, place, {place: support.value}), support.history
+
+    def _tied(self, shape: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
+        """Displacements (n, 3), m, when supports move as in a shape and by values along theirs."""
+        ties = self.constraints
+        return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
 
     @cached_property
     def base_terms(self) -> Terms:
@@ -195,7 +235,12 @@ class Case:
         base = self.fixed & ~self.imposed
         for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
-            if not base[:, axis].any():
+            along = {
+                where: support.value * unit_vector(other.direction)[axis]
+                for where, other in self._supports(Fix)
+                if other.direction is not None
+            }
+            if not base[:, axis].any() and not any(along.values()):
                 raise InputError(
                     f"{place}: the base moves along {support.axis}, but no support holds a "
                     f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
@@ -203,7 +248,7 @@ class Case:
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield vector, support.history
+            yield self._tied(vector, place, along), support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:

@@ -68,8 +68,9 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     if not len(free):
         return 0.0
     state = np.zeros_like(structure.nodes) if u is None else np.asarray(u, float)
-    k = case.body.tangent(state, 1.0)[free][:, free]
-    m = sparse.kron(case.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    reduced = case.constraints.matrix
+    k = reduced(case.body.tangent(state, 1.0))[free][:, free]
+    m = reduced(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))[free][:, free]
     try:
         return _largest_frequency(k, m)
     except (RuntimeError, np.linalg.LinAlgError, SingularTangentError) as error:

@@ -153,13 +153,15 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     if part.value == 0.0:
         raise InputError("drive[0].value = 0: the base must move")
     column = AXES.index(part.axis)
-    if case.imposed[:, column].any():
+    if any(vectors[:, column].any() for vectors, _ in case.imposed_terms) or (
+        case.imposed[:, column].any()
+    ):
         raise InputError(
             f"drive[0]: an Impose holds nodes along {part.axis}, which would not follow the base; "
             "use Fix instead of Impose there and start from a state that has been brought there"
         )
     held = case.fixed[:, column]
-    if not held.any():
+    if not (case.reaction_dofs % 3 == column).any():
         raise InputError(
             f"drive[0]: the base moves along {part.axis}, but no support holds a node along "
             f'{part.axis}; add one with axes = "{part.axis}", or drive by forces'
@@ -177,10 +179,7 @@ def drive_shape(system: Linearized, drive: Drive) -> NDArray[np.float64]:
         load = np.zeros_like(drive.vector)
         mass = system.case.nodal_mass
         load[:, AXES.index(drive.axis)] = mass
-    shape = np.zeros(len(system.free))
-    nodal = system.free < load.size
-    shape[nodal] = load.ravel()[system.free[nodal]]
-    return shape
+    return system.projected(load.ravel())
 
 
 def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
@@ -192,10 +191,7 @@ def drive_factor(system: Linearized, drive: Drive, omega: float) -> complex:
 
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
     """Response (m, n, 3) to the drive from that of the free dofs (m, nf), relative to the base."""
-    response = np.zeros((len(relative), drive.vector.size), np.complex128)
-    nodal = system.free < drive.vector.size
-    response[:, system.free[nodal]] = relative[:, nodal]
-    response = response.reshape(-1, *drive.vector.shape)
+    response = system.expanded(relative.T).T.reshape(-1, *drive.vector.shape).copy()
     if drive.axis is not None:
         response[:, :, AXES.index(drive.axis)] += 1.0
     return response

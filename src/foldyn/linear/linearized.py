@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse import linalg
 from scipy.special import gamma, hyp2f1
 
 from foldyn.algebra.solvers import check_fill
@@ -39,6 +40,7 @@ from foldyn.values import brief, number
 
 SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest angle to rounding
 # (4e-7 rad from it, which is what the tolerance of statics leaves undetermined)
+STILL = 1e-9  # of a hinge's gradient: what constraints leave of that of one that cannot turn
 POWER = 4.0 / 3.0
 AT_REST = float(2.0 / np.sqrt(np.pi) * gamma(0.5 * POWER + 1.0) / gamma(0.5 * POWER + 1.5))
 
@@ -55,7 +57,8 @@ class Linearized:
         The state, m.
     free : (nf,)
         Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
-        that a shell has beside the displacements of its nodes.
+        that a shell has beside the displacements of its nodes. Where constraints tie others to
+        them, `expanded` gives the motion of all.
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and alpha M + beta K0 (N s/m). K0 is the
         exact tangent at rest, or in this state where the damping says so.
@@ -80,6 +83,21 @@ class Linearized:
     secant: float | None
     residual: float = 0.0
     unbalanced: float = 0.0
+
+    def expanded(self, motions: NDArray) -> NDArray:
+        """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
+        size = self.displacement.size
+        on_nodes = self.free < size
+        full = np.zeros((size, motions.shape[1]), motions.dtype)
+        full[self.free[on_nodes]] = motions[on_nodes]
+        return self.case.constraints.displacement(full)
+
+    def projected(self, force: NDArray) -> NDArray:
+        """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
+        on_nodes = self.free < force.size
+        out = np.zeros(len(self.free))
+        out[on_nodes] = self.case.constraints.force(force)[self.free[on_nodes]]
+        return out
 
 
 def linearize(
@@ -119,13 +137,13 @@ def linearize(
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
-    check_mass(case.mass, case.fixed)
+    check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
     body = point.body
     free = np.concatenate([case.free_dofs, body.hidden])
     exact = body.tangent(point.dofs)
-    change, soft = _slope_change(body, point.dofs, amplitude)
+    change, soft = _slope_change(case, body, point.dofs, amplitude)
     if soft:
         warnings.warn(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
@@ -141,13 +159,15 @@ def linearize(
         massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
         mass = sparse.block_diag([mass, massless], format="csr")
     mass = sparse.csr_array(mass)
+    reduced = case.constraints.matrix
+    damping = case.damping.matrix(mass, _reference(case, exact))
     return Linearized(
         case=case,
         displacement=point.displacement,
         free=free,
-        stiffness=_block(stiffness, free),
-        mass=_block(mass, free),
-        damping=_block(case.damping.matrix(mass, _reference(case, exact)), free),
+        stiffness=_block(reduced(stiffness), free),
+        mass=_block(reduced(mass), free),
+        damping=_block(reduced(damping), free),
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
@@ -156,17 +176,30 @@ def linearize(
 
 
 def _slope_change(
-    body: Body, q: NDArray, amplitude: float | None
+    case: Case, body: Body, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
-    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft."""
+    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft.
+
+    Hinges that constraints keep from turning are left alone.
+    """
     hinges = body.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
     if amplitude is not None:
         change, soft = equivalent_slope(hinges.offset, amplitude) - slope, 0
     else:
-        at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
+        at_rest = (slope < SOFT) & (hinges.stiffness > 0.0) & _turns(case, hinges.gradient)
         change, soft = np.where(at_rest, -slope, 0.0), int(at_rest.sum())
     return (body.soft_tangent(q, change) if change.any() else None), soft
+
+
+def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
+    """Whether constraints let each hinge (h,) turn, by the gradients (h, m) of their angles."""
+    ties = case.constraints
+    if not ties:
+        return np.ones(gradient.shape[0], bool)
+    basis = ties.extended(gradient.shape[1])[:, ties.free]
+    left, whole = (linalg.norm(each, axis=1) for each in (gradient @ basis, gradient))
+    return left > STILL * whole
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:

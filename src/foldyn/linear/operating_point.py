@@ -72,7 +72,7 @@ def operating_point(
 def _equilibrium(case: Case) -> NDArray:
     """Displacement (n, 3) under the loads of a case in full, near its rest state."""
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
-    free = free_rigid_motions(case.structure.nodes, case.fixed.ravel()).shape[1] > 0
+    free = free_rigid_motions(case.structure.nodes, case.constraints).shape[1] > 0
     with warnings.catch_warnings():  # the linearization itself warns of unstable motions
         warnings.filterwarnings("ignore", "the path loses stability", FoldynWarning)
         path = trace(case, "newton", factors, inertia_relief=free)
@@ -88,14 +88,14 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     problem = OrigamiProblem(case, (), displacement)
     body = problem.actuation.body(factor)
     u, free = body.dofs(displacement), problem.free
-    residual = body.internal(u)
-    loads = _load_vectors(case, body)
+    residual = problem.projected(body.internal(u))
+    loads = problem.projected(_load_vectors(case, body))
     if kind == "equilibrium":
         residual = residual - loads.sum(axis=1)
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
-    reached = balance(problem, u, factor, residual)
+    reached = balance(problem, problem.state(displacement, factor), factor, residual)
     return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
 
 

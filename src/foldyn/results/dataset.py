@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn import __version__
-from foldyn.cases import HISTORIES, Case, Fix
+from foldyn.cases import HISTORIES, Case, Fix, Link
 from foldyn.cases.document import Document, to_document
 from foldyn.results.quantities import (
     ESTIMATES,
@@ -62,7 +62,7 @@ def trajectory_dataset(
     displacement, velocity : array_like, shape (nt, n, 3)
         Displacement (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
-        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (nt,)
         kinetic, dissipated, work and the strain energies of the structure's `energy_groups` (J).
     statistics : mapping
@@ -86,8 +86,9 @@ def trajectory_dataset(
     known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
     values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
-    varying = [part for part in (*case.supports, *case.loads) if not isinstance(part, Fix)]
-    called = any(type(part.history) not in HISTORIES.values() for part in varying)
+    parts = (*case.supports, *case.loads)
+    varying = [part.history for part in parts if not isinstance(part, Fix | Link)]
+    called = any(type(history) not in HISTORIES.values() for history in varying)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
     return result_dataset("trajectory", case, data, along, statistics, times)
@@ -114,7 +115,7 @@ def path_dataset(
     displacement : array_like, shape (ns, n, 3)
         Displacement (m) of every node.
     reaction : array_like, shape (ns, nd)
-        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (ns,)
         work and the strain energies of the structure's `energy_groups` (J).
     solution : mapping of str to array_like, shape (ns,)
@@ -237,7 +238,7 @@ def result_dataset(
     obstacles : tuple of str
         Why the result cannot be run again from itself, beside what the case says.
     """
-    support = case.supported_dofs
+    support = case.reaction_dofs
     document = to_document(case, times)
     obstacles = (*document.obstacles, *obstacles)
     attributes: dict[str, Any] = {

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from foldyn.cases import Case
+from foldyn.cases.constraints import Constraints
 from foldyn.errors import InputError
 
 FREE = 1e-9  # of a rigid motion's size: what held dofs may move in it
@@ -35,26 +36,29 @@ def rigid_motions(x: NDArray) -> NDArray:
     return motions.reshape(-1, 6)
 
 
-def free_rigid_motions(x: NDArray, held: NDArray) -> NDArray:
-    """Rigid motions (3n, r) of points x (n, 3) that leave the dofs of the mask held (3n,) still."""
+def free_rigid_motions(x: NDArray, ties: Constraints) -> NDArray:
+    """Rigid motions (3n, r) of points x (n, 3) that supports and constraints allow."""
     motions = rigid_motions(x)
-    return motions @ _free_space(motions, held)
+    return motions @ _free_space(motions, ties)
 
 
-def _free_space(motions: NDArray, held: NDArray) -> NDArray:
+def _free_space(motions: NDArray, ties: Constraints) -> NDArray:
     """Combinations (6, r) of the rigid motions that leave held dofs still, but not everything."""
-    _, values, right = np.linalg.svd(np.linalg.qr(motions[held], mode="r"))
-    rank = int((values > FREE * np.sqrt(held.sum())).sum())
+    held = motions[ties.held]
+    if ties:
+        held = np.vstack([held, ties.rows @ motions])
+    _, values, right = np.linalg.svd(np.linalg.qr(held, mode="r"))
+    rank = int((values > FREE * np.sqrt(len(held))).sum())
     space = right[rank:].T
     # points on a line stand still as it turns about itself
     _, values, right = np.linalg.svd(motions @ space, full_matrices=False)
     return space @ right[values > FREE * np.sqrt(len(motions))].T
 
 
-def name_rigid_motions(x: NDArray, held: NDArray) -> list[str]:
+def name_rigid_motions(x: NDArray, ties: Constraints) -> list[str]:
     """Free rigid motions in words, such as "translation along x" and "rotation about y"."""
     motions = rigid_motions(x)
-    space = _free_space(motions, held)
+    space = _free_space(motions, ties)
     if not space.size:
         return []
     left, values, right = np.linalg.svd(space[3:])
@@ -94,7 +98,7 @@ class Relief:
     """Balance of the loads of a case whose supports leave it free to move as a rigid body."""
 
     def __init__(self, case: Case, start: NDArray) -> None:
-        self._nodes, self._held = case.structure.nodes, case.fixed.ravel()
+        self._nodes, self._ties = case.structure.nodes, case.constraints
         try:
             self._mass = case.mass
         except InputError as error:
@@ -107,13 +111,13 @@ class Relief:
             raise InputError(
                 ": the supports leave no rigid motion free: leave it out", "inertia_relief"
             )
-        free = np.flatnonzero(~self._held)
+        free = case.free_dofs
         first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first
         _, _, order = qr(motions[free].T * first, mode="economic", pivoting=True)
         self.pins = np.sort(free[order[: self._count]])
 
     def _motions(self, u: NDArray) -> NDArray:
-        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held)
+        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._ties)
 
     def inertia(self, u: NDArray, force: NDArray) -> NDArray:
         """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""

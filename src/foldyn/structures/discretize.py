@@ -16,6 +16,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths, n4b5, n5b8
+from foldyn.structures.plate import checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure, hinge_angles
 from foldyn.values import choice, numbers, vector
@@ -36,6 +37,7 @@ def discretize(
     crease_stiffness: float | Sequence[float] | None = None,
     crease_rest: float | Sequence[float] | None = None,
     centers: Mapping[int, ArrayLike] | None = None,
+    rigid: str | Sequence[int] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
@@ -60,6 +62,9 @@ def discretize(
         `pattern.creases`, instead of the pattern's own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
+    rigid : "all" or sequence of int, optional
+        Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
+        be flat. Their bars still stretch.
 
     Returns
     -------
@@ -80,8 +85,9 @@ def discretize(
     """
     check_kinds(pattern, sheet)
     options = ModelOptions(
-        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest
-    )
+        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest,
+        checked_panels(rigid, len(pattern.faces)),
+    )  # fmt: skip
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
     materials.hinge_law(bend_law, "bend_law")
@@ -97,7 +103,7 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
 
     x = mesh.nodes
-    return Structure(
+    structure = Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
         bar_area=area,
@@ -113,7 +119,9 @@ def discretize(
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,
-    ).marked()
+    )
+    _ = structure.plates  # refuse panels that are not flat
+    return structure.marked()
 
 
 def check_kinds(pattern: Any, sheet: Any) -> None:

@@ -19,6 +19,7 @@ from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
+from foldyn.structures.plate import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.values import choice
 
@@ -41,6 +42,7 @@ class ModelOptions:
     calibration: Literal["standard", "merlin2"] = "standard"
     crease_stiffness: float | Sequence[float] | None = None
     crease_rest: float | Sequence[float] | None = None
+    rigid: str | tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -133,6 +135,15 @@ class Structure(Discretized):
     def body(self) -> BarsHingesBody:
         """What solvers take."""
         return BarsHingesBody(self.model, self.hinge_of_fold, self.fold_law)
+
+    @cached_property
+    def plates(self) -> tuple[Plate, ...]:
+        """Its rigid panels."""
+        if self.pattern is None:
+            return ()
+        return rigid_plates(
+            self.options.rigid, self.pattern.faces, self.nodes, self.triangles, self.triangle_panel
+        )
 
     @cached_property
     def hinge_of_fold(self) -> NDArray:
