@@ -3,8 +3,9 @@
 Each equation determines one dof, its slave, from others. With x the vector u in which the value g
 of its equation takes the place of each slave, u = E x: row by row a slave is a combination of free
 dofs, of held ones, and of the values g. Columns of E that belong to free dofs span the motions that
-the equations and the supports allow; transposed, E turns forces on u into those on x: on free dofs
-what drives them, on held ones what their supports exert, on slaves the multipliers of the equations.
+the equations and the supports allow. Transposed, E turns forces on u into those on x: on free dofs
+what drives them, on held ones what their supports exert, and on slaves the multipliers of the
+equations.
 
 The equations are taken one after the other. What is known of earlier slaves is put into each; a dof
 that is still free and counts enough becomes its slave, first of all the one that the equation names

@@ -25,6 +25,7 @@ from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
+from foldyn.structures.plate import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 
@@ -172,6 +173,7 @@ Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(lambda value: number_or_list("", value, "crease"))]
+Rigid = Annotated[Any, PlainValidator(lambda value: checked_panels(value, MOST, ""))]
 Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
@@ -198,6 +200,7 @@ class ModelSection(Section):
     calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
+    rigid: Rigid = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:

@@ -111,6 +111,8 @@ class Case:
             )
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
+        if self.constraints:
+            _ = self.imposed_terms
         for place, load in self._loads():
             load.check(self.structure, self.fixed, place)
 

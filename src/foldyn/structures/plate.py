@@ -50,23 +50,21 @@ def on_plate(points: NDArray, corners: NDArray) -> tuple[NDArray, NDArray]:
     return np.stack([1.0 - second - third, second, third], axis=1), off
 
 
-def checked_panels(rigid: Any, count: int) -> str | tuple[int, ...] | None:
+def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[int, ...] | None:
     """Return which of `count` panels are rigid: "all", their numbers, or None for none."""
     if rigid is None or (isinstance(rigid, str) and rigid == "all"):
         return rigid
     if isinstance(rigid, str):
-        raise InputError(
-            f' = {show(rigid)}: must be "all", or panel numbers, as in [0, 1]', "rigid"
-        )
-    if np.size(rigid) == 0:
+        raise InputError(f' = {show(rigid)}: must be "all", or panel numbers, as in [0, 1]', field)
+    if isinstance(rigid, list | tuple) and not rigid:
         return None
-    chosen = indices("rigid", rigid, "panel", 'or "all"')
+    chosen = indices(field, rigid, "panel", 'or "all"')
     for panel in chosen:
         if not 0 <= panel < count:
             raise InputError(
                 f" = {show(rigid)}: panel {panel} is out of range; the pattern has panels 0 to "
                 f"{count - 1}",
-                "rigid",
+                field,
             )
     return chosen
 
