@@ -39,6 +39,7 @@ from foldyn.cases import (
     Harmonic as Harmonic,
     Impose as Impose,
     LineLoad as LineLoad,
+    Link as Link,
     ModalDamping as ModalDamping,
     PointMass as PointMass,
     Pressure as Pressure,

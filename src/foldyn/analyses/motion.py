@@ -118,7 +118,7 @@ class MotionAnalysis(Analysis):
         check_samples(
             sum(motion.expected_samples for motion in motions),
             len(case.structure.nodes),
-            len(case.supported_dofs),
+            len(case.reaction_dofs),
             len(motions),
         )
 

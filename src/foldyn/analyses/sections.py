@@ -35,6 +35,7 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
 from foldyn.structures.creases import per_crease
+from foldyn.structures.plate import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 
@@ -190,6 +191,7 @@ BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAW
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_per_crease)]
 Pairs = Annotated[Any, PlainValidator(lambda value: check_pairs("", value))]
+Rigid = Annotated[Any, PlainValidator(lambda value: checked_panels(value, MOST, ""))]
 Animation = Annotated[str, one_of(ANIMATIONS)]
 
 
@@ -231,6 +233,7 @@ class ModelSection(Section):
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: Pairs = None
+    rigid: Rigid = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:

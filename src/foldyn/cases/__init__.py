@@ -1,4 +1,4 @@
-"""Cases: supports, loads, histories, damping, states."""
+"""Cases: supports, links, loads, histories, damping, states."""
 
 from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
@@ -10,7 +10,7 @@ from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes, select
 from foldyn.cases.state import State
-from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Spring
+from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
 
 __all__ = [
     "SUPPORTS",
@@ -21,6 +21,7 @@ __all__ = [
     "Fix",
     "Function",
     "Impose",
+    "Link",
     "ModalDamping",
     "PointMass",
     "Rayleigh",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.cases.constraints import Constraints
 from foldyn.cases.damped import Damped
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import History, as_history
@@ -18,7 +19,18 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.springs import packed
-from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Spring, Support
+from foldyn.cases.supports import (
+    AXES,
+    SUPPORTS,
+    BaseMotion,
+    Fix,
+    Impose,
+    Link,
+    Spring,
+    Support,
+    unit_vector,
+)
+from foldyn.cases.ties import equations_of, values_of
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.attached import Springs
 from foldyn.mechanics.attached_body import GROUP, attached
@@ -42,8 +54,8 @@ class Case(Damped):
     structure : Structure
         The discretized pattern.
     supports : sequence of Fix, Impose, BaseMotion and the other kinds of `SUPPORTS`
-        Nodes held at rest, moved as prescribed, held by springs or damped, and motions of the base;
-        none by default (free motion is legal in dynamics).
+        Nodes held at rest, moved as prescribed, tied together, held by springs or damped, and
+        motions of the base; none by default (free motion is legal in dynamics).
     loads : sequence of Force, Gravity, Actuate and the other kinds of `LOADS`
         Forces, gravity, pressure, creases that fold by themselves; none by default.
     damping : Rayleigh, ModalDamping, CreaseDamping, or a sequence of them
@@ -59,8 +71,13 @@ class Case(Damped):
         True where a node is held along an axis, by `Fix` or by `Impose`.
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
+    constraints : Constraints
+        What ties displacements together: directions that are held, links, rigid panels.
     free_dofs, supported_dofs : ndarray of int64
-        Numbers 3 * node + axis of the free and of the held ones, increasing.
+        Numbers 3 * node + axis of the free ones, on which all others depend, and of the held ones,
+        increasing.
+    reaction_dofs : ndarray of int64
+        The held ones and those on which supports act along a direction, increasing.
     load_terms : tuple of (ndarray of shape (n, 3), History)
         Forces (N) on all nodes with their history; loads with equal histories are one term.
         Forces on held nodes are kept: the reactions carry them.
@@ -71,8 +88,8 @@ class Case(Damped):
     gravity_terms : tuple of (ndarray of shape (3,), History)
         Accelerations of gravity (m/s2) with their history.
     imposed_terms : tuple of (ndarray of shape (n, 3), History)
-        Displacements (m) at factor 1 of the imposed dofs, zero elsewhere, with their history;
-        equal histories are one term.
+        Displacements (m) at factor 1 of the imposed dofs and of those that constraints tie to
+        them, zero elsewhere, with their history; equal histories are one term.
     base_terms : tuple of (ndarray of shape (n, 3), History)
         The same of the dofs that `Fix` holds along the axis of a `BaseMotion`, from where they
         stand at the start of the motion.
@@ -108,6 +125,8 @@ class Case(Damped):
         object.__setattr__(self, "damping", dampings(self.damping))
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
+        if self.constraints:
+            _ = self.imposed_terms
         for place, load in self._loads():
             load.check(self.structure, self.fixed, place)
             if isinstance(load, Gravity):
@@ -117,7 +136,7 @@ class Case(Damped):
     def _check_selections(self) -> None:
         """Refuse nodes and creases that are not there, all at once."""
         faults = Faults()
-        for place, support in self._supports(Fix, Impose):
+        for place, support in self._supports(Fix, Impose, Link):
             with faults.collected():
                 self._nodes_of(place, support)
         for place, dashpot in self.dashpots:
@@ -207,6 +226,8 @@ class Case(Damped):
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Impose):
+            if support.axis is None:
+                continue
             nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
             for taken, both in ((self._held, "held and imposed"), (mask, "imposed twice")):
                 twice = nodes[taken[nodes, axis]]
@@ -224,7 +245,7 @@ class Case(Damped):
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Fix):
             nodes = self._nodes_of(place, support)
-            for axis in support.axes:
+            for axis in support.axes or "":
                 mask[nodes, AXES.index(axis)] = True
         return mask
 
@@ -232,9 +253,25 @@ class Case(Damped):
         return resolve_nodes(self.structure, support.nodes, f"{place}.nodes")
 
     @cached_property
+    def constraints(self) -> Constraints:
+        """What ties displacements together: directions that are held, links, rigid panels."""
+        equations = equations_of(self.structure, self._supports(Fix, Impose, Link))
+        return Constraints(equations, self.fixed.ravel())
+
+    @property
     def free_dofs(self) -> NDArray[np.int64]:
-        """Numbers 3 * node + axis that are free, increasing."""
-        return np.flatnonzero(~self.fixed.ravel()).astype(np.int64)
+        """Numbers 3 * node + axis that are free, increasing; all others depend on them."""
+        return self.constraints.free
+
+    @property
+    def imposed_slaves(self) -> NDArray[np.int64]:
+        """Numbers of the dofs that `Impose` along a direction moves with others of their nodes."""
+        return self.constraints.slaves_of([place for place, _ in self._supports(Impose)])
+
+    @property
+    def reaction_dofs(self) -> NDArray[np.int64]:
+        """Numbers 3 * node + axis on which supports exert forces, increasing."""
+        return self.constraints.supported
 
     @cached_property
     def supported_dofs(self) -> NDArray[np.int64]:
@@ -249,8 +286,14 @@ class Case(Damped):
     def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
             vector = np.zeros((len(self.structure.nodes), 3))
-            vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
-            yield vector, support.history
+            if support.axis is not None:
+                vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
+            yield self._tied(vector, place, {place: support.value}), support.history
+
+    def _tied(self, shape: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
+        """Displacements (n, 3), m, when supports move as in a shape and by values along theirs."""
+        ties = self.constraints
+        return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
 
     @cached_property
     def base_terms(self) -> Terms:
@@ -261,7 +304,12 @@ class Case(Damped):
         base = self.fixed & ~self.imposed
         for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
-            if not base[:, axis].any():
+            along = {
+                where: support.value * unit_vector(other.direction)[axis]
+                for where, other in self._supports(Fix)
+                if other.direction is not None
+            }
+            if not base[:, axis].any() and not any(along.values()):
                 raise InputError(
                     f"{place}: the base moves along {support.axis}, but no support holds a "
                     f'node along {support.axis}; add one with axes = "{support.axis}", or leave '
@@ -269,7 +317,7 @@ class Case(Damped):
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield vector, support.history
+            yield self._tied(vector, place, along), support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:

@@ -167,7 +167,7 @@ class _Writer:
                 array = np.asarray(value, dtype=np.float64)
                 section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
             else:
-                section[name] = [list(edge) for edge in value] if name == "clamped" else value
+                section[name] = plain(value)
         if structure.kind != BARS_AND_HINGES:
             section["kind"] = structure.kind
         return section

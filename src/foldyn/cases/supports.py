@@ -1,4 +1,4 @@
-"""Supports: nodes held at rest, moved as prescribed or held by springs, and a base that moves."""
+"""Supports: nodes held, moved, tied together or held by springs, a base that moves; all kinds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foldyn.cases.dashpots import AXES, DIRECTIONS, Dashpot
 from foldyn.cases.decode import Part, given_keys
@@ -20,68 +21,98 @@ from foldyn.values import brief, choice, indices, number, number_or_list, show, 
 @brief
 @dataclass(frozen=True)
 class Fix(Part):
-    """Nodes held along some axes.
+    """Nodes held along some axes, or along one direction.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
         Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
     axes : str
-        The axes held: letters of "xyz".
+        The axes held: letters of "xyz"; all three unless a direction is given.
+    direction : sequence of float, shape (3,), or str, optional
+        Instead of axes: the displacement along this vector of any length, or along "x" to "-z", is
+        held; across it the nodes slide, as on rollers on a plane with this normal.
     """
 
     nodes: int | str | Sequence[int]
-    axes: str = "xyz"
+    axes: str | None = None
+    direction: Sequence[float] | str | None = None
 
-    keys = {"nodes": "nodes", "axes": "axes"}
+    keys = {"nodes": "nodes", "axes": "axes", "direction": "direction"}
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        axes = self.axes
-        if not isinstance(axes, str) or not axes or set(axes) - set(AXES):
-            raise InputError(f' = {show(axes)}: must be letters of "xyz", as in "xz"', "axes")
-        if len(set(axes)) < len(axes):
-            raise InputError(f" = {show(axes)}: an axis is listed twice", "axes")
+        if self.direction is None:
+            axes = "xyz" if self.axes is None else self.axes
+            object.__setattr__(self, "axes", check_axes("axes", axes))
+            return
+        if self.axes is not None:
+            raise InputError(
+                f" = {show(self.direction)}: holds one direction, axes hold others; give one of "
+                "the two, and a support for each",
+                "direction",
+            )
+        object.__setattr__(self, "direction", check_direction("direction", self.direction))
+
+    def table(self) -> dict[str, Any]:
+        """See `Part`."""
+        return {key: value for key, value in super().table().items() if value is not None}
 
 
 @brief
 @dataclass(frozen=True)
 class Impose(Part):
-    """Nodes moved along one axis as prescribed, whatever force that takes.
+    """Nodes moved along one axis or direction as prescribed, whatever force that takes.
 
-    The displacement from the rest position is the value times the factor of the history.
+    The displacement from the rest position is the value times the factor of the history. Along a
+    direction it is the component that is prescribed; across it the nodes are free.
 
     Parameters
     ----------
     nodes : int, sequence of int, or str
         Node numbers, or an expression over the pattern's vertices ("xmin", "zmax and y>0").
-    axis : {"x", "y", "z"}
+    axis : {"x", "y", "z"}, optional
         The axis; give one `Impose` for each.
     value : float or sequence of float
         Displacement (m) at factor 1 of all these nodes, or of each of them in the order of
         `nodes`, which then are numbers.
     history : History or callable, optional
         Factor of time; constant by default.
+    direction : sequence of float, shape (3,), or str, optional
+        Instead of the axis: a vector of any length, or "x" to "-z".
     """
 
     nodes: int | str | Sequence[int]
-    axis: str
-    value: float | Sequence[float]
+    axis: str | None = None
+    value: float | Sequence[float] | None = None
     history: History | Callable[[Any], Any] | None = None
+    direction: Sequence[float] | str | None = None
 
-    keys = {"nodes": "nodes", "axis": "axis", "displacement": "value"}
+    keys = {"nodes": "nodes", "axis": "axis", "direction": "direction", "displacement": "value"}
     missing = {
-        "axis": 'give the axis of the displacement, as in axis = "x"',
         "displacement": "give it (m), or write axes instead of axis to hold nodes",
     }
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        object.__setattr__(self, "axis", check_axis("axis", self.axis))
+        if (self.axis is None) == (self.direction is None):
+            raise InputError(
+                ': give the axis of the displacement, as in axis = "x", or its direction, as in '
+                "direction = (1, 0, 1), and only one of the two",
+                "axis",
+            )
+        if self.axis is not None:
+            object.__setattr__(self, "axis", check_axis("axis", self.axis))
+        else:
+            object.__setattr__(self, "direction", check_direction("direction", self.direction))
         object.__setattr__(self, "value", check_per_node("value", self.value, self.nodes))
         object.__setattr__(self, "history", as_history(self.history))
+
+    def table(self) -> dict[str, Any]:
+        """See `Part`."""
+        return {key: value for key, value in super().table().items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -195,10 +226,61 @@ class Spring(Part):
         return written
 
 
-Support = Fix | Impose | BaseMotion | Spring | Dashpot
-SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring, Dashpot)
-OF_SPRINGS = ("stiffness", "between", "direction", "rest_length")
-"""Keys that only springs have."""
+@brief
+@dataclass(frozen=True)
+class Link(Part):
+    """Nodes tied together, exactly: by equal displacements, or to three others.
+
+    Parameters
+    ----------
+    nodes : int, sequence of int, or str
+        Node numbers, or an expression over the pattern's vertices.
+    axes : str, optional
+        All these nodes, at least two, have the same displacement along these axes ("xyz" unless
+        `to` is given). They do not follow each other's rotation about them.
+    to : sequence of int, shape (3,), optional
+        Instead of axes: the nodes ride on these three as points of one plate. They lie in the plane
+        of the three, u = w1 u1 + w2 u2 + w3 u3 with w what weights their places at rest, which is
+        exact for any motion of a plate that stays flat.
+    """
+
+    nodes: int | str | Sequence[int]
+    axes: str | None = None
+    to: Sequence[int] | None = None
+
+    keys = {"nodes": "nodes", "link": "axes", "to": "to"}
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        if self.to is None:
+            axes = "xyz" if self.axes is None else self.axes
+            object.__setattr__(self, "axes", check_axes("axes", axes))
+            if isinstance(self.nodes, tuple) and len(self.nodes) < 2:
+                raise InputError(
+                    f" = {show(self.nodes)}: a link ties at least two nodes; give them all, or the "
+                    "three nodes on which one rides, as in to = (0, 1, 2)",
+                    "nodes",
+                )
+            return
+        if self.axes is not None:
+            raise InputError(
+                f" = {show(self.to)}: nodes that ride on others do so along all axes; leave out "
+                "the axes, or to",
+                "to",
+            )
+        corners = indices("to", self.to, "node", "the three that carry")
+        if len(corners) != 3:
+            raise InputError(f" = {show(self.to)}: must be three nodes", "to")
+        object.__setattr__(self, "to", corners)
+
+    def table(self) -> dict[str, Any]:
+        """See `Part`."""
+        return {key: value for key, value in super().table().items() if value is not None}
+
+
+Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link
+SUPPORTS: tuple[type[Support], ...] = (Fix, Impose, BaseMotion, Spring, Dashpot, Link)
 
 
 def support_from(table: Any, folder: Path | None = None) -> Support:
@@ -206,8 +288,9 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
     given = given_keys(table, SUPPORTS)
     if not given:
         raise InputError(
-            ": give nodes and axes (held), nodes, axis and displacement (moved), base and history "
-            "(a base that moves), or nodes or between with stiffness (springs) or dashpot (damped)"
+            ": give nodes and axes or direction (held), nodes, axis and displacement (moved), base "
+            "and history (a base that moves), nodes and link or to (tied together), or nodes or "
+            "between with stiffness (springs) or dashpot (damped)"
         )
     for own, kind in (("stiffness", Spring), ("dashpot", Dashpot)):
         if own not in given:
@@ -220,7 +303,7 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
                 f".{own}",
             )
         return kind.of(table, folder)
-    if left := [key for key in table if key in ("between", "direction", "rest_length")]:
+    if left := [key for key in table if key in ("between", "rest_length")]:
         raise InputError(
             f": {left[0]} is for springs and dashpots: give stiffness (N/m) or dashpot (N s/m)"
         )
@@ -234,6 +317,17 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
                 ".base",
             )
         return BaseMotion.of(table, folder)
+    if given & {"link", "to"}:
+        own = "link" if "link" in given else "to"
+        strange = [key for key in ("axes", "axis", "direction", "displacement", "history")]
+        strange = [key for key in strange if key in given]
+        if strange:
+            raise InputError(
+                f": ties nodes together; leave out {strange[0]}, and write [[supports]] for what "
+                "holds or moves them",
+                f".{own}",
+            )
+        return Link.of(table, folder)
     moved = [key for key in ("displacement", "history", "axis") if key in given]
     if moved and "axes" in given and "nodes" in given:
         raise InputError(
@@ -241,6 +335,8 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
             'as in axis = "x", with displacement',
             ".axes",
         )
+    if moved and not given & {"axis", "direction"}:
+        raise InputError(': missing; give the axis of the displacement, as in axis = "x"', ".axis")
     return (Impose if moved else Fix).of(table, folder)
 
 
@@ -249,6 +345,30 @@ def check_axis(name: str, axis: Any) -> str:
     if not isinstance(axis, str) or axis not in tuple(AXES):
         raise InputError(f' = {show(axis)}: must be one of "x", "y" and "z"', name)
     return axis
+
+
+def check_axes(name: str, axes: Any) -> str:
+    """Return the letters of some axes, each once."""
+    if not isinstance(axes, str) or not axes or set(axes) - set(AXES):
+        raise InputError(f' = {show(axes)}: must be letters of "xyz", as in "xz"', name)
+    if len(set(axes)) < len(axes):
+        raise InputError(f" = {show(axes)}: an axis is listed twice", name)
+    return axes
+
+
+def check_direction(name: str, direction: Any) -> str | tuple[float, ...]:
+    """Return a direction as it was given: a vector that is not zero, or a name as "-z"."""
+    if isinstance(direction, str):
+        return choice(name, direction, DIRECTIONS)
+    return vector(name, direction, nonzero=True)
+
+
+def unit_vector(direction: Any) -> NDArray[np.float64]:
+    """Unit vector (3,) of a checked direction."""
+    if isinstance(direction, str):
+        axis, sign = signed("direction", direction)
+        return sign * np.eye(3)[axis]
+    return np.array(direction) / np.linalg.norm(direction)
 
 
 def signed(name: str, direction: Any) -> tuple[int, float]:

@@ -166,7 +166,7 @@ def prepare(
         integrator = method_of(method)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
-        check_mass(case.mass, case.fixed)
+        check_mass(case.mass, case.constraints.determined)
     critical = integrator.critical_step(case, u)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
@@ -183,7 +183,7 @@ def prepare(
             "one or leave dt out (force = true integrates all the same)",
             "dt",
         )
-    timing.check_samples(timing.expected_samples(plan), len(u), len(case.supported_dofs))
+    timing.check_samples(timing.expected_samples(plan), len(u), len(case.reaction_dofs))
     if integrator.implicit:
         check_fill(case.structure.fill, case.body.size)
     check_steady(case, plan.start, plan.end)

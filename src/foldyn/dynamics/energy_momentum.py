@@ -33,6 +33,7 @@ from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, carry
+from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
@@ -122,6 +123,9 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
+    if system.ties.slave.size > 0:  # of which the masters may be such nodes
+        follow_masters(system.ties, a1)
+        follow_masters(system.ties, w1)
     if system.varies and t != s.time[0]:
         evaluate(system.waves, t, system.moves or system.turns, s.factor)
         s.time[0] = t

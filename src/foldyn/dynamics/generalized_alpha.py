@@ -42,6 +42,7 @@ from foldyn.dynamics.implicit.scheme import (
 )
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, acceleration, carry
+from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
 
@@ -163,6 +164,9 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
         if mass.diagonal[node] <= 0.0:  # no inertia: velocities would ring for ever
             for i in range(3 * node, 3 * node + 3):
                 a1[i], w1[i] = 0.0, d[i] / h
+    if system.ties.slave.size > 0:  # of which the masters may be such nodes
+        follow_masters(system.ties, a1)
+        follow_masters(system.ties, w1)
     acceleration(model, system, mass, new.q, new.w, t, out, work, s)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]
@@ -200,6 +204,8 @@ def _iterate(
         substitute(band, step)
         for k in range(free.size):
             d[free[k]] -= step[k]
+        if system.ties.slave.size > 0:
+            follow_masters(system.ties, d)
     return NOT_CONVERGED, norm, most
 
 

@@ -1,7 +1,9 @@
 """The mass matrix inside compiled loops: M v and the solution of M a = r on free dofs.
 
 A lumped matrix is a division. A consistent one is factored once per distinct set of supported
-nodes (axes with equal supports share it) and solved by sparse triangular substitution.
+nodes (axes with equal supports share it) and solved by sparse triangular substitution. Where
+constraints tie dofs together, the matrix of the free dofs of all axes, Z' M Z with v = Z v_free, is
+factored and a = Z (Z' M Z)^-1 Z' r, whether M is lumped or not.
 """
 
 from __future__ import annotations
@@ -14,22 +16,24 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.superlu import factorize
+from foldyn.dynamics.ties import Ties, follow_masters, hand_over, reduced
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar, summing
+from foldyn.jit.intrinsics import flat
 
 
 class Inertia(NamedTuple):
     """Mass matrix (nodal, CSR), its inverse where diagonal, its factors where not."""
 
-    lumped: bool
-    diagonal: NDArray  # (n,)
+    lumped: bool  # and without constraints
+    diagonal: NDArray  # (n,) with constraints the least that the free dofs of a node feel
     inverse: NDArray  # (n, 3) 1/m on free dofs, 0 on fixed ones; empty if not lumped
     indptr: NDArray
     indices: NDArray
     data: NDArray
     factor_of_axis: NDArray  # (3,) which factor serves each axis
     start: NDArray  # (factors + 1,) first row of each factor in the arrays below
-    nodes: NDArray  # free nodes of each factor
+    nodes: NDArray  # free nodes of each factor; with constraints free dofs
     row_order: NDArray
     column_order: NDArray
     lower_ptr: NDArray  # strictly lower part of L, by columns
@@ -39,6 +43,7 @@ class Inertia(NamedTuple):
     upper_row: NDArray
     upper: NDArray
     pivot: NDArray  # 1 / diagonal of U
+    ties: Ties
 
 
 def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
@@ -57,19 +62,26 @@ def is_lumped(mass: sparse.csr_array) -> bool:
     return sparse.csr_array(mass - sparse.diags_array(mass.diagonal())).count_nonzero() == 0
 
 
-def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
+def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
     """Prepare the nodal mass matrix (n, n) for the supports `fixed` (n, 3)."""
     mass = sparse.csr_array(mass)
     mass.sort_indices()
     diagonal = mass.diagonal()
-    lumped = is_lumped(mass)
-    if lumped:
+    lumped = is_lumped(mass) and not len(ties.slave)
+    if len(ties.slave):
+        inverse, factor_of_axis = np.zeros((0, 3)), np.zeros(3, np.int64)
+        tied = reduced(sparse.kron(mass, sparse.eye_array(3), format="csr"), ties)
+        diagonal = _least(tied.diagonal(), ties, diagonal)
+        massless = sparse.diags_array((tied.diagonal() <= 0.0).astype(float))
+        factors = [_factor(sparse.csr_array(tied + massless), ties.free)]
+    elif lumped:
         inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])
         factor_of_axis, factors = np.zeros(3, np.int64), []
     else:
         inverse = np.zeros((0, 3))
         distinct, factor_of_axis = np.unique(fixed, axis=1, return_inverse=True)
-        factors = [_factor(mass, np.flatnonzero(~held)) for held in distinct.T]
+        free = [np.flatnonzero(~held) for held in distinct.T]
+        factors = [_factor(mass[nodes][:, nodes], nodes) for nodes in free]
     return Inertia(
         lumped,
         diagonal,
@@ -79,15 +91,23 @@ def inertia(mass: sparse.csr_array, fixed: NDArray) -> Inertia:
         mass.data.astype(float),
         factor_of_axis.ravel(),
         *_join(factors),
+        ties=ties,
     )
 
 
+def _least(diagonal: NDArray, ties: Ties, own: NDArray) -> NDArray:
+    """Least mass (n,) that the free dofs of each node feel; its own where a node has none."""
+    least = np.full(len(own), np.inf)
+    np.minimum.at(least, ties.free // 3, diagonal)
+    return np.where(np.isfinite(least), least, own)
+
+
 def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:
-    """Free nodes, orders, L and U without their diagonals, and pivots of the free part."""
+    """Free nodes, orders, L and U without their diagonals, and pivots of their mass matrix."""
     if not len(nodes):
         empty = sparse.csc_array((0, 0))
         return nodes, nodes, nodes, empty, empty, np.zeros(0)
-    lu = factorize(sparse.csc_array(mass[nodes][:, nodes]))
+    lu = factorize(sparse.csc_array(mass))
     lower = sparse.csc_array(sparse.tril(sparse.csc_array(lu.L), -1))
     upper = sparse.csc_array(lu.U)
     above = sparse.csc_array(sparse.triu(upper, 1))
@@ -131,8 +151,11 @@ def times_mass(m, v, out):
 def substitute(m, r, a, scratch):
     """Solve M a = r with the factors of a consistent matrix; a is zero on fixed dofs.
 
-    scratch holds n numbers.
+    scratch holds n numbers, 3 n where there are constraints.
     """
+    if m.ties.slave.size > 0:
+        _substitute_tied(m, flat(r), flat(a), scratch)
+        return
     a[:] = 0.0
     for c in range(3):
         k = m.factor_of_axis[c]
@@ -152,6 +175,30 @@ def substitute(m, r, a, scratch):
                 scratch[m.upper_row[p]] -= m.upper[p] * value
         for i in range(count):
             a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]
+
+
+@kernel
+def _substitute_tied(m, r, a, scratch):
+    """The same with constraints; r, a (3n,)."""
+    for i in range(a.size):
+        a[i] = r[i]
+    hand_over(m.ties, a)
+    count = m.nodes.size
+    for i in range(count):
+        scratch[m.row_order[i]] = a[m.nodes[i]]
+    for j in range(count):
+        value = scratch[j]
+        for p in range(m.lower_ptr[j], m.lower_ptr[j + 1]):
+            scratch[m.lower_row[p]] -= m.lower[p] * value
+    for j in range(count - 1, -1, -1):
+        value = scratch[j] * m.pivot[j]
+        scratch[j] = value
+        for p in range(m.upper_ptr[j], m.upper_ptr[j + 1]):
+            scratch[m.upper_row[p]] -= m.upper[p] * value
+    a[:] = 0.0
+    for i in range(count):
+        a[m.nodes[i]] = scratch[m.column_order[i]]
+    follow_masters(m.ties, a)
 
 
 @summing

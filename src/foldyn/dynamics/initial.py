@@ -11,6 +11,8 @@ from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case, State
+from foldyn.cases.constraints import AGREES
+from foldyn.cases.ties import check_tied
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
@@ -23,7 +25,6 @@ from foldyn.results.contents import check_variable
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
 ZERO = 1e-10  # of the largest stiffness: eigenvalues of less are none
-AGREES = 1e-9  # of the longest bar: how near a node must stand to where it is imposed
 
 
 def initial_state(result: Any, at: int = -1) -> State:
@@ -76,7 +77,26 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
     if (pair[1][held] != 0.0).any():
         node = int(np.argwhere((pair[1] != 0.0) & held)[0][0])
         raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
+    check_tied(case, pair[0], "initial")
+    _check_tied_velocity(case, pair[1])
     return pair[0], pair[1]
+
+
+def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
+    """Refuse velocities (n, 3), m/s, that constraints do not allow."""
+    ties = case.constraints
+    if not ties:
+        return
+    speed = np.abs(ties.values(velocity))
+    for vector, _ in (*case.imposed_terms, *case.base_terms):  # these move
+        speed[np.abs(ties.values(vector)) > AGREES * np.abs(vector).max()] = 0.0
+    if speed.max() > AGREES * np.abs(velocity).max():
+        worst = int(speed.argmax())
+        raise InputError(
+            f": velocity of node {ties.equations[worst].dofs[0] // 3} does not satisfy "
+            f"{ties.owners[worst]}; nodes that are tied together move together",
+            "initial",
+        )
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
@@ -97,7 +117,8 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
         return
     free = np.asarray(case.free_dofs)
     body = case.body
-    matrix = sparse.csc_array(body.tangent(body.dofs(u))[free][:, free])
+    whole = case.constraints.matrix(body.tangent(body.dofs(u)))
+    matrix = sparse.csc_array(whole[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
     try:
         factors = SuperLU(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
@@ -123,8 +144,12 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: StepPlan, packed: Packed) ->
     if callbacks.error is not None:
         raise callbacks.error
     carried, imposed = by.outward(s.displacement), case.imposed
-    q, w = u - carried, v - by.outward(follow(mass, by.inward(np.where(case.fixed, v, 0.0))))
+    prescribed = np.where(case.fixed, v, 0.0)
+    if ties := case.constraints:
+        prescribed = ties.moved(prescribed, ties.values(v), "initial")
+    q, w = u - carried, v - by.outward(follow(mass, by.inward(prescribed)))
     apart = np.where(imposed, np.abs(q), 0.0)
+    apart.ravel()[case.imposed_slaves] = np.abs(ties.coordinates(q.ravel()))[case.imposed_slaves]
     if apart.max() > AGREES * case.structure.bar_length.max():
         node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
         raise InputError(

@@ -43,7 +43,7 @@ def choose(
     implicit = "energy_momentum" if conserved else "generalized_alpha"
     if massless := case.structure.massless:
         return "generalized_alpha", f"implicit: {massless} have no mass"
-    if (case.mass.diagonal() <= 0.0)[~case.fixed.all(axis=1)].any():
+    if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
         return implicit, "implicit: nodes without mass have no acceleration"
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
@@ -106,9 +106,10 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
     stiffness = case.body.tangent(u, 1.0)
-    force = _applied(case, u) - stiffness @ _imposed(case)
-    k = stiffness[free][:, free]
-    m = sparse.kron(case.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    ties = case.constraints
+    force = ties.force(_applied(case, u) - stiffness @ _imposed(case))
+    k = ties.matrix(stiffness)[free][:, free]
+    m = ties.matrix(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))[free][:, free]
     spin, deforming, moving = _split(structure.nodes + u, v)
     pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
     softest = (2.0 * math.pi / duration) ** 2
@@ -186,7 +187,8 @@ def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
         load = following_force(part, u.ravel(), np.ones((1, 1))).reshape(u.shape)
         force = force + history(start) * load
         size = max(size, float(np.abs(load).max()))
-    return float(np.abs(force[~case.fixed]).max(initial=0.0)) > AT_REST * size
+    free = case.constraints.force(force.ravel())[case.free_dofs]
+    return float(np.abs(free).max(initial=0.0)) > AT_REST * size
 
 
 def _split(x: NDArray, v: NDArray) -> tuple[float, NDArray, NDArray]:

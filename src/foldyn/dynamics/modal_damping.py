@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse import linalg
 
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.cases import Case, ModalDamping
@@ -32,19 +33,31 @@ SOFT = 0.01  # of k: slope below which a superlinear hinge stands at its rest an
 MOST_MODES = 2000  # free dofs of which all modes may be damped
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one,
 SLOW = 1e-6  # where its eigenvalue is less than that of the largest one found
+STILL = 1e-9  # of a hinge's gradient: what constraints leave of that of one that cannot turn
 BEYOND = 6  # modes that are sought beyond those asked for: the rigid ones
 
 
-def soft_slopes(body: Body, q: NDArray) -> tuple[sparse.csr_array | None, int]:
+def soft_slopes(case: Case, body: Body, q: NDArray) -> tuple[sparse.csr_array | None, int]:
     """What to add to the tangent (m, m) so that hinges at rest have no slope, and how many do so.
 
-    Superlinear ones, whose slope at their rest angle is the root of rounding errors.
+    Superlinear ones, whose slope at their rest angle is the root of rounding errors. Hinges that
+    constraints keep from turning are left alone.
     """
     hinges = body.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
-    at_rest = (slope < SOFT) & (hinges.stiffness > 0.0)
+    at_rest = (slope < SOFT) & (hinges.stiffness > 0.0) & _turns(case, hinges.gradient)
     change = np.where(at_rest, -slope, 0.0)
     return (body.soft_tangent(q, change) if change.any() else None), int(at_rest.sum())
+
+
+def _turns(case: Case, gradient: sparse.csr_array) -> NDArray[np.bool_]:
+    """Whether constraints let each hinge (h,) turn, by the gradients (h, m) of their angles."""
+    ties = case.constraints
+    if not ties:
+        return np.ones(gradient.shape[0], bool)
+    basis = ties.extended(gradient.shape[1])[:, ties.free]
+    left, whole = (linalg.norm(each, axis=1) for each in (gradient @ basis, gradient))
+    return left > STILL * whole
 
 
 class ModalRows(NamedTuple):
@@ -80,7 +93,7 @@ def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
     state = start if damping.state == "start" else None
     state = np.zeros_like(case.structure.nodes) if state is None else state
     q = body.dofs(state)
-    change, soft = soft_slopes(body, q)
+    change, soft = soft_slopes(case, body, q)
     stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
     return rows_of(damping, case, stiffness, state)._replace(soft=soft)
 
@@ -89,17 +102,19 @@ def rows_of(
     damping: ModalDamping, case: Case, stiffness: sparse.csr_array, state: NDArray
 ) -> ModalRows:
     """Modal damping for a stiffness (m, m) at a displacement (n, 3)."""
-    free = np.concatenate([case.free_dofs, case.body.hidden])
+    ties, free = case.constraints, np.concatenate([case.free_dofs, case.body.hidden])
     mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
     mass.resize(stiffness.shape)
+    mass, stiffness = ties.matrix(mass), ties.matrix(stiffness)
     block = sparse.csc_array(mass[free][:, free])
     pencil = Pencil(sparse.csc_array(stiffness[free][:, free]), block)
     spectrum = _swinging(pencil, damping, case, state, free)
     values, shapes = spectrum.values, spectrum.shapes
     rows = np.zeros((len(values), stiffness.shape[0]))
     rows[:, free] = (block @ shapes).T
-    held = case.supported_dofs
+    held = np.flatnonzero(ties.determined)
     rows[:, held] = (stiffness[held][:, free] @ shapes).T / values[:, None]
+    rows = ties.rows_on_dofs(rows)
     rates = 2.0 * np.broadcast_to(damping.ratios, len(values)) * np.sqrt(values)
     return ModalRows(rows * np.sqrt(rates)[:, None], float(rates.max(initial=0.0)), 0)
 
@@ -141,7 +156,7 @@ def _rigid(
     pencil: Pencil, spectrum: Spectrum, case: Case, state: NDArray, free: NDArray
 ) -> NDArray:
     """Which modes (k,) are rigid motions that next to nothing resists."""
-    motions = free_rigid_motions(case.structure.nodes + state, case.fixed.ravel())
+    motions = free_rigid_motions(case.structure.nodes + state, case.constraints)
     space = np.zeros((pencil.size, motions.shape[1]))
     nodal = free < len(motions)
     space[nodal] = motions[free[nodal]]

@@ -90,7 +90,7 @@ class Motion:
         structure = self.case.structure
         self._course = begin(self.case, *self._state, self.plan, self._packed)
         self._out = samples(
-            count, len(structure.nodes), len(self.case.supported_dofs),
+            count, len(structure.nodes), len(self.case.reaction_dofs),
             len(audited(self.case.energy_groups)),
         )  # fmt: skip
 

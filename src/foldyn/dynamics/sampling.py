@@ -45,7 +45,7 @@ class Sampler:
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
         structure = case.structure
         taken = {*TAKEN, *case.energy_groups}
-        sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.supported_dofs)}
+        sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
         for name, what in given.items():
             if not isinstance(name, str) or not name.isidentifier() or name in taken:

@@ -97,10 +97,11 @@ def _state(case: Case, u: ArrayLike | None) -> NDArray:
 def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
     """Largest eigenvalue of a matrix (m, m) over the mass, on the free dofs."""
     free = np.asarray(case.free_dofs)
-    k = sparse.csr_array(matrix[free][:, free])
+    k = sparse.csr_array(case.constraints.matrix(matrix)[free][:, free])
     if not k.count_nonzero():
         return 0.0
-    m = sparse.kron(case.mass, sparse.eye_array(3), format="csr")[free][:, free]
+    whole = sparse.kron(case.mass, sparse.eye_array(3), format="csr")
+    m = case.constraints.matrix(whole)[free][:, free]
     try:
         return _largest_eigenvalue(k, m)
     except (RuntimeError, np.linalg.LinAlgError, SingularTangentError) as error:

@@ -37,6 +37,7 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
+from foldyn.dynamics.ties import Ties, add_reactions, ties_of
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
@@ -63,7 +64,7 @@ class System(NamedTuple):
     rows: int  # of arrays: n, and those of the dofs beside displacements
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
-    supported: NDArray  # (s,) dofs 3 place + axis, in the order of the case's
+    supported: NDArray  # (s,) held dofs 3 place + axis, in the order of the case's
     damping: Damping
     waves: Waveforms
     loads: Entries  # N
@@ -71,6 +72,7 @@ class System(NamedTuple):
     moved_mass: NDArray  # (h, h) S_k M S_l, kg m2
     actuators: Actuators
     following: Following
+    ties: Ties
 
 
 class Scratch(NamedTuple):
@@ -81,7 +83,7 @@ class Scratch(NamedTuple):
 
     force: NDArray  # (n, 3) F_int + beta K0 v - p
     product: NDArray  # (n, 3) the mass matrix times a vector
-    line: NDArray  # (n,)
+    line: NDArray  # (n,), or (3 n,) with constraints
     energy: NDArray  # (groups,) strain energies, J
     time: NDArray  # (1,) when the histories were evaluated last, s
     factor: NDArray  # (h, 3) factors of the histories and their two derivatives
@@ -121,7 +123,8 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
     """
     body, by = renumbered(case.body)
     nodal = by.matrix(case.mass)
-    mass = inertia(nodal, by.held(case.fixed))
+    ties = ties_of(case.constraints, by)
+    mass = inertia(nodal, by.held(case.fixed), ties)
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
     for _, history in (*forces, *supports, *case.base_terms, *case.rest_terms):
@@ -153,6 +156,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         moved_mass=_moved_mass(nodal, moves, histories),
         actuators=turned,
         following=following,
+        ties=ties,
     )
     return Packed(body, system, mass, callbacks, by)
 
@@ -175,12 +179,15 @@ def _ordered(entries: Entries) -> Entries:
 
 
 def follow(mass: Inertia, shape: NDArray) -> NDArray:
-    """Motion (n, 3) of all nodes with supports that move by `shape`: S of the module's text."""
+    """Motion (n, 3) of all nodes with supports that move by `shape`: S of the module's text.
+
+    shape : (n, 3), with what constraints tie to the supports.
+    """
     if mass.lumped:
         return shape
     product, out = np.empty_like(shape), np.empty_like(shape)
     times_mass(mass, shape, product)
-    substitute(mass, product, out, np.zeros(len(shape)))
+    substitute(mass, product, out, np.zeros(shape.size))
     return shape - out
 
 
@@ -197,7 +204,8 @@ def scratch(system: System) -> Scratch:
     """Memory for one thread that has all nodes."""
     nodes, histories = system.rows, len(system.waves.code)
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
-    line, energy, factor = np.zeros(nodes), np.zeros(system.energies), np.zeros((histories, 3))
+    line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
+    energy, factor = np.zeros(system.energies), np.zeros((histories, 3))
     never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
     stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
     pushed = np.zeros((nodes if system.follows else 0, 3))
@@ -323,13 +331,22 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
             velocity[system.order[i], c] = s.velocity[i, c]
     product, force = flat(s.product), flat(s.force)
     times_mass(mass, s.moving, s.product)
-    for k in range(system.supported.size):
-        reaction[k] = product[system.supported[k]] + force[system.supported[k]]
+    tied = system.ties.slave.size > 0
+    if tied:
+        reaction[:] = 0.0
+        add_reactions(system.ties.reactions, product, 1.0, reaction)
+        add_reactions(system.ties.reactions, force, 1.0, reaction)
+    else:
+        for k in range(system.supported.size):
+            reaction[k] = product[system.supported[k]] + force[system.supported[k]]
     groups = s.energy.size
     energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
-    for k in range(system.supported.size):
-        reaction[k] += drag(system.damping, product[system.supported[k]])
+    if tied:
+        add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
+    else:
+        for k in range(system.supported.size):
+            reaction[k] += drag(system.damping, product[system.supported[k]])
     energies_of(model, s.displacement, work, s.energy)
     for k in range(groups):
         energy[k] = s.energy[k]

@@ -155,13 +155,15 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     if part.value == 0.0:
         raise InputError("drive[0].value = 0: the base must move")
     column = AXES.index(part.axis)
-    if case.imposed[:, column].any():
+    if any(vectors[:, column].any() for vectors, _ in case.imposed_terms) or (
+        case.imposed[:, column].any()
+    ):
         raise InputError(
             f"drive[0]: an Impose holds nodes along {part.axis}, which would not follow the base; "
             "use Fix instead of Impose there and start from a state that has been brought there"
         )
     held = case.fixed[:, column]
-    if not held.any():
+    if not (case.reaction_dofs % 3 == column).any():
         raise InputError(
             f"drive[0]: the base moves along {part.axis}, but no support holds a node along "
             f'{part.axis}; add one with axes = "{part.axis}", or drive by forces'
@@ -185,38 +187,29 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     which does not move with it, hold back.
     """
     if drive.axis is None:
-        return [Term(_on_free(system, drive.vector / drive.value), lambda omega: 1.0)]
+        return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
     load = np.zeros_like(drive.vector)
     load[:, axis] = system.case.nodal_mass
-    terms = [Term(_on_free(system, load), lambda omega: omega**2 - 1j * omega * damping.alpha)]
+    inertia = system.projected(load.ravel())
+    terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
     held, springs = np.zeros_like(load), system.case.springs
     if springs is not None:
         stands = springs.ends[:, 1] < 0
         pull = springs.stiffness[stands] * springs.direction[stands, axis]
         np.add.at(held, springs.ends[stands, 0], pull[:, None] * springs.direction[stands])
     if held.any():
-        terms.append(Term(_on_free(system, held), lambda omega: -1.0 - 1j * omega * damping.beta))
+        shape = system.projected(held.ravel())
+        terms.append(Term(shape, lambda omega: -1.0 - 1j * omega * damping.beta))
     dragged = system.drag[:, axis]
     if dragged.any():
         terms.append(Term(dragged, lambda omega: -1j * omega))
     return terms
 
 
-def _on_free(system: Linearized, vectors: NDArray) -> NDArray[np.float64]:
-    """Vectors (n, 3) on the free dofs (nf,)."""
-    shape = np.zeros(len(system.free))
-    nodal = system.free < vectors.size
-    shape[nodal] = vectors.ravel()[system.free[nodal]]
-    return shape
-
-
 def absolute(system: Linearized, drive: Drive, relative: NDArray) -> NDArray[np.complex128]:
     """Response (m, n, 3) to the drive from that of the free dofs (m, nf), relative to the base."""
-    response = np.zeros((len(relative), drive.vector.size), np.complex128)
-    nodal = system.free < drive.vector.size
-    response[:, system.free[nodal]] = relative[:, nodal]
-    response = response.reshape(-1, *drive.vector.shape)
+    response = system.expanded(relative.T).T.reshape(-1, *drive.vector.shape).copy()
     if drive.axis is not None:
         response[:, :, AXES.index(drive.axis)] += 1.0
     return response

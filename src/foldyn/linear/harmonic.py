@@ -134,7 +134,10 @@ class _Hinges:
     def __init__(self, system: Linearized) -> None:
         body = system.case.body
         hinges = body.soft_hinges(body.dofs(system.displacement))
-        self.gradient = sparse.csr_array(hinges.gradient[:, system.free])
+        gradient = hinges.gradient
+        if ties := system.case.constraints:
+            gradient = gradient @ ties.extended(gradient.shape[1])
+        self.gradient = sparse.csr_array(gradient[:, system.free])
         self.offset, self.stiffness = hinges.offset, hinges.stiffness
         self.reference = equivalent_slope(self.offset, np.radians(REFERENCE))
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse import linalg
 from scipy.special import gamma, hyp2f1
 
 from foldyn.algebra.solvers import check_fill
@@ -58,7 +59,8 @@ class Linearized:
         The state, m.
     free : (nf,)
         Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
-        that a shell has beside the displacements of its nodes.
+        that a shell has beside the displacements of its nodes. Where constraints tie others to
+        them, `expanded` gives the motion of all.
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and damping but for that of modes (N s/m):
         alpha M + beta K0, dashpots and creases in the state. The tangent has the symmetric part of
@@ -92,6 +94,21 @@ class Linearized:
     secant: float | None
     residual: float = 0.0
     unbalanced: float = 0.0
+
+    def expanded(self, motions: NDArray) -> NDArray:
+        """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
+        size = self.displacement.size
+        on_nodes = self.free < size
+        full = np.zeros((size, motions.shape[1]), motions.dtype)
+        full[self.free[on_nodes]] = motions[on_nodes]
+        return self.case.constraints.displacement(full)
+
+    def projected(self, force: NDArray) -> NDArray:
+        """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
+        on_nodes = self.free < force.size
+        out = np.zeros(len(self.free))
+        out[on_nodes] = self.case.constraints.force(force)[self.free[on_nodes]]
+        return out
 
 
 def linearize(
@@ -133,13 +150,13 @@ def linearize(
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
-    check_mass(case.mass, case.fixed)
+    check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
     body = point.body
     free = np.concatenate([case.free_dofs, body.hidden])
     exact = body.tangent(point.dofs)
-    change, soft = _slope_change(body, point.dofs, amplitude)
+    change, soft = _slope_change(case, body, point.dofs, amplitude)
     if soft:
         warnings.warn(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
@@ -158,7 +175,7 @@ def linearize(
         massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
         mass = sparse.block_diag([mass, massless], format="csr")
     mass = sparse.csr_array(mass)
-    more = dampers(case).matrix(point.dofs)
+    ties, more = case.constraints, dampers(case).matrix(point.dofs)
     damping = case.rayleigh.matrix(mass, _reference(case, exact))
     whole = np.zeros((body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
@@ -167,11 +184,11 @@ def linearize(
         case=case,
         displacement=point.displacement,
         free=free,
-        stiffness=_block(stiffness, free),
-        mass=_block(mass, free),
-        damping=_block(damping + more if more.nnz else damping, free),
-        modal=modal[:, free],
-        drag=(more @ whole)[free],
+        stiffness=_block(ties.matrix(stiffness), free),
+        mass=_block(ties.matrix(mass), free),
+        damping=_block(ties.matrix(damping + more if more.nnz else damping), free),
+        modal=ties.force(modal.T)[free].T,
+        drag=ties.force(more @ whole)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
@@ -193,11 +210,14 @@ def _symmetric(loads: sparse.csr_array, free: NDArray) -> sparse.csr_array:
 
 
 def _slope_change(
-    body: Body, q: NDArray, amplitude: float | None
+    case: Case, body: Body, q: NDArray, amplitude: float | None
 ) -> tuple[sparse.csr_array | None, int]:
-    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft."""
+    """What to add to the tangent (m, m) for other slopes, and how many hinges are soft.
+
+    Hinges that constraints keep from turning are left alone.
+    """
     if amplitude is None:
-        return soft_slopes(body, q)
+        return soft_slopes(case, body, q)
     hinges = body.soft_hinges(q)
     slope = Superlinear().slope(hinges.offset, np.zeros(len(hinges.offset)))
     change = equivalent_slope(hinges.offset, amplitude) - slope

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import eigh
 
 from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
+from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.errors import FoldynWarning
 from foldyn.linear.linearized import Linearized, linearize
@@ -137,9 +139,7 @@ def _variables(
         ratio = np.where(omega > 0.0, modal / (2.0 * omega), np.nan)
     share = rigid_share(linear, space, shapes)
     factors = shapes.T @ (linear.mass @ along)
-    full = np.zeros((len(values), linear.displacement.size))
-    on_nodes = linear.free < full.shape[1]
-    full[:, linear.free[on_nodes]] = shapes[on_nodes].T
+    full = linear.expanded(shapes).T
     return {
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
@@ -154,9 +154,21 @@ def _variables(
 
 
 def _unit_translations(linear: Linearized) -> NDArray:
-    """Unit translations (nf, 3) of the free dofs along x, y, z."""
+    """Unit translations (nf, 3) of the free dofs along x, y, z.
+
+    Where constraints allow none, the motions that are nearest to them, weighted by mass.
+    """
     on_nodes = linear.free < linear.displacement.size
-    return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)
+    if not linear.case.constraints:
+        return (on_nodes[:, None] & (linear.free[:, None] % 3 == np.arange(3))).astype(float)
+    moves = ~linear.case.fixed.ravel()
+    unit = moves[:, None] & (np.arange(len(moves))[:, None] % 3 == np.arange(3))
+    weighted = sparse.kron(linear.case.mass, sparse.eye_array(3), format="csr") @ unit.astype(float)
+    pushed = np.stack([linear.projected(each) for each in weighted.T], axis=1)
+    out = np.zeros(pushed.shape)
+    mass = sparse.csc_array(linear.mass[on_nodes][:, on_nodes])
+    out[on_nodes] = factorize(mass).solve(pushed[on_nodes])
+    return out
 
 
 def _rounding(pencil: Pencil, spectrum: Spectrum) -> float:
@@ -190,7 +202,7 @@ def rigid_space(linear: Linearized) -> NDArray:
     Translations along x, y, z come first as far as they are among them, then rotations.
     """
     x = linear.case.structure.nodes + linear.displacement
-    allowed = free_rigid_motions(x, linear.case.fixed.ravel())
+    allowed = free_rigid_motions(x, linear.case.constraints)
     plain = rigid_motions(x)
     chosen = np.linalg.lstsq(plain, allowed, rcond=None)[0]
     basis, _ = np.linalg.qr(chosen)

@@ -82,7 +82,7 @@ def _equilibrium(case: Case) -> NDArray:
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
     holds = body.holds(np.zeros(body.size))
-    free = free_rigid_motions(nodes, case.fixed.ravel(), holds).shape[1] > 0
+    free = free_rigid_motions(nodes, case.constraints, holds).shape[1] > 0
     with warnings.catch_warnings():  # the linearization itself warns of these
         for told in ("the path loses stability", NO_POTENTIAL[:20]):
             warnings.filterwarnings("ignore", told, FoldynWarning)
@@ -99,15 +99,15 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     """
     problem = OrigamiProblem(case, (), displacement)
     body = problem.actuation.body(factor)
-    u, free = problem.dofs(displacement, factor), problem.free
-    residual = body.internal(u) - problem.following_force(u, factor)
-    loads = _load_vectors(case, body)
+    u, free = problem.dofs(problem.state(displacement, factor)), problem.free
+    residual = problem.projected(body.internal(u) - problem.following_force(u, factor))
+    loads = problem.projected(_load_vectors(case, body))
     if kind == "equilibrium":
         residual = residual - loads.sum(axis=1)
     elif kind == "state" and loads.size:
         factors = np.linalg.lstsq(loads[free], residual[free], rcond=None)[0]
         residual = residual - loads @ factors
-    reached = balance(problem, u, factor, residual)
+    reached = balance(problem, problem.state(displacement, factor), factor, residual)
     return OperatingPoint(displacement, problem, factor, body, u, reached, kind)
 
 

@@ -22,7 +22,7 @@ from foldyn.cases import (
     Table,
     resolve_nodes,
 )
-from foldyn.cases.supports import AXES, Support
+from foldyn.cases.supports import Support, unit_vector
 from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Drive
@@ -100,8 +100,9 @@ class Rig:
         for support in self.case.supports:
             if isinstance(support, Impose):
                 nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")
-                where = self.state[nodes, AXES.index(support.axis)]
-                held.append(Impose(nodes.tolist(), support.axis, where.tolist()))
+                where = self.state[nodes] @ unit_vector(support.axis or support.direction)
+                still = replace(support, nodes=nodes.tolist(), value=where.tolist(), history=None)
+                held.append(still)
         return held
 
     def driven(self, history: History) -> Case:

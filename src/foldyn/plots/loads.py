@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.selection import resolve_creases
+from foldyn.cases.supports import unit_vector
 from foldyn.plots import style
-from foldyn.values import number
+from foldyn.values import number, show
 
 _SAMPLES = 2001
 _LISTED = 3
@@ -105,20 +106,21 @@ def _imposed_curves(case: Case) -> list[_Curve]:
     """Curves of imposed displacements, one for each history, value and axis."""
     curves = []
     for vectors, history in case.imposed_terms:
-        groups: dict[tuple[int, float], list[int]] = {}
+        groups: dict[tuple[str, float], list[int]] = {}
         for support in case.supports:
             if isinstance(support, Impose) and support.history == history:
-                axis = "xyz".index(support.axis)
+                unit = unit_vector(support.axis or support.direction)
+                along = support.axis or show(support.direction)
                 for node in resolve_nodes(case.structure, support.nodes).tolist():
-                    groups.setdefault((axis, float(vectors[node, axis])), []).append(node)
+                    groups.setdefault((along, float(vectors[node] @ unit)), []).append(node)
         curves += _some(
             [
                 _Curve(
                     value,
-                    f"moved {value:.4g} m along {'xyz'[axis]} on {_listed('node', nodes)}",
+                    f"moved {value:.4g} m along {along} on {_listed('node', nodes)}",
                     history,
                 )
-                for (axis, value), nodes in groups.items()
+                for (along, value), nodes in groups.items()
             ]
         )
     return curves

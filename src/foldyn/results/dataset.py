@@ -62,7 +62,7 @@ def trajectory_dataset(
     displacement, velocity : array_like, shape (nt, n, 3)
         Displacement (m) and velocity (m/s) of every node.
     reaction : array_like, shape (nt, ns)
-        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (nt,)
         kinetic, dissipated, work and the strain energies of the structure's `energy_groups` (J).
     statistics : mapping
@@ -115,7 +115,7 @@ def path_dataset(
     displacement : array_like, shape (ns, n, 3)
         Displacement (m) of every node.
     reaction : array_like, shape (ns, nd)
-        Forces of the supports (N) on the dofs `case.supported_dofs`, in that order.
+        Forces of the supports (N) on the dofs `case.reaction_dofs`, in that order.
     energies : mapping of str to array_like, shape (ns,)
         work and the strain energies of the structure's `energy_groups` (J).
     solution : mapping of str to array_like, shape (ns,)
@@ -238,7 +238,7 @@ def result_dataset(
     obstacles : tuple of str
         Why the result cannot be run again from itself, beside what the case says.
     """
-    support = case.supported_dofs
+    support = case.reaction_dofs
     document = to_document(case, times)
     obstacles = (*document.obstacles, *obstacles)
     attributes: dict[str, Any] = {

@@ -101,7 +101,8 @@ def fold(model, u, x, work):
             work.gradient[e, c] = found[1 + c]
     for k in range(model.piece_hinge.size):
         e = model.piece_hinge[k]
-        both = x[model.piece_rotations[k, 0]] + x[model.piece_rotations[k, 1]]
+        one, other = model.piece_rotations[k]
+        both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
         work.fold_angle[k] = model.hinge_rest[e] + work.turn[e] - model.per_reach * both
 
 
@@ -184,8 +185,9 @@ def shell_force(model, u, x, force, couple, work):
             p[k, 0], p[k, 1], p[k, 2], p[k, 3], model.addresses[1],
         )  # fmt: skip
         work.moment[model.piece_hinge[k]] += moment
-        couple[model.piece_rotations[k, 0]] -= model.per_reach * moment
-        couple[model.piece_rotations[k, 1]] -= model.per_reach * moment
+        for rotation in model.piece_rotations[k]:
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * moment
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]

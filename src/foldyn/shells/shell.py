@@ -30,6 +30,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, FoldPieces, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
+from foldyn.structures.plate import Plate, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
 
@@ -50,6 +51,7 @@ class ShellOptions:
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
+    rigid: str | tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -103,8 +105,19 @@ class Shell(Discretized):
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
-    massless: ClassVar[str] = "the rotations of a shell"
     bar_law: ClassVar[None] = None
+
+    @property
+    def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Its dofs without mass, in words; none where all panels are rigid."""
+        return "the rotations of a shell" if self.rotations else ""
+
+    @cached_property
+    def plates(self) -> tuple[Plate, ...]:
+        """Its rigid panels."""
+        return rigid_plates(
+            self.options.rigid, self.pattern.faces, self.nodes, self.triangles, self.triangle_panel
+        )
 
     @property
     def fill(self) -> Fill:
@@ -313,6 +326,7 @@ def shell(
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
     clamped: Sequence[Sequence[int]] = (),
+    rigid: str | Sequence[int] | None = None,
 ) -> Shell:
     """Discretize a pattern as a thin shell of triangles with exact creases.
 
@@ -334,6 +348,8 @@ def shell(
     clamped : sequence of (vertex, vertex)
         Boundary edges along which the sheet keeps its rest tangent in space, wherever they are
         moved; their nodes need a support of their own.
+    rigid : "all" or sequence of int, optional
+        As in `discretize`: panels that cannot bend, exactly. Their mesh has no rotations.
 
     Returns
     -------
@@ -357,7 +373,8 @@ def shell(
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
     edges = clamped_edges(clamped, pattern)
-    options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges)
+    plates = checked_panels(rigid, len(pattern.faces))
+    options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
     check_memory(
         f"divisions = {show(divisions)}", f"a shell of about {float(nodes):.3g} nodes",
@@ -365,9 +382,10 @@ def shell(
     )  # fmt: skip
     check_sheet(sheet, pattern)
     mesh = shell_mesh(pattern, divisions)
-    ends = sides(mesh, pattern, edges)
+    chosen = range(len(pattern.faces)) if isinstance(plates, str) else plates or ()
+    ends = sides(mesh, pattern, edges, chosen)
     pieces = ends.hinges[ends.piece_hinge]
-    return Shell(
+    made = Shell(
         nodes=mesh.nodes,
         triangles=mesh.triangles,
         triangle_panel=mesh.panel,
@@ -377,4 +395,6 @@ def shell(
         pattern=pattern,
         sheet=sheet,
         options=options,
-    ).marked()
+    )
+    _ = made.plates  # refuse panels that are not flat
+    return made.marked()

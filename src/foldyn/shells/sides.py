@@ -17,7 +17,7 @@ dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a rotation
 crease each side has a rotation of its own, and the crease turns by what is left of the dihedral,
 d - x - y. Free sides have no moment: their rotation is eliminated in the triangle. A clamped side
 keeps its rest tangent in space: its hinge has a wing that is no node and rides on the mean
-displacement of the side's ends.
+displacement of the side's ends. The sides of rigid panels, which stay flat, have no rotations.
 """
 
 from __future__ import annotations
@@ -51,13 +51,19 @@ class Sides(NamedTuple):
     free: NDArray  # (nt, 3) bool
     rotations: int
     piece_hinge: NDArray  # (c,)
-    piece_rotations: NDArray  # (c, 2)
+    piece_rotations: NDArray  # (c, 2) -1 where there is none
     piece_crease: NDArray  # (c,) number of the pattern's crease
     wings: NDArray  # (g, 3) m
 
 
-def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> Sides:
-    """Find hinges and rotations of a mesh; `clamped` are boundary edges (low, high)."""
+def sides(
+    mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = (), rigid: Collection[int] = ()
+) -> Sides:
+    """Find hinges and rotations of a mesh.
+
+    clamped : boundary edges (low, high).
+    rigid : numbers of rigid panels.
+    """
     crease_of = {
         pair: number
         for edge, number in edge_lookup(pattern.creases).items()
@@ -97,6 +103,10 @@ def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> 
     free = np.zeros(3 * count, bool)
     free[alone] = True
     free[stiff] = False
+    rotation, pieces, rotations = _without(
+        np.isin(mesh.panel, list(rigid)), rotation, pieces, int(smooth.sum() + 2 * folded.sum())
+    )
+    sign[rotation < 0] = 0.0
     pairs = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
     return Sides(
         hinges=np.concatenate(hinges).astype(np.int64),
@@ -105,12 +115,23 @@ def sides(mesh: ShellMesh, pattern: Pattern, clamped: Collection[Edge] = ()) -> 
         rotation=rotation.reshape(-1, 3),
         sign=sign.reshape(-1, 3),
         free=free.reshape(-1, 3),
-        rotations=int(smooth.sum() + 2 * folded.sum()),
+        rotations=rotations,
         piece_hinge=numbers[folded],
         piece_rotations=pieces,
         piece_crease=np.array([crease_of[pair] for pair in pairs], np.int64),
         wings=np.array(wings).reshape(-1, 3),
     )
+
+
+def _without(
+    rigid: NDArray, rotation: NDArray, pieces: NDArray, count: int
+) -> tuple[NDArray, NDArray, int]:
+    """Rotations (3 nt,) and those of creases (c, 2) without those of rigid triangles (nt,)."""
+    kept = np.ones(count + 1, bool)  # the last entry stands for none
+    kept[rotation[np.repeat(rigid, 3)]] = False
+    number = np.where(kept, np.cumsum(kept) - 1, -1)
+    number[-1] = -1
+    return number[rotation], number[pieces], int(kept[:-1].sum())
 
 
 def _pieces(points: list[int]) -> list[Edge]:

@@ -49,7 +49,8 @@ def shell_pattern(model: ShellModel) -> ShellPattern:
     n, count = model.nodes, model.nodes + model.rotations
     nodes, corner = _neighborhoods(model)
     triangle = np.concatenate([nodes, np.where(model.rotation >= 0, n + model.rotation, -1)], 1)
-    piece = np.concatenate([model.hinges[model.piece_hinge], n + model.piece_rotations], axis=1)
+    turns = np.where(model.piece_rotations >= 0, n + model.piece_rotations, -1)
+    piece = np.concatenate([model.hinges[model.piece_hinge], turns], axis=1)
     owner = np.full(len(model.hinges), -1, np.int64)
     side = np.flatnonzero(model.hinge.ravel() >= 0)
     owner[model.hinge.ravel()[side]] = side

@@ -148,7 +148,7 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
 def station_of(solver: Solver, problem: OrigamiProblem, path: xarray.Dataset, at: int) -> Station:
     """A station at a step of a path, as it is stored."""
     factor = float(path["load_factor"].values[at])
-    u = problem.dofs(path["displacement"].values[at], factor).copy()
+    u = problem.state(path["displacement"].values[at], factor)
     reached = balance(problem, u, factor, problem.residual(u, factor))
     station = arrive(solver, Attempt(u, factor, int(path["iterations"].values[at]), reached))
     negative = int(path["negative_eigenvalues"].values[at])

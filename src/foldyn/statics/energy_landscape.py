@@ -191,8 +191,7 @@ class _Walker:
                 "needs one of them"
             )
         self.driver = problem.motion if self.by_motion else problem.growing
-        size = np.abs(self.driver)
-        self.size = float(size.max() if self.by_motion else size.sum())
+        self.size = float(np.abs(self.driver).max()) if self.by_motion else problem.load
 
     def force(self, station: Station) -> float:
         """Driving force, N."""

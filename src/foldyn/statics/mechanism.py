@@ -54,13 +54,10 @@ def refuse_mechanisms(problem: OrigamiProblem) -> None:
 def mechanisms(problem: OrigamiProblem) -> list[str]:
     """Free motions in words: rigid ones, and where there are none, internal mechanisms."""
     structure = problem.structure
-    held = np.zeros(structure.nodes.size, bool)
-    held[problem.held] = True
     start, body = problem.start(), problem.case.body
-    rigid = name_rigid_motions(
-        structure.nodes + problem.displacement(start), held, body.holds(start)
-    )
-    unstrained = None if rigid else body.unstrained(start)
+    x, q = structure.nodes + problem.displacement(start), problem.dofs(start)
+    rigid = name_rigid_motions(x, problem.pinned, body.holds(q))
+    unstrained = None if rigid else body.unstrained(q)
     if unstrained is None:
         return rigid
     return [_name(mode.reshape(-1, 3)) for mode in free_modes(problem, unstrained).T]
@@ -82,7 +79,8 @@ def _name(mode: NDArray) -> str:
 def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     """Motions (m, k) of the free dofs that strain nothing, orthonormal."""
     free = problem.free
-    matrix = unstrained.tangent[free][:, free].tocsc()
+    ties = problem.case.constraints
+    matrix = ties.matrix(unstrained.tangent)[free][:, free].tocsc()
     diagonal = matrix.diagonal()
     if not (diagonal > 0.0).all():
         return _unresisted(problem, diagonal)
@@ -97,6 +95,7 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     vectors = vectors[:, np.argsort(values, kind="stable")[:MOST_MODES]]
     shapes = np.zeros((size + len(problem.held), vectors.shape[1]))
     shapes[free] = vectors * scale[:, None]
+    shapes = ties.displacement(shapes)
     kept = [k for k, mode in enumerate(shapes.T) if _strains_nothing(unstrained, mode)]
     return np.linalg.qr(shapes[:, kept])[0] if kept else shapes[:, :0]
 
@@ -116,7 +115,7 @@ def _unresisted(problem: OrigamiProblem, diagonal: NDArray) -> NDArray:
     loose = problem.free[diagonal <= 0.0]
     modes = np.zeros((problem.structure.nodes.size, len(loose)))
     modes[loose, np.arange(len(loose))] = 1.0
-    return modes
+    return problem.case.constraints.displacement(modes)
 
 
 def _strains_nothing(unstrained: Unstrained, mode: NDArray) -> bool:

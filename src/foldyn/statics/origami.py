@@ -48,6 +48,10 @@ class Actuation:
 class OrigamiProblem:
     """Equilibrium of a case along the load factor; dofs as in `mechanics.body`.
 
+    Where constraints tie displacements together, states and forces are those of `Constraints`, x
+    and E' f: in place of each slave stands the value of its equation, which is held. `dofs` and
+    `displacement` give displacements of a state, `state` the state of displacements.
+
     Parameters
     ----------
     case : Case
@@ -67,12 +71,16 @@ class OrigamiProblem:
     ----------
     constant, growing : ndarray, shape (m,)
         Forces (N) at every factor, and per unit of the factor.
+    load : float
+        Sum of the magnitudes of the latter's components, N.
     motion : ndarray, shape (m,)
         Displacements (m) imposed per unit of the factor.
     actuation : Actuation
         The body at each factor.
     following : Following
         Forces that depend on the displacement: at every factor in row 0, growing in row 1.
+    pinned : Constraints
+        Of the case, with the dofs that fix a free body's place in space.
     """
 
     def __init__(
@@ -83,41 +91,58 @@ class OrigamiProblem:
         self.structure, self._adaptive = structure, adaptive_load
         body = case.body
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
-        self._work = body.workspaces(1)[0]
+        self._work, self._ties = body.workspaces(1)[0], case.constraints
         self._shape = structure.nodes.shape
         loads, chosen = range(len(case.loads)), set(constant)
         steady = with_loads(case, [i for i in loads if i in chosen])
         growing = with_loads(case, [i for i in loads if i not in chosen])
         kinds = enumerate((steady, growing))
         self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
-        self._rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
-        self.constant = self._extended(_total(steady.load_terms, self._shape))
-        self.growing = self._extended(_total(growing.load_terms, self._shape))
-        self.motion = self._extended(_total(case.imposed_terms, self._shape))
+        at_rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
+        self._rest = self._ties.coordinates(at_rest)
+        self._constant = self._extended(_total(steady.load_terms, self._shape))
+        self._growing = self._extended(_total(growing.load_terms, self._shape))
+        self.constant = self._ties.force(self._constant)
+        self.growing = self._ties.force(self._growing)
+        self.load = float(np.abs(self._growing).sum())
+        moved = self._extended(_total(case.imposed_terms, self._shape))
         self._moves = self._extended(case.imposed).astype(bool)
+        self._moves[case.imposed_slaves] = True
+        self.motion = np.where(self._moves, self._ties.coordinates(moved), 0.0)
         angles = body.rest_angles.shape
         self.actuation = Actuation(
             body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
         )
-        self._relief = Relief(case, self._rest[: structure.nodes.size]) if inertia_relief else None
+        self._relief = Relief(case, at_rest[: structure.nodes.size]) if inertia_relief else None
         pins = self._relief.pins if self._relief else np.zeros(0, np.int64)
+        self.pinned = self._ties.with_held(pins)
         self.free = np.concatenate([np.setdiff1d(case.free_dofs, pins), body.hidden])
-        self.held = np.union1d(case.supported_dofs, pins)
+        self.held = np.union1d(np.flatnonzero(case.constraints.determined), pins)
         self.length = float(np.linalg.norm(structure.nodes - structure.nodes.mean(axis=0)))
-        self.force_rounding = EPS * float(np.linalg.norm(body.scale()[self.free]))
+        scale = self._ties.largest(body.scale())
+        self.force_rounding = EPS * float(np.linalg.norm(scale[self.free]))
 
     def _extended(self, values: NDArray) -> NDArray:
         """Values (n, 3) as those of all dofs (m,), zero at the hidden ones."""
         return np.concatenate([np.asarray(values, float).ravel(), np.zeros(self._hidden)])
 
-    def dofs(self, displacement: NDArray, factor: float) -> NDArray:
-        """State (m,) with displacements (n, 3) of the nodes, the hidden dofs in balance."""
-        push = self.external(self._extended(displacement), factor)
-        return self.actuation.body(factor).dofs(displacement, push)
+    def dofs(self, u: NDArray) -> NDArray:
+        """Dofs (m,) of the body in a state (m,)."""
+        return self._ties.displacement(u)
 
     def displacement(self, u: NDArray) -> NDArray:
         """Displacements (n, 3) of the nodes in a state (m,)."""
-        return u[: math.prod(self._shape)].reshape(self._shape)
+        return self.dofs(u)[: math.prod(self._shape)].reshape(self._shape)
+
+    def state(self, displacement: NDArray, factor: float) -> NDArray:
+        """State (m,) with displacements (n, 3) of the nodes, the hidden dofs in balance."""
+        push = self._external(self._extended(displacement), factor)
+        q = self.actuation.body(factor).dofs(displacement, push)
+        return self._ties.coordinates(q.copy())
+
+    def projected(self, force: NDArray) -> NDArray:
+        """Forces (m,) on states, of forces (m,) on the body's dofs, N."""
+        return self._ties.force(force)
 
     def start(self) -> NDArray:
         """State (m,) from which the path is sought."""
@@ -129,40 +154,55 @@ class OrigamiProblem:
 
     def external(self, u: NDArray, factor: float) -> NDArray:
         """External forces (m,), N."""
-        force = self.constant + factor * self.growing
+        return self._ties.force(self._external(self.dofs(u), factor))
+
+    def _external(self, q: NDArray, factor: float) -> NDArray:
+        """External forces (m,) on the body's dofs q (m,), N."""
+        force = self._constant + factor * self._growing
         if self.following.acts:
-            force = force + self.following_force(u, factor)
+            force = force + self.following_force(q, factor)
         if self._adaptive is not None:
-            added = np.asarray(self._adaptive(self.displacement(u).copy(), factor), float)
+            displacement = q[: math.prod(self._shape)].reshape(self._shape)
+            added = np.asarray(self._adaptive(displacement.copy(), factor), float)
             if added.shape != self._shape:
                 raise InputError(
                     f"adaptive_load: returned forces of shape {added.shape}, give {self._shape}"
                 )
             force = force + self._extended(added)
         if self._relief is not None:
-            nodal = u.size - self._hidden
-            force[:nodal] = force[:nodal] - self._relief.inertia(u[:nodal], force[:nodal])
+            nodal = q.size - self._hidden
+            force[:nodal] = force[:nodal] - self._relief.inertia(q[:nodal], force[:nodal])
         return force
+
+    def unbalanced(self, u: NDArray, factor: float) -> NDArray:
+        """Internal minus external force (m,) on the body's dofs, N."""
+        q = self.dofs(u)
+        return self.actuation.body(factor).internal(q, self._work) - self._external(q, factor)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
-        internal = self.actuation.body(factor).internal(u, self._work)
-        return internal - self.external(u, factor)
+        return self._ties.force(self.unbalanced(u, factor))
+
+    def reactions(self, u: NDArray, factor: float) -> NDArray:
+        """What supports exert, N, on `case.reaction_dofs`."""
+        force = self.unbalanced(u, factor)
+        return self._ties.reactions @ force[: math.prod(self._shape)]
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""
-        matrix = self.actuation.body(factor).step_tangent(u, before)
-        if not self.following.acts:
-            return matrix
-        return sparse.csr_array(matrix + self.load_stiffness(u, factor))
+        q, old = self.dofs(u), None if before is None else self.dofs(before)
+        matrix = self.actuation.body(factor).step_tangent(q, old)
+        if self.following.acts:
+            matrix = sparse.csr_array(matrix + self.load_stiffness(q, factor))
+        return self._ties.matrix(matrix)
 
-    def following_force(self, u: NDArray, factor: float) -> NDArray:
-        """Forces (m,), N, of loads that depend on the displacement."""
-        return following_force(self.following, u, _factors(1.0, factor))
+    def following_force(self, q: NDArray, factor: float) -> NDArray:
+        """Forces (m,), N, of loads that depend on the displacement, on the body's dofs q (m,)."""
+        return following_force(self.following, q, _factors(1.0, factor))
 
-    def load_stiffness(self, u: NDArray, factor: float) -> sparse.csr_array:
-        """Part (m, m) of the tangent, N/m, of loads that depend on the displacement."""
-        return following_tangent(self.following, u, _factors(1.0, factor))
+    def load_stiffness(self, q: NDArray, factor: float) -> sparse.csr_array:
+        """Part (m, m) of the body's tangent, N/m, of loads that depend on the displacement."""
+        return following_tangent(self.following, q, _factors(1.0, factor))
 
     def rate(self, u: NDArray, factor: float) -> NDArray:
         """Derivative (3n,) of the residual with respect to the factor at fixed u."""
@@ -175,17 +215,17 @@ class OrigamiProblem:
 
     def reference(self, u: NDArray, factor: float) -> float:
         """Largest of the norms of the external forces and of the hinges' forces alone, N."""
-        hinges = self.actuation.body(factor).hinge_forces(u, self._work)
-        external = self.external(u, factor)
+        hinges = self.actuation.body(factor).hinge_forces(self.dofs(u), self._work)
+        external = self._external(u, factor)
         return max(float(np.linalg.norm(hinges)), float(np.linalg.norm(external)))
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
-        return self.actuation.body(0.0).turn(u, v)
+        return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
 
     def energies(self, u: NDArray, factor: float) -> NDArray:
         """Strain energies (J) by `groups`."""
-        return self.actuation.body(factor).energies(u)
+        return self.actuation.body(factor).energies(self.dofs(u))
 
     def actuation_rate(self, u: NDArray, factor: float) -> float:
         """Derivative (J) of the energy with respect to the factor at fixed u: by actuation."""
@@ -215,7 +255,7 @@ def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDAr
 def drives(case: Case, constant: Sequence[int]) -> bool:
     """Whether anything of a case grows with the load factor."""
     growing = any(i not in set(constant) for i in range(len(case.loads)))
-    return growing or bool(case.imposed.any())
+    return growing or bool(case.imposed_terms)
 
 
 def is_actuated(case: Case) -> bool:

@@ -182,7 +182,7 @@ def _dataset(
         problem.case,
         [p.factor for p in points],
         [problem.displacement(p.u) for p in points],
-        np.reshape([r[problem.case.supported_dofs] for r in residuals], (len(points), -1)),
+        np.reshape([problem.reactions(p.u, p.factor) for p in points], (len(points), -1)),
         {
             **dict(zip(problem.groups, energies.T, strict=True)),
             "work": _work(problem, points, residuals),

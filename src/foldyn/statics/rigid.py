@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.linalg import qr
 
 from foldyn.cases import Case
+from foldyn.cases.constraints import Constraints
 from foldyn.errors import InputError
 
 FREE = 1e-9  # of a rigid motion's size: what held dofs may move in it
@@ -36,18 +37,22 @@ def rigid_motions(x: NDArray) -> NDArray:
     return motions.reshape(-1, 6)
 
 
-def free_rigid_motions(x: NDArray, held: NDArray, holds: sparse.csr_array | None = None) -> NDArray:
-    """Rigid motions (3n, r) of points x (n, 3) that leave the dofs of the mask held (3n,) still.
+def free_rigid_motions(
+    x: NDArray, ties: Constraints, holds: sparse.csr_array | None = None
+) -> NDArray:
+    """Rigid motions (3n, r) of points x (n, 3) that supports and constraints allow.
 
     holds : what else keeps them in place, see `Body.holds`.
     """
     motions = rigid_motions(x)
-    return motions @ _free_space(motions, held, holds)
+    return motions @ _free_space(motions, ties, holds)
 
 
-def _free_space(motions: NDArray, held: NDArray, holds: sparse.csr_array | None) -> NDArray:
+def _free_space(motions: NDArray, ties: Constraints, holds: sparse.csr_array | None) -> NDArray:
     """Combinations (6, r) of the rigid motions that leave held dofs still, but not everything."""
-    still = motions[held]
+    still = motions[ties.held]
+    if ties:
+        still = np.concatenate([still, ties.rows @ motions])
     if holds is not None and holds.shape[0]:
         still = np.concatenate([still, holds[:, : len(motions)] @ motions])
     _, values, right = np.linalg.svd(np.linalg.qr(still, mode="r"))
@@ -59,11 +64,11 @@ def _free_space(motions: NDArray, held: NDArray, holds: sparse.csr_array | None)
 
 
 def name_rigid_motions(
-    x: NDArray, held: NDArray, holds: sparse.csr_array | None = None
+    x: NDArray, ties: Constraints, holds: sparse.csr_array | None = None
 ) -> list[str]:
     """Free rigid motions in words, such as "translation along x" and "rotation about y"."""
     motions = rigid_motions(x)
-    space = _free_space(motions, held, holds)
+    space = _free_space(motions, ties, holds)
     if not space.size:
         return []
     left, values, right = np.linalg.svd(space[3:])
@@ -103,8 +108,7 @@ class Relief:
     """Balance of the loads of a case whose supports leave it free to move as a rigid body."""
 
     def __init__(self, case: Case, start: NDArray) -> None:
-        self._nodes, self._held = case.structure.nodes, case.fixed.ravel()
-        self._body = case.body
+        self._nodes, self._ties, self._body = case.structure.nodes, case.constraints, case.body
         try:
             self._mass = case.mass
         except InputError as error:
@@ -117,13 +121,14 @@ class Relief:
             raise InputError(
                 ": the supports leave no rigid motion free: leave it out", "inertia_relief"
             )
-        free = np.flatnonzero(~self._held)
+        free = case.free_dofs
         first = np.linspace(1.0, 1.0 - TIE, len(free))  # of dofs that hold it as well, the first
         _, _, order = qr(motions[free].T * first, mode="economic", pivoting=True)
         self.pins = np.sort(free[order[: self._count]])
 
     def _motions(self, u: NDArray) -> NDArray:
-        return free_rigid_motions(self._nodes + u.reshape(-1, 3), self._held, self._body.holds(u))
+        x, holds = self._nodes + u.reshape(-1, 3), self._body.holds(u)
+        return free_rigid_motions(x, self._ties, holds)
 
     def inertia(self, u: NDArray, force: NDArray) -> NDArray:
         """Inertia forces (3n,), N, that balance forces (3n,) at displacement u (3n,)."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
+from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
@@ -208,6 +209,7 @@ def displacement_of(
         raise InputError(
             f": displacement of shape {displacement.shape}: the case has {shape}", field
         )
+    check_tied(case, displacement, field)
     return displacement
 
 
@@ -222,7 +224,7 @@ def check_movable(case: Case) -> None:
 def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
     """Refuse a case in which nothing happens along the path."""
     check_movable(case)
-    moves = bool(case.imposed.any()) or is_actuated(case)
+    moves = bool(case.imposed_terms) or is_actuated(case)
     if plan.method.name == "displacement" and not moves:
         raise InputError(
             " 'displacement' needs something that moves: an Impose among the supports or an "

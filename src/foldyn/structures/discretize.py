@@ -18,6 +18,7 @@ from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
+from foldyn.structures.plate import checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure
 from foldyn.structures.swelling import panel_of_triangle
@@ -40,6 +41,7 @@ def discretize(
     crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
     clamped: Sequence[Sequence[int]] = (),
+    rigid: str | Sequence[int] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
@@ -68,6 +70,9 @@ def discretize(
     clamped : sequence of (vertex, vertex)
         Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
         their nodes need a support of their own. See `foldyn.structures.clamps`.
+    rigid : "all" or sequence of int, optional
+        Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
+        be flat. Their bars still stretch.
 
     Returns
     -------
@@ -89,8 +94,9 @@ def discretize(
     check_kinds(pattern, sheet)
     edges = clamped_edges(clamped, pattern)
     options = ModelOptions(
-        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest, edges
-    )
+        scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest,
+        edges, checked_panels(rigid, len(pattern.faces)),
+    )  # fmt: skip
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
     materials.hinge_law(bend_law, "bend_law")
@@ -109,7 +115,7 @@ def discretize(
     clamps = clamp_rows(edges, mesh.triangles)
     clamped_panel = panel_of_triangle(mesh.triangles, mesh.triangle_panel, clamps)
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
-    return Structure(
+    structure = Structure(
         nodes=x,
         bars=np.concatenate([mesh.inner, outer]),
         bar_area=area,
@@ -127,7 +133,9 @@ def discretize(
         centers=mesh.centers,
         clamps=clamps,
         clamp_stiffness=clamp_stiffness(x, clamps, modulus),
-    ).marked()
+    )
+    _ = structure.plates  # refuse panels that are not flat
+    return structure.marked()
 
 
 def check_kinds(pattern: Any, sheet: Any) -> None:

@@ -17,6 +17,7 @@ from foldyn.materials import HingeLaw, hinge_law
 from foldyn.mechanics.body import Body
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
+from foldyn.structures.plate import Plate
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling
 
@@ -71,6 +72,8 @@ class Discretized:
         Its name in case files.
     energy_groups : mapping of str to str
         Parts of its strain energy, and what they are.
+    plates : tuple of Plate
+        Its rigid panels, all nodes of which ride on three of their corners.
     massless : str
         Its dofs without mass, "the rotations of a shell"; empty if it has none.
     fill : Fill
@@ -97,6 +100,7 @@ class Discretized:
     kind: ClassVar[str]
     massless: ClassVar[str] = ""
     as_made: bool = False
+    plates: tuple[Plate, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(cast(Any, self)):

@@ -24,6 +24,7 @@ from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.plate import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
 from foldyn.values import choice
@@ -48,6 +49,7 @@ class ModelOptions:
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
+    rigid: str | tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -146,6 +148,15 @@ class Structure(Discretized):
             return body
         bends = tuple(GROUPS).index("strain_bends")
         return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
+
+    @cached_property
+    def plates(self) -> tuple[Plate, ...]:
+        """Its rigid panels."""
+        if self.pattern is None:
+            return ()
+        return rigid_plates(
+            self.options.rigid, self.pattern.faces, self.nodes, self.triangles, self.triangle_panel
+        )
 
     def _rows(self, group: int, hinges: NDArray) -> NDArray:
         """Rows in `model.hinges` of the folds (group 0) or bends (1), which may be mixed there."""

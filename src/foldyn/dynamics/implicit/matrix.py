@@ -22,6 +22,7 @@ from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.dynamics.implicit.damping import ElementBlocks, ModalTerm, Weights
 from foldyn.dynamics.system import Packed
+from foldyn.dynamics.ties import Ties, follow_masters, hand_over
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.following import following_places, put_following
@@ -81,21 +82,27 @@ class StepMatrix:
         self._matrices = Matrices(self.stiffness, masses, viscous)
         held = np.zeros(3 * nodes, bool)
         held[system.supported] = True
+        held[system.ties.slave] = True
         held[self.blocks.unused] = True
         along = self.blocks.order
         self.free = along[~held[along]]
+        self._ties = system.ties
         filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
         filled |= self._elements.filled(shape)
         filled.reshape(-1)[self._follow] = True
-        row, column, take = _entries(self.pattern, self.free, filled)
-        size, width = len(self.free), int(np.abs(row - column).max(initial=0))
-        self._sparse = _Sparse(row, column, take, size, symmetric)
+        entries = _entries(self.pattern, self.free, filled, self._ties)
+        size = len(self.free)
+        width = int(np.abs(entries.row - entries.column).max(initial=0))
+        self._sparse = _Sparse(entries, size, symmetric)
         self._band = None
         if takes_band(size, width, symmetric):
-            self._band = _Band(row, column, take, size, width, symmetric)
+            self._band = _Band(entries, size, width, symmetric)
         self.solver = "banded" if self._band else self._sparse.solver
         self._factors: Any = None
-        self._modal = ModalTerm(system.damping.modal[:, self.free])
+        modal = system.damping.modal.copy()
+        for row in modal:
+            hand_over(self._ties, row)
+        self._modal = ModalTerm(modal[:, self.free])
         self.factorizations = 0
 
     def add_following(self, u: NDArray, factor: NDArray, share: float) -> None:
@@ -150,20 +157,42 @@ class StepMatrix:
         return self._factors.columns if isinstance(self._factors, Cholesky) else None
 
     def solve(self, residual: NDArray, out: NDArray) -> NDArray:
-        """Solution of A x = residual at the free dofs of `out`; the others stay; all (n, 3)."""
-        out.ravel()[self.free] = self._factors.solve(residual.ravel()[self.free])
+        """Solution of A x = residual at the free dofs of `out`; the others stay; all (n, 3).
+
+        Slaves of constraints follow.
+        """
+        if not len(self._ties.slave):
+            out.ravel()[self.free] = self._factors.solve(residual.ravel()[self.free])
+            return out
+        force, moved = residual.ravel().copy(), out.reshape(-1)
+        hand_over(self._ties, force)
+        moved[self.free] = self._factors.solve(force[self.free])
+        follow_masters(self._ties, moved)
         return out
+
+
+class _Entries(NamedTuple):
+    """Entries between free dofs: row, column, and what of the blocks goes there.
+
+    With constraints several times the same one, to be added, each times a value of its own.
+    """
+
+    row: NDArray
+    column: NDArray
+    take: NDArray
+    value: NDArray  # none without constraints
 
 
 class _Band:
     """Puts entries into a band."""
 
-    def __init__(
-        self, row: NDArray, column: NDArray, take: NDArray, size: int, width: int, symmetric: bool
-    ) -> None:
+    def __init__(self, entries: _Entries, size: int, width: int, symmetric: bool) -> None:
         self._make: Callable[[NDArray], Any] = Cholesky if symmetric else BandLU
-        kept = row <= column if symmetric else slice(None)
-        row, column, self._take = row[kept], column[kept], take[kept]
+        row, column, self._take, self._value = entries
+        if symmetric:
+            kept = row <= column
+            row, column, self._take = row[kept], column[kept], self._take[kept]
+            self._value = self._value[kept] if len(self._value) else self._value
         rows, diagonal = (width + 1, width) if symmetric else (3 * width + 1, 2 * width)
         self._put = (diagonal + row - column) + rows * column
         self._memory = np.zeros((size, rows)).T
@@ -171,33 +200,43 @@ class _Band:
     def __call__(self, weights: Weights, matrices: Matrices) -> Any:
         flat = self._memory.T.reshape(-1)
         flat[:] = 0.0
-        _gather(weights, matrices, self._take, self._put, flat)
+        if len(self._value):
+            _gather_tied(weights, matrices, self._take, self._value, self._put, flat)
+        else:
+            _gather(weights, matrices, self._take, self._put, flat)
         return self._make(self._memory)
 
 
 class _Sparse:
     """Puts entries into a sparse matrix by columns."""
 
-    def __init__(
-        self, row: NDArray, column: NDArray, take: NDArray, size: int, symmetric: bool
-    ) -> None:
+    def __init__(self, entries: _Entries, size: int, symmetric: bool) -> None:
+        row, column, take, self._value = entries
+        self._put = np.arange(len(take))
+        if len(self._value):  # to the same place several times
+            place, self._put = np.unique(row + size * column, return_inverse=True)
+            row, column, self._take = place % size, place // size, take
         numbered = sparse.csc_array((np.arange(1, len(row) + 1), (row, column)), (size, size))
         numbered.sort_indices()
-        self._take = take[numbered.data - 1]
+        if not len(self._value):
+            self._take = take[numbered.data - 1]
         self._indices, self._indptr, self._size = numbered.indices, numbered.indptr, size
         self.solver, self._make = "superlu", SuperLU
         if symmetric:
             self.solver, self._make = factorizer("auto", size)
 
     def __call__(self, weights: Weights, matrices: Matrices) -> Any:
-        data, put = np.empty(len(self._take)), np.arange(len(self._take))
-        _gather(weights, matrices, self._take, put, data)
+        data = np.zeros(len(self._indices))
+        if len(self._value):
+            _gather_tied(weights, matrices, self._take, self._value, self._put, data)
+        else:
+            _gather(weights, matrices, self._take, self._put, data)
         shape = (self._size, self._size)
         return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
 
 
-def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Row, column and place in the blocks of the `filled` entries between free dofs."""
+def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:
+    """The `filled` entries of the blocks between free dofs, and between slaves of constraints."""
     dofs = 3 * (len(pattern.indptr) - 1)
     number = np.full(dofs, -1)
     number[free] = np.arange(len(free))
@@ -205,9 +244,30 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray) -> tuple[NDArray
     axis = np.arange(3)
     row = 3 * node[:, None, None] + axis[:, None] + 0 * axis
     column = 3 * pattern.indices.astype(np.int64)[:, None, None] + axis[:, None] * 0 + axis
-    row, column = number[row.ravel()], number[column.ravel()]
-    kept = np.flatnonzero((row >= 0) & (column >= 0) & filled.ravel())
-    return row[kept], column[kept], kept
+    row, column = row.ravel(), column.ravel()
+    if not len(ties.slave):
+        row, column = number[row], number[column]
+        kept = np.flatnonzero((row >= 0) & (column >= 0) & filled.ravel())
+        return _Entries(row[kept], column[kept], kept, np.zeros(0))
+    kept = np.flatnonzero(filled.ravel())
+    start, master, value = _masters(number, free, ties)
+    count = np.diff(start)
+    one, other = (count[dof[kept]] for dof in (row, column))
+    first = np.repeat(np.arange(len(kept)), one * other)  # entry of the blocks of each product
+    within = np.arange(len(first)) - np.repeat(np.cumsum(one * other) - one * other, one * other)
+    a = start[row[kept]][first] + within // other[first]
+    b = start[column[kept]][first] + within % other[first]
+    return _Entries(master[a], master[b], kept[first], value[a] * value[b])
+
+
+def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArray, NDArray]:
+    """Of every dof the numbers of the free ones it consists of, with its values, by rows."""
+    dof = np.concatenate([free, np.repeat(ties.slave, np.diff(ties.masters.start))])
+    master = number[np.concatenate([free, ties.masters.dof])]
+    value = np.concatenate([np.ones(len(free)), ties.masters.value])
+    order = np.argsort(dof, kind="stable")
+    start = np.searchsorted(dof[order], np.arange(len(number) + 1))
+    return start, master[order], value[order]
 
 
 @kernel
@@ -218,3 +278,13 @@ def _gather(weights, matrices, take, put, out):
         e = take[k]
         value = weights.stiffness * stiffness[e] + weights.mass * mass[e]
         out[put[k]] = value + weights.damping * damping[e]
+
+
+@kernel
+def _gather_tied(weights, matrices, take, value, put, out):
+    """Add to out[put] the weighted sum of the matrices at `take` times a value, all flat."""
+    stiffness, mass, damping = flat(matrices.stiffness), flat(matrices.mass), flat(matrices.damping)
+    for k in range(take.size):
+        e = take[k]
+        entry = weights.stiffness * stiffness[e] + weights.mass * mass[e]
+        out[put[k]] += value[k] * (entry + weights.damping * damping[e])

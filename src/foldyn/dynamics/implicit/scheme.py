@@ -20,6 +20,7 @@ from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
+from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
 
@@ -299,7 +300,8 @@ class Newton:
 def norms(system, force, inertia, factor, following):
     """Norms of an out-of-balance force (n, 3) on the free dofs, N, and of the forces at play.
 
-    The force becomes zero at the supports, where it is a reaction.
+    The force becomes zero at the supports, where it is a reaction, and at slaves of constraints,
+    which hand theirs over to their masters.
 
     inertia : sum of squares of the inertial forces, N2.
     factor : (h, 3) of the histories, for the loads.
@@ -310,6 +312,11 @@ def norms(system, force, inertia, factor, following):
         dof = system.supported[k]
         reactions += values[dof] * values[dof]
         values[dof] = 0.0
+    ties = system.ties
+    if ties.slave.size > 0:
+        for k in range(ties.slave.size):
+            reactions += values[ties.slave[k]] * values[ties.slave[k]]
+        hand_over(ties, values)
     loads = system.loads
     for k in range(loads.dof.size):
         load = loads.value[k] * factor[loads.row[k], 0]

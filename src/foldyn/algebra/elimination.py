@@ -1,0 +1,102 @@
+"""Linear equations G u = g between dofs, solved for some of them: the slaves.
+
+Each equation determines one dof, its slave, from others. With x the vector u in which the value g
+of its equation takes the place of each slave, u = E x: row by row a slave is a combination of free
+dofs, of held ones, and of the values g. Columns of E that belong to free dofs span the motions that
+the equations and the supports allow. Transposed, E turns forces on u into those on x: on free dofs
+what drives them, on held ones what their supports exert, and on slaves the multipliers of the
+equations.
+
+The equations are taken one after the other. What is known of earlier slaves is put into each; a dof
+that is still free and counts enough becomes its slave, first of all the one that the equation names
+first, and is then taken out of all equations before. An equation in which no free dof is left
+follows from the others, or contradicts them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+NAMED = 0.5  # of the largest coefficient, from which the dof that an equation names first is taken
+DEPENDENT = 1e-9  # of an equation's coefficients: what is left where it follows from the others
+ROUNDING = 1e-14  # of them: coefficients that are none
+
+
+class Elimination(NamedTuple):
+    """k equations between m dofs, s of them independent."""
+
+    slaves: NDArray  # (s,) dofs
+    kept: NDArray  # (s,) the equation of each
+    left: NDArray  # (k - s,) equations that determine nothing
+    basis: sparse.csr_array  # E (m, m)
+
+
+def eliminate(equations: sparse.csr_array, held: NDArray) -> Elimination:
+    """Solve equations G (k, m) for slaves among the dofs that are not held, a mask (m,)."""
+    size = equations.shape[1]
+    known: dict[int, dict[int, float]] = {}  # slaves as combinations of entries of x
+    users: defaultdict[int, set[int]] = defaultdict(set)  # slaves that a free dof determines
+    kept, left = [], []
+    bounds = zip(equations.indptr[:-1].tolist(), equations.indptr[1:].tolist(), strict=True)
+    for number, (first, last) in enumerate(bounds):
+        named = equations.indices[first:last].tolist()
+        values = equations.data[first:last].tolist()
+        row = _inserted(dict(zip(named, values, strict=True)), known)
+        largest = max(map(abs, values), default=0.0)
+        pivot = _pivot(row, named, held, known, DEPENDENT * largest)
+        if pivot < 0:
+            left.append(number)
+            continue
+        kept.append(number)
+        share = row.pop(pivot)
+        solved = {j: -value / share for j, value in row.items() if abs(value) > ROUNDING * largest}
+        solved[pivot] = 1.0 / share
+        for slave in users.pop(pivot, ()):
+            changed = _inserted(known[slave], {pivot: solved})
+            known[slave] = {j: value for j, value in changed.items() if abs(value) > ROUNDING}
+            for j in solved:
+                users[j].add(slave)
+        known[pivot] = solved
+        for j in solved:
+            users[j].add(pivot)
+    slaves = np.array(list(known), np.int64)
+    return Elimination(
+        slaves, np.array(kept, np.int64), np.array(left, np.int64), _basis(known, size)
+    )
+
+
+def _inserted(row: dict[int, float], known: dict[int, dict[int, float]]) -> dict[int, float]:
+    """A combination of dofs with the slaves among them replaced by what determines them."""
+    out: defaultdict[int, float] = defaultdict(float)
+    for dof, value in row.items():
+        for j, part in known.get(dof, {dof: 1.0}).items():
+            out[j] += value * part
+    return dict(out)
+
+
+def _pivot(
+    row: dict[int, float], named: list[int], held: NDArray, known: dict[int, Any], least: float
+) -> int:
+    """The free dof that an equation is solved for, -1 where none is left."""
+    open_ = {j: abs(value) for j, value in row.items() if not held[j] and j not in known}
+    largest = max(open_.values(), default=0.0)
+    if largest <= least:
+        return -1
+    first = (j for j in named if open_.get(j, 0.0) >= NAMED * largest)
+    return next(first, max(open_, key=lambda j: open_[j]))
+
+
+def _basis(known: dict[int, dict[int, float]], size: int) -> sparse.csr_array:
+    alone = np.setdiff1d(np.arange(size), np.array(list(known), np.int64))
+    rows = [alone, *(np.full(len(known[slave]), slave) for slave in known)]
+    columns = [alone, *(np.array(list(each), np.int64) for each in known.values())]
+    values = [np.ones(len(alone)), *(np.array(list(each.values())) for each in known.values())]
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    basis = sparse.csr_array(entries, (size, size))
+    basis.sort_indices()
+    return basis

@@ -1,0 +1,98 @@
+"""Constraints of a case in compiled loops: slaves follow their masters and hand them their forces.
+
+Motions less those of supports satisfy G v = 0. Of such a motion its free dofs say everything: each
+slave is a sum of some of them, its masters, times constant values. Forces on slaves act on the
+masters with the same values. See `cases.constraints`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.cases.constraints import Constraints
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.body import Numbering
+
+
+class Rows(NamedTuple):
+    """Sums of values times dofs 3 place + axis: row k has entries start[k] to start[k + 1]."""
+
+    start: NDArray  # (k + 1,)
+    dof: NDArray
+    value: NDArray
+
+
+class Ties(NamedTuple):
+    """s slaves, dofs 3 place + axis; none where a case has no constraints."""
+
+    slave: NDArray  # (s,)
+    masters: Rows  # of each slave
+    free: NDArray  # (f,) free dofs; none without constraints
+    reactions: Rows  # what the supports exert, by forces on all dofs, on `case.reaction_dofs`
+
+
+def ties_of(constraints: Constraints, by: Numbering) -> Ties:
+    """Constraints as they stand in memory."""
+    if not constraints:
+        nothing, empty = np.zeros(0, np.int64), Rows(np.zeros(1, np.int64), *np.zeros((2, 0)))
+        empty = empty._replace(dof=nothing)
+        return Ties(nothing, empty, nothing, empty)
+    slaves, free = constraints.slaves, constraints.free
+    only = sparse.csr_array(constraints.basis[slaves][:, free])
+    return Ties(
+        by.dofs(slaves),
+        Rows(only.indptr.astype(np.int64), by.dofs(free[only.indices]), only.data),
+        by.dofs(free),
+        _rows(constraints.reactions, by),
+    )
+
+
+def _rows(matrix: sparse.csr_array, by: Numbering) -> Rows:
+    return Rows(matrix.indptr.astype(np.int64), by.dofs(matrix.indices), matrix.data)
+
+
+def reduced(matrix: sparse.csr_array, ties: Ties) -> sparse.csr_array:
+    """A matrix of all dofs (m, m) on the free ones (f, f)."""
+    size, count = matrix.shape[0], len(ties.free)
+    place = np.full(size, -1)
+    place[ties.free] = np.arange(count)
+    masters = np.repeat(ties.slave, np.diff(ties.masters.start))
+    row = np.concatenate([ties.free, masters])
+    column = np.concatenate([np.arange(count), place[ties.masters.dof]])
+    value = np.concatenate([np.ones(count), ties.masters.value])
+    basis = sparse.csr_array((value, (row, column)), (size, count))
+    return sparse.csr_array(basis.T @ matrix @ basis)
+
+
+@kernel
+def follow_masters(ties, motion):
+    """Make slaves follow in a motion, flat, of which the free dofs are given."""
+    masters = ties.masters
+    for k in range(ties.slave.size):
+        total = 0.0
+        for p in range(masters.start[k], masters.start[k + 1]):
+            total += masters.value[p] * motion[masters.dof[p]]
+        motion[ties.slave[k]] = total
+
+
+@kernel
+def hand_over(ties, force):
+    """Move the forces on slaves, flat, to their masters."""
+    masters = ties.masters
+    for k in range(ties.slave.size):
+        own = force[ties.slave[k]]
+        for p in range(masters.start[k], masters.start[k + 1]):
+            force[masters.dof[p]] += masters.value[p] * own
+        force[ties.slave[k]] = 0.0
+
+
+@kernel
+def add_reactions(rows, force, factor, out):
+    """Add `factor` times what the supports exert on them, by a force on all dofs, flat."""
+    for k in range(out.size):
+        for p in range(rows.start[k], rows.start[k + 1]):
+            out[k] += factor * rows.value[p] * force[rows.dof[p]]
