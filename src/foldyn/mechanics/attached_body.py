@@ -79,9 +79,9 @@ class AttachedBody(Body):
         """A vector (m,) of forces on nodes (n, 3)."""
         return np.concatenate([force.ravel(), np.zeros(len(self.hidden))])
 
-    def dofs(self, displacement: NDArray) -> NDArray:
+    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
         """See `Body`."""
-        return self.inner.dofs(displacement)
+        return self.inner.dofs(displacement, push)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
