@@ -54,8 +54,10 @@ def test_a_spinning_panel_is_pushed_along_its_normal(make, method) -> None:
     t, a = found.time.values, P / MASS
     x = a / SPIN * (t - np.sin(SPIN * t) / SPIN)
     z = a / SPIN**2 * (1.0 - np.cos(SPIN * t))
-    error = np.abs(center - np.stack([x, 0.0 * t, z], axis=1)).max()
-    assert error < (1e-6 if method == "dormand_prince" or not METHODS[method].implicit else 1e-4)
+    expected = np.stack([x, 0.0 * t, z], axis=1)
+    error = np.abs(center - expected).max() / expected.max()
+    bound = 1e-4 if METHODS[method].implicit else 2e-6
+    assert error < (5e-7 if method == "rk4" else 5e-5 if make is shell else bound)
     assert found.attrs["energy_error"] < 1e-4
 
 
@@ -142,7 +144,8 @@ def test_work_of_pressure_on_a_closed_body_is_pressure_times_volume(make) -> Non
     x = (s.nodes + found.displacement.values)[:, s.triangles]
     volume = np.einsum("stc,stc->s", x[:, :, 0], np.cross(x[:, :, 1], x[:, :, 2])) / 6.0
     assert volume.max() > 1.2
-    np.testing.assert_allclose(found.work, p * (volume - 1.0), rtol=2e-5, atol=1e-4)
+    off = np.abs(found.work.values - p * (volume - 1.0)).max() / float(found.work.max())
+    assert off < (4e-9 if make is bars else 4e-6)
     momentum = np.einsum("n,tnc->tc", s.nodal_mass, found.velocity.values)
     assert np.abs(momentum).max() < 1e-10
 
@@ -179,11 +182,12 @@ def test_pressure_leaves_the_frequency_of_a_fold_as_it_is(make) -> None:
         return float(found.frequency[0])
 
     free = np.sqrt(k / inertia) / (2.0 * np.pi)
-    assert first(fd.Pressure(1.2 * k, [1])) == pytest.approx(free, rel=3e-3)
-    assert first(fd.CreaseMoment([0], -0.6 * k)) == pytest.approx(free, rel=3e-3)
+    error = 1e-4 if make is bars else 2e-3
+    assert first(fd.Pressure(1.2 * k, [1])) == pytest.approx(free, rel=error)
+    assert first(fd.CreaseMoment([0], -0.6 * k)) == pytest.approx(free, rel=error)
     dead = first(fd.TotalForce((0, 0, 1.2 * k), panels=[1]))
     angle = brentq(lambda f: f - 0.6 * np.cos(f), 0.0, 1.0)
-    assert dead == pytest.approx(free * np.sqrt(1.0 + 0.6 * np.sin(angle)), rel=3e-3)
+    assert dead == pytest.approx(free * np.sqrt(1.0 + 0.6 * np.sin(angle)), rel=error)
 
 
 def test_free_inflated_body_keeps_its_six_rigid_motions() -> None:

@@ -148,7 +148,7 @@ def test_a_pressure_turns_a_panel_until_its_crease_balances_it(make) -> None:
     case = fd.Case(s, half_held(s), [fd.Pressure(2 * 0.6 * K, [1])])
     with pytest.warns(FoldynWarning, match="has no potential"):
         path = fd.trace(case, load_factors=[0, 1])
-    assert turned(s, path) == pytest.approx(0.6, rel={bars: 1e-3, shell: 4e-3}[make])
+    assert turned(s, path) == pytest.approx(0.6, rel={bars: 2e-4, shell: 3e-3}[make])
 
 
 @pytest.mark.parametrize("make", MODELS)
@@ -161,7 +161,7 @@ def test_a_line_load_on_a_crease_between_rollers(make) -> None:
     path = fd.trace(case, load_factors=[0, 1])
     f = brentq(lambda f: 2 * K * f - 0.5 * q * np.cos(f), 0.0, 1.5)
     rise = float(path.displacement[-1].sel(node=1, axis="z"))
-    assert rise == pytest.approx(np.sin(f), rel={bars: 2e-3, shell: 5e-3}[make])
+    assert rise == pytest.approx(np.sin(f), rel={bars: 5e-4, shell: 4e-3}[make])
 
 
 def test_small_pressure_bends_a_strip_as_a_beam() -> None:
@@ -193,7 +193,7 @@ def test_large_pressure_makes_a_held_strip_a_cylinder_under_hoop_tension() -> No
     a = brentq(unbalanced, 1e-3, 1.5)
     radius = 0.5 / np.sin(a)
     rise = path.displacement.values[-1, where(s, 0.5), 2].mean()
-    assert rise == pytest.approx(radius * (1.0 - np.cos(a)), rel=2e-3)
+    assert rise == pytest.approx(radius * (1.0 - np.cos(a)), rel=1.2e-3)
     # half of the strip: what the support takes and the pressure pushes sideways is the tension
     side = path.support_node.isin(where(s, 0.0)) & (path.support_axis == "x")
     pull = -float(path.reaction[-1].where(side, 0.0).sum()) / 0.25
