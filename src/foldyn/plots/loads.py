@@ -13,6 +13,7 @@ from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.selection import resolve_creases
 from foldyn.cases.supports import unit_vector
 from foldyn.plots import style
+from foldyn.plots.following import Share, moments, pressures
 from foldyn.values import number, show
 
 _SAMPLES = 2001
@@ -37,6 +38,8 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
 
     - one curve per history of forces: the force at the most heavily loaded of its nodes, that is
       the largest magnitude among the nodes times the factor of the history;
+    - pressure and moments of creases: one curve per load, the largest in magnitude of its panels
+      or creases times the factor;
     - gravity: the magnitude of its acceleration times the factor;
     - imposed displacements and displacements of the base, one curve per value and axis;
     - rest angles of actuated creases, one curve per pair of first and last angle.
@@ -46,8 +49,8 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     Parameters
     ----------
     case : Case
-        The curves are its ``force_terms``, ``gravity_terms``, ``imposed_terms``, ``base_terms``
-        and ``actuation_terms``.
+        The curves are its ``force_terms``, ``following_terms``, ``gravity_terms``,
+        ``imposed_terms``, ``base_terms`` and ``actuation_terms``.
     duration : float
         Length of the time axis (s).
     title : str
@@ -67,8 +70,12 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     number("duration", duration, above=0.0, unit="s")
     forces = [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
     gravity = [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
+    pressure = [_Curve(_most(s.value), describe_pressure(s), s.history) for s in pressures(case)]
+    moment = [_Curve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
     panels = [
         ("force at a node (N)", forces),
+        ("pressure (Pa)", pressure),
+        ("moment of a crease (N m)", moment),
         ("gravity (m/s2)", gravity),
         ("imposed displacement (m)", _imposed_curves(case)),
         ("base displacement (m)", _base_curves(case)),
@@ -179,6 +186,24 @@ def signed_peak(vectors: np.ndarray) -> np.ndarray:
 def describe_load(vectors: np.ndarray) -> str:
     """Say in words where a load acts, in which direction, and how large it is at a node."""
     return _describe(vectors, "N")
+
+
+def describe_pressure(share: Share) -> str:
+    """Say in words how large a pressure is, and on which panels it acts."""
+    return f"pressure {_most(share.value):.4g} Pa on {_listed('panel', share.numbers.tolist())}"
+
+
+def describe_moment(share: Share) -> str:
+    """Say in words how large moments of creases are, and of which."""
+    creases, low = _listed("crease", share.numbers.tolist()), float(share.value.min())
+    if np.ptp(share.value):
+        return f"moments {low:.4g} to {share.value.max():.4g} N m of {creases}"
+    return f"moment {low:.4g} N m of {creases}"
+
+
+def _most(values: np.ndarray) -> float:
+    """Value of the largest magnitude."""
+    return float(values[np.abs(values).argmax()])
 
 
 def describe_imposed(vectors: np.ndarray) -> str:

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from foldyn.plots.scene import Points, View
 
+CROWD = 20  # arrows between the vertices of a pattern, beyond which they keep a distance,
+MANY = 100  # and arrows in all, beyond which they keep a larger one
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 
-def _billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
+def billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
     """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
     across = np.cross(view.basis[2], along)
     size = np.linalg.norm(across)
@@ -54,7 +56,7 @@ def support_triangles(
             # The triangle stands outside the sheet; on the middle plane, below or before it.
             outside = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
             along[k] = np.sign(moves[node, k]) or outside
-            triangles.append(_billboard(points[node], along, size, 0.38 * size, view))
+            triangles.append(billboard(points[node], along, size, 0.38 * size, view))
     return np.array(triangles).reshape(-1, 3, 3), held
 
 
@@ -83,10 +85,40 @@ def load_arrows(
     for node in np.flatnonzero(size > 0.0):
         along = vectors[node] / size[node]
         tip = points[node] + length * max(size[node] / longest, 1.0 / 3.0) * along
-        head = _billboard(tip, along, 0.3 * length, 0.11 * length, view)
+        head = billboard(tip, along, 0.3 * length, 0.11 * length, view)
         shafts.append([points[node], 0.5 * (head[1] + head[2])])
         heads.append(head)
     return np.array(shafts).reshape(-1, 2, 3), np.array(heads).reshape(-1, 3, 3)
+
+
+def thinned(points: Points, vectors: Points, length: float, always: int | None) -> Points:
+    """Vectors (n, 3), zero at points (n, 3) that are too near to others for arrows of a length.
+
+    The first `always` points keep theirs; so do all where few others have one, or for None.
+    """
+    where = np.flatnonzero(vectors.any(axis=1))
+    if always is None or np.count_nonzero(where >= always) <= CROWD:
+        return vectors
+    apart = length * (0.3 if len(where) <= MANY else 0.7)
+    kept: list[int] = []
+    for node in where.tolist():
+        gaps = np.linalg.norm(points[kept] - points[node], axis=1)
+        if node < always or gaps.min(initial=np.inf) > apart:
+            kept.append(node)
+    out = np.zeros_like(vectors)
+    out[kept] = vectors[kept]
+    return out
+
+
+def arc_arrows(arcs: Points, size: float, view: View) -> tuple[Points, Points]:
+    """Return pieces (k, 2, 3) and heads (m, 3, 3) of arrows along arcs (m, p, 3)."""
+    heads = []
+    for arc in arcs:
+        along = arc[-1] - arc[-2]
+        along = along / np.linalg.norm(along)
+        heads.append(billboard(arc[-1] + 0.5 * size * along, along, size, 0.4 * size, view))
+    pieces = np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return pieces, np.array(heads).reshape(-1, 3, 3)
 
 
 def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) -> Poly3DCollection:

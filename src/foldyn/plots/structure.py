@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
+from foldyn.plots import following, marks, scene, style
 from foldyn.plots import loads as histories
-from foldyn.plots import marks, scene, style
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure
@@ -52,7 +52,9 @@ def draw_structure(
         base.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
-        and one from the center of mass along gravity. Actuated creases are highlighted.
+        one from each panel under pressure, two about each crease with a moment, towards the panels
+        where it opens them, and one from the center of mass along gravity. Actuated creases are
+        highlighted.
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float
@@ -182,16 +184,40 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
 
 
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
-    """Return arrows of forces, and of gravity at the center of mass."""
-    forces = [(points, vectors) for vectors, _ in sheet.case.force_terms]
+    """Return arrows of forces, pressure and moments, and of gravity at the center of mass."""
+    case = sheet.case
+    vertices = len(sheet.pattern.vertices)
+    forces = [(points, vectors) for vectors, _ in case.force_terms]
+    pushed = [share for share in following.pressures(case) if share.value.any()]
+    pressure = [following.panel_arrows(case, points, share) for share in pushed]
+    told = iter([histories.describe_pressure(share) for share in pushed])
     gravity = [
         (_center_of_mass(sheet, points)[None], vector[None])
         for vector, _ in sheet.case.gravity_terms
     ]
     return [
-        *_arrows(forces, length, sight, style.LOAD, histories.describe_load),
+        *_arrows(forces, length, sight, style.LOAD, histories.describe_load, vertices),
+        *_arrows(pressure, length, sight, style.LOAD, lambda _: next(told)),
+        *_turns(sheet, points, length, sight),
         *_arrows(gravity, 1.5 * length, sight, style.GRAVITY, histories.describe_gravity),
     ]
+
+
+def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
+    """Return curved arrows of moments of creases."""
+    shares = following.moments(sheet.case)
+    if not shares:
+        return []
+    drawn = [
+        marks.arc_arrows(
+            following.crease_arcs(sheet.case, points, share, 0.6 * length), 0.22 * length, sight
+        )
+        for share in shares
+    ]
+    look = {"color": style.LOAD, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
+    keys = [style.key(histories.describe_moment(share), **look) for share in shares]
+    pieces, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    return [_Arrows(pieces, heads, style.LOAD, keys)]
 
 
 def _arrows(
@@ -200,13 +226,21 @@ def _arrows(
     sight: View,
     color: str,
     describe: Callable[[Points], str],
+    vertices: int | None = None,
 ) -> list[_Arrows]:
-    """Return arrows from points along vectors, both (k, 3) in each term, one key for each term."""
+    """Return arrows from points along vectors, both (k, 3) in each term, one key for each term.
+
+    vertices : of crowds of nodes beyond this number, those that stand too close have no arrow.
+    """
     terms = [(points, vectors) for points, vectors in terms if vectors.any()]
     if not terms:
         return []
+    how = length, sight
     longest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors in terms)
-    drawn = [marks.load_arrows(*term, longest, length, sight) for term in terms]
+    drawn = [
+        marks.load_arrows(at, marks.thinned(at, vectors, length, vertices), longest, *how)
+        for at, vectors in terms
+    ]
     look = {"color": color, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
     keys = [
         style.key(describe(vectors if len(vectors) > 1 else vectors[0]), **look)

@@ -1,0 +1,94 @@
+"""Loads that follow the sheet, as pictures show them: pressure by panels, moments by creases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn import mechanics
+from foldyn.cases import Case
+from foldyn.plots.scene import Points
+
+STEPS = 12  # of an arc
+NEAR, FAR = 0.15, 1.0  # rad, from a panel to the ends of an arc, at most
+
+
+class Share(NamedTuple):
+    """What acts on some panels (Pa) or creases (N m), with its history."""
+
+    numbers: NDArray[np.int64]
+    value: NDArray[np.float64]
+    history: Any
+
+
+def pressures(case: Case) -> list[Share]:
+    """Pressure on panels, one for each load."""
+    panel = dict(zip(_rows(case.structure.triangles), case.structure.triangle_panel, strict=True))
+    return [
+        _share([panel[row] for row in _rows(load.triangles)], load.pressure, False, history)
+        for load, history in case.following_terms
+        if len(load.pressure)
+    ]
+
+
+def moments(case: Case) -> list[Share]:
+    """Moments of whole creases, one for each load."""
+    pieces = case.structure.fold_pieces
+    fold = dict(zip(_rows(pieces.hinges), pieces.fold, strict=True))
+    return [
+        _share([fold[row] for row in _rows(load.hinges)], load.moment, True, history)
+        for load, history in case.following_terms
+        if len(load.moment)
+    ]
+
+
+def _rows(numbers: NDArray) -> Iterator[tuple[int, ...]]:
+    return map(tuple, numbers.tolist())
+
+
+def _share(numbers: list[int], values: NDArray, added: bool, history: Any) -> Share:
+    """Values of entries by panel or crease: their sum, or what all have in common."""
+    found, which = np.unique(numbers, return_inverse=True)
+    total = np.bincount(which, values)
+    return Share(found, total if added else total / np.bincount(which), history)
+
+
+def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:
+    """Middles of panels (k, 3) and the vectors (k, 3), Pa, of the pressure there."""
+    structure = case.structure
+    middles, vectors = [], []
+    for panel, pressure in zip(share.numbers, share.value, strict=True):
+        corners = points[structure.triangles[structure.triangle_panel == panel]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1)
+        middles.append(area @ corners.mean(axis=1) / area.sum())
+        along = normal.sum(axis=0)
+        vectors.append(pressure * along / np.linalg.norm(along))
+    return np.array(middles), np.array(vectors)
+
+
+def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Points:
+    """Arcs (m, STEPS, 3) about the middles of creases, two for each, that end at a head.
+
+    They lie on the front. Those of a positive moment point towards the panels, which it opens;
+    those of a negative one away from them.
+    """
+    pieces, arcs = case.structure.fold_pieces, []
+    for crease, moment in zip(share.numbers, share.value, strict=True):
+        own = pieces.hinges[pieces.fold == crease]
+        ends = points[own[:, :2]].reshape(-1, 3)
+        middle = own[np.linalg.norm(points[own[:, :2]].mean(1) - ends.mean(0), axis=1).argmin()]
+        j, k, i, _ = points[middle]
+        angle = float(mechanics.angles(points - points.mean(0), middle[None].astype(np.uint32))[0])
+        axis = (k - j) / np.linalg.norm(k - j)
+        wing = (i - j) - axis * ((i - j) @ axis)
+        wing = wing / np.linalg.norm(wing)
+        turn = np.linspace(max(NEAR, min(FAR, 0.45 * angle)), NEAR, STEPS)
+        turn = turn if moment > 0.0 else turn[::-1]
+        for way in (turn, angle - turn):
+            across = np.outer(np.cos(way), wing) + np.outer(np.sin(way), np.cross(axis, wing))
+            arcs.append(ends.mean(axis=0) + radius * across)
+    return np.array(arcs).reshape(-1, STEPS, 3)
