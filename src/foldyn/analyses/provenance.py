@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray
 
     from foldyn.analyses.casefile import CaseFile
+    from foldyn.cases import Case
 
 UNITS: Mapping[str, str] = {
     "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
@@ -38,6 +39,7 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
         ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
         *([["mesh", mesh]] if mesh else []),
         ["damping", _listed(_given(case.damping))],
+        *([["point masses", _point_masses(case)]] if case.masses else []),
         ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
     ]
     if command:
@@ -49,6 +51,14 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
     if case_file.text:
         sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
     return sections
+
+
+def _point_masses(case: Case) -> str:
+    """How much the point masses weigh, and on how many nodes."""
+    masses = case.point_masses
+    count = int((masses > 0.0).sum())
+    nodes = f"{count} node{'s' if count > 1 else ''}"
+    return f"{masses.sum():.6g} kg on {nodes}, of {case.total_mass:.6g} kg in all"
 
 
 def mesh_error(result: xarray.Dataset) -> str:

@@ -17,6 +17,7 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.springs import packed
+from foldyn.cases.straight import Straight
 from foldyn.cases.supports import AXES, SUPPORTS, BaseMotion, Fix, Impose, Spring, Support
 from foldyn.errors import Faults, InputError, within
 from foldyn.mechanics.attached import Springs
@@ -52,7 +53,8 @@ class Case:
     Attributes
     ----------
     fixed : ndarray of bool, shape (n, 3)
-        True where a node is held along an axis, by `Fix` or by `Impose`.
+        True where a node is held along an axis, by `Fix` or by `Impose`. Points of a mesh between
+        the ends of a clamped edge are held where both ends are.
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
     free_dofs, supported_dofs : ndarray of int64
@@ -191,11 +193,20 @@ class Case:
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
         """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
-        return read_only(self.imposed | self._held)
+        return read_only(self._straight.held())
 
     @cached_property
     def imposed(self) -> NDArray[np.bool_]:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
+        return read_only(self._straight.moved(self._stated))
+
+    @cached_property
+    def _straight(self) -> Straight:
+        return Straight(self.structure, self._stated | self._held)
+
+    @cached_property
+    def _stated(self) -> NDArray[np.bool_]:
+        """Whether an Impose names each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Impose):
             nodes, axis = self._nodes_of(place, support), AXES.index(support.axis)
@@ -207,7 +218,7 @@ class Case:
                         "contradictory support; leave out one of the two"
                     )
             mask[nodes, axis] = True
-        return read_only(mask)
+        return mask
 
     @cached_property
     def _held(self) -> NDArray[np.bool_]:
@@ -241,7 +252,7 @@ class Case:
         for place, support in self._supports(Impose):
             vector = np.zeros((len(self.structure.nodes), 3))
             vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
-            yield vector, support.history
+            yield self._straight.carried(vector), support.history
 
     @cached_property
     def base_terms(self) -> Terms:
@@ -260,7 +271,7 @@ class Case:
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield vector, support.history
+            yield self._straight.carried(vector), support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:
