@@ -39,6 +39,7 @@ def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[
         ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
         *([["mesh", mesh]] if mesh else []),
         ["damping", damping_text(case)],
+        *([["point masses", _point_masses(case)]] if case.masses else []),
         ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
     ]
     if command:
@@ -60,6 +61,14 @@ def damping_text(case: Case) -> str:
         parts.append(f"{name}: {_listed(_given(part))}" if part.key else _listed(_given(part)))
     parts += [f"dashpot: {_listed(_given(dashpot))}" for _, dashpot in case.dashpots]
     return "; ".join(parts)
+
+
+def _point_masses(case: Case) -> str:
+    """How much the point masses weigh, and on how many nodes."""
+    masses = case.point_masses
+    count = int((masses > 0.0).sum())
+    nodes = f"{count} node{'s' if count > 1 else ''}"
+    return f"{masses.sum():.6g} kg on {nodes}, of {case.total_mass:.6g} kg in all"
 
 
 def mesh_error(result: xarray.Dataset) -> str:

@@ -19,6 +19,7 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.springs import packed
+from foldyn.cases.straight import Straight
 from foldyn.cases.supports import (
     AXES,
     SUPPORTS,
@@ -68,7 +69,8 @@ class Case(Damped):
     rayleigh, modal_damping, crease_damping, dashpots, damped
         See `Damped`.
     fixed : ndarray of bool, shape (n, 3)
-        True where a node is held along an axis, by `Fix` or by `Impose`.
+        True where a node is held along an axis, by `Fix` or by `Impose`. Points of a mesh between
+        the ends of a clamped edge are held where both ends are.
     imposed : ndarray of bool, shape (n, 3)
         True where an `Impose` moves a node along an axis.
     constraints : Constraints
@@ -219,11 +221,20 @@ class Case(Damped):
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
         """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
-        return read_only(self.imposed | self._held)
+        return read_only(self._straight.held())
 
     @cached_property
     def imposed(self) -> NDArray[np.bool_]:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
+        return read_only(self._straight.moved(self._stated))
+
+    @cached_property
+    def _straight(self) -> Straight:
+        return Straight(self.structure, self._stated | self._held)
+
+    @cached_property
+    def _stated(self) -> NDArray[np.bool_]:
+        """Whether an Impose names each node along each axis, shape (n, 3)."""
         mask = np.zeros((len(self.structure.nodes), 3), dtype=bool)
         for place, support in self._supports(Impose):
             if support.axis is None:
@@ -237,7 +248,7 @@ class Case(Damped):
                         "contradictory support; leave out one of the two"
                     )
             mask[nodes, axis] = True
-        return read_only(mask)
+        return mask
 
     @cached_property
     def _held(self) -> NDArray[np.bool_]:
@@ -288,7 +299,8 @@ class Case(Damped):
             vector = np.zeros((len(self.structure.nodes), 3))
             if support.axis is not None:
                 vector[self._nodes_of(place, support), AXES.index(support.axis)] = support.value
-            yield self._tied(vector, place, {place: support.value}), support.history
+            moved = self._straight.carried(vector)
+            yield self._tied(moved, place, {place: support.value}), support.history
 
     def _tied(self, shape: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
         """Displacements (n, 3), m, when supports move as in a shape and by values along theirs."""
@@ -317,7 +329,7 @@ class Case(Damped):
                 )
             vector = np.zeros(base.shape)
             vector[base[:, axis], axis] = support.value
-            yield self._tied(vector, place, along), support.history
+            yield self._tied(self._straight.carried(vector), place, along), support.history
 
     @cached_property
     def actuation_terms(self) -> Terms:

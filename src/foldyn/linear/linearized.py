@@ -28,7 +28,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.sparse import linalg
 from scipy.special import gamma, hyp2f1
 
 from foldyn.algebra.solvers import check_fill

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
+from foldyn.mechanics.attached_body import GROUP
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
 from foldyn.shells.body import GROUPS as OF_SHELLS
@@ -23,6 +24,7 @@ PARTS: Mapping[str, tuple[str, str]] = {
     "strain_bends": ("bends", style.PURPLE),
     "strain_bending": ("bending", style.PURPLE),
     "strain_folds": ("folds", style.GREEN),
+    GROUP: ("springs", style.SKY),
 }
 """Names and colors of strain energies, stacked in this order from the bottom up: folds on top."""
 _NONE = 1e-9  # of the largest energy: below it there is nothing to share
@@ -30,7 +32,8 @@ _NONE = 1e-9  # of the largest energy: below it there is nothing to share
 
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
     """Parts of the strain energy of a result, in the order of its structure."""
-    return tuple(OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES)
+    own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
+    return (*own, *([GROUP] if GROUP in result else []))
 
 
 def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
@@ -116,8 +119,8 @@ def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     Returns
     -------
     dict of str to ndarray, shape (steps,)
-        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", each from 0
-        to 1.
+        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", and
+        "springs" if there are any, each from 0 to 1.
     """
     check_path(path, "path")
     energies = _stacked(path)

@@ -17,6 +17,7 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import following, marks, scene, style
 from foldyn.plots import loads as histories
+from foldyn.plots.attachments import attachments
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure
@@ -49,12 +50,12 @@ def draw_structure(
     supports : bool
         Mark held and moved nodes: one triangle per direction, and the names of the directions. An
         arrow from each node with an imposed displacement, and one from the middle of a moving
-        base.
+        base. Springs are zigzags, clamped edges are hatched.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         one from each panel under pressure, two about each crease with a moment, towards the panels
         where it opens them, and one from the center of mass along gravity. Actuated creases are
-        highlighted.
+        highlighted, and point masses are dots.
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float
@@ -89,13 +90,14 @@ def draw_structure(
     length = min(0.17 * size, 0.8 * edge)
     arrows = _motions(sheet, points, length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
+    attached = attachments(sheet, points, marked, sight, supports, loads)
     triangles = np.concatenate([group.triangles for group in groups] or [np.zeros((0, 3, 3))])
     heads = np.concatenate([group.heads for group in arrows] or [np.zeros((0, 3, 3))])
     shafts = np.concatenate([group.shafts for group in arrows] or [np.zeros((0, 2, 3))])
 
     # The names of the held directions stand beyond the triangles' feet.
     feet = triangles[:, :1] + 1.6 * (triangles - triangles[:, :1])
-    everything = [points, feet.reshape(-1, 3), heads.reshape(-1, 3)]
+    everything = [points, feet.reshape(-1, 3), heads.reshape(-1, 3), attached.points]
     if numbers:  # room for the labels above the highest nodes
         everything.append(points + np.array([0.0, 0.0, 0.06 * size]))
     keys: list[Any] = []
@@ -104,6 +106,7 @@ def draw_structure(
         keys += rest_keys(scale)
     keys += edge_keys(sheet, elements, loads)
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
+    keys += attached.keys
     keys += [key for group in arrows for key in group.keys]
 
     columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
@@ -112,6 +115,7 @@ def draw_structure(
     if displacement is not None:
         add_undeformed(axes, sheet)
     DrawnSheet(axes, sheet, points, sight, elements, loads)
+    attached.draw(axes)
     for group in groups:
         marks.add_triangles(axes, group.triangles, group.color, 6.0)
     for group in arrows:

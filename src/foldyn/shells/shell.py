@@ -207,6 +207,12 @@ class Shell(Discretized):
         return read_only(np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1))
 
     @cached_property
+    def clamped_nodes(self) -> tuple[NDArray, ...]:
+        """Nodes along each clamped edge, from its lower to its higher vertex."""
+        rows = {(int(row[0]), int(row[-1])): row for row in self.edge_nodes}
+        return tuple(rows[edge] for edge in self.options.clamped)
+
+    @cached_property
     def bars(self) -> NDArray:
         """Sides of the triangles (nb, 2), each once."""
         tri = self.triangles

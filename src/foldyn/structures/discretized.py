@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self, cast
@@ -78,6 +78,8 @@ class Discretized:
         Its dofs without mass, "the rotations of a shell"; empty if it has none.
     fill : Fill
         Memory of the factors of its tangent.
+    clamped_nodes : sequence of (k,)
+        Nodes along each clamped edge of a mesh, from one end to the other.
     as_made : bool
         Whether `discretize`, or the function of its model, made it and would make it again from
         pattern, sheet and options. `dataclasses.replace` does not pass it on.
@@ -99,6 +101,7 @@ class Discretized:
     energy_groups: ClassVar[Mapping[str, str]]
     kind: ClassVar[str]
     massless: ClassVar[str] = ""
+    clamped_nodes: Sequence[NDArray] = ()
     as_made: bool = False
     plates: tuple[Plate, ...] = ()
 

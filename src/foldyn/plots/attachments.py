@@ -1,0 +1,146 @@
+"""Marks of what is attached to a sheet: springs, clamped edges, point masses."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d import Axes3D
+
+from foldyn.cases.springs import spring_directions, spring_ends
+from foldyn.cases.supports import Spring
+from foldyn.patterns.topology import around, edge_of
+from foldyn.plots import scene, style
+from foldyn.plots.scene import Points, Sheet3D, View
+
+_TURNS = (4, 14)  # of a zigzag, at least and at most
+_LEAD = 0.2  # straight parts of a zigzag at its ends, as a share of its length
+_HATCHES = 8  # of a clamped edge
+
+
+class Attachments(NamedTuple):
+    """Marks of a case.
+
+    Attributes
+    ----------
+    springs, hatches : ndarray, shapes (k, p, 3), (k, 2, 3)
+        Lines of springs and of clamped edges.
+    masses : ndarray, shape (k, 3)
+        Where point masses are.
+    sizes : ndarray, shape (k,)
+        Of their dots, points.
+    keys : list
+        Legend entries.
+    """
+
+    springs: list[Points]
+    hatches: Points
+    masses: Points
+    sizes: Points
+    keys: list[Any]
+
+    @property
+    def points(self) -> Points:
+        """All points that the picture must have room for (k, 3)."""
+        return np.concatenate([*self.springs, self.hatches.reshape(-1, 3), self.masses])
+
+    def draw(self, axes: Axes3D) -> None:
+        """Draw them."""
+        for line in self.springs:
+            scene.add_segments(axes, line[None], style.SPRING, 1.1, zorder=6.5)
+        if len(self.hatches):
+            scene.add_segments(axes, self.hatches, style.SUPPORT, 1.3, zorder=6.2)
+        for size in np.unique(self.sizes):
+            look: dict[str, Any] = {"color": style.MASS, "markersize": size, "zorder": 8.0}
+            axes.plot(*self.masses[self.sizes == size].T, "o", markeredgecolor="white", **look)
+
+
+def attachments(
+    sheet: Sheet3D, points: Points, size: float, view: View, supports: bool, loads: bool
+) -> Attachments:
+    """Marks of a case at node positions (n, 3).
+
+    size : length of a support's mark, m.
+    supports, loads : whether springs and clamps, and whether masses are shown.
+    """
+    case, keys, springs = sheet.case, [], []
+    hatches, masses, sizes = np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros(0)
+    clamped = getattr(sheet.structure.options, "clamped", ()) if supports else ()
+    if clamped:
+        hatches = _hatched(sheet, points, clamped, 0.7 * size)
+        look = {"facecolor": "white", "edgecolor": style.SUPPORT, "hatch": "////", "linewidth": 0.0}
+        keys.append(Patch(label="clamped edge", **look))
+    if supports and case is not None:
+        for i, part in enumerate(case.supports):
+            if isinstance(part, Spring):
+                springs += _of_part(sheet, points, part, f"supports[{i}]", size, view)
+    if springs:
+        keys.append(style.key("spring", color=style.SPRING, linewidth=1.1))
+    if loads and case is not None and case.masses:
+        there = np.flatnonzero(case.point_masses)
+        masses, own = points[there], case.point_masses[there]
+        sizes = np.round(4.0 + 5.0 * np.cbrt(own / own.max()), 1)
+        span = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (own.min(), own.max())))
+        look = {"color": style.MASS, "marker": "o", "linestyle": "none", "markersize": 7.0}
+        keys.append(style.key(f"point mass, {span} kg", **look))
+    return Attachments(springs, hatches, masses, sizes, keys)
+
+
+def _of_part(
+    sheet: Sheet3D, points: Points, spring: Spring, place: str, size: float, view: View
+) -> list[Points]:
+    """Zigzags of a part's springs."""
+    axes, lines = spring_directions(spring), []
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    for a, b in spring_ends(sheet.structure, spring, place).tolist():
+        if b >= 0:
+            lines.append(_zigzag(points[a], points[b], 0.3 * size, view))
+            continue
+        for axis in np.zeros((0, 3)) if axes is None else axes:
+            outside = axis if axis @ (points[a] - middle) > 0.05 * size and not axis[2] else -axis
+            foot = points[a] + 1.5 * size * outside * (np.sign(axis[2]) or 1.0)
+            lines.append(_zigzag(points[a], foot, 0.3 * size, view))
+            lines.append(_ground(points[a], foot, size, view))
+    return lines
+
+
+def _across(line: Points, view: View) -> Points:
+    """Unit vector on the screen across a line."""
+    across = np.cross(view.basis[2], line)
+    length = np.linalg.norm(across)
+    return across / length if length > 1e-9 * np.linalg.norm(line) else view.basis[0]
+
+
+def _zigzag(start: Points, end: Points, width: float, view: View) -> Points:
+    """A spring (p, 3) from one point to another."""
+    line = end - start
+    turns = int(np.clip(np.linalg.norm(line) / width, *_TURNS))
+    inner = _LEAD + (1.0 - 2.0 * _LEAD) * np.arange(2 * turns + 1) / (2 * turns)
+    offset = np.where(np.arange(2 * turns + 1) % 2, 0.5, -0.5)
+    offset[[0, -1]] = 0.0
+    share = np.concatenate([[0.0], inner, [1.0]])
+    offset = np.concatenate([[0.0], offset, [0.0]])
+    return start + share[:, None] * line + width * offset[:, None] * _across(line, view)
+
+
+def _ground(start: Points, foot: Points, size: float, view: View) -> Points:
+    """The line on which a spring stands."""
+    across = 0.35 * size * _across(foot - start, view)
+    return np.array([foot - across, foot + across])
+
+
+def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
+    """Hatches outside of clamped edges."""
+    faces = {edge_of(a, b): face for face in sheet.pattern.faces for a, b in around(face)}
+    lines = []
+    for a, b in edges:
+        along = points[b] - points[a]
+        unit = along / np.linalg.norm(along)
+        inward = points[list(faces[edge_of(a, b)])].mean(axis=0) - points[a]
+        outward = -(inward - (inward @ unit) * unit)
+        outward *= size / np.linalg.norm(outward)
+        for share in np.linspace(0.0, 1.0, _HATCHES):
+            start = points[a] + share * along
+            lines.append([start, start + outward - 0.5 * size * unit])
+    return np.array(lines).reshape(-1, 2, 3)
