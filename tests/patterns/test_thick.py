@@ -172,3 +172,9 @@ TOUCH = fd.Pattern(
 def test_what_cannot_be_thick(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_fold_file_of_thick_panels_warns():
+    with pytest.warns(fd.errors.FoldynWarning, match="no place for the thickness"):
+        text = fd.formats.fold.write(fd.thicken(strip(2, fold_angle=30), T))
+    assert '"edges_foldAngle"' in text

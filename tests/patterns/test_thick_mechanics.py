@@ -34,12 +34,21 @@ def test_mass_center_and_inertia_of_a_board_about_its_hinge(model):
 
 
 def test_inertia_of_an_accordion_about_all_axes():
-    """That of boards of width w, thickness t, but for the two that turn about x and z: see docs."""
+    """Moments of boards of width w, length b and thickness t, all three exact."""
     s = make("n5b8", fd.thicken(strip(4), T), mass="consistent")
-    along_y = 4 * MASS * (W**2 + T**2) / 12 + MASS * 2 * (0.5**2 + 1.5**2)
-    assert s.inertia[1, 1] == pytest.approx(along_y, rel=1e-12)
-    along_x = 4 * MASS * (B**2 + T**2) / 12
-    assert s.inertia[0, 0] == pytest.approx(along_x, rel=1e-12)
+    apart = MASS * 2 * (0.5**2 + 1.5**2)
+    wanted = [B**2 + T**2, W**2 + T**2, W**2 + B**2] * np.array(4 * MASS / 12)
+    np.testing.assert_allclose(np.diag(s.inertia), wanted + np.array([0, apart, apart]), rtol=1e-12)
+
+
+def test_what_a_tilted_plane_adds_to_the_inertia_of_one_board():
+    """A product m w t / 12 of the axes across the hinge, which the board itself does not have."""
+    weightless = fd.PanelSheet([1], density=1e-12 * RHO)
+    s = make("n5b8", fd.thicken(strip(2), T), fd.Sheet(1e8, 0.3, T, RHO, panels=[weightless]),
+             mass="consistent")  # fmt: skip
+    wanted = np.diag([B**2 + T**2, W**2 + T**2, W**2 + B**2]) * MASS / 12
+    wanted[0, 2] = wanted[2, 0] = -MASS * W * T / 12
+    np.testing.assert_allclose(s.inertia, wanted, atol=1e-9)
 
 
 def test_both_hinges_in_one_face_leave_the_mass_there():
