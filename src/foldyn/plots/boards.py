@@ -51,18 +51,19 @@ def draw_boards(
     Raises
     ------
     InputError
-        The panels are not thick, or the displacement has another shape.
+        The panels are not thick, or the displacement has another shape or is not finite.
     """
     sheet = Sheet3D.of(case_or_structure)
     pattern = sheet.pattern
     if pattern is None or pattern.boards is None:
         raise InputError("case_or_structure: its panels are not thick; see foldyn.thicken")
-    moved = np.zeros((1, *sheet.nodes.shape)) if displacement is None else np.array(displacement)
-    moved = moved[None] if moved.ndim == 2 else moved
-    if moved.ndim != 3 or moved.shape[1:] != sheet.nodes.shape:
+    still = np.zeros(sheet.nodes.shape)
+    given = still if displacement is None else np.array(displacement, dtype=np.float64)
+    moved: Points = given[None] if given.ndim == 2 else given
+    if moved.ndim != 3 or moved.shape[1:] != still.shape or not np.isfinite(moved).all():
         raise InputError(
-            f"displacement: shape {np.shape(displacement)}; give {sheet.nodes.shape} for one "
-            "state, with the number of states in front for several"
+            f"displacement: shape {given.shape}; give {still.shape} for one state, with the "
+            "number of states in front for several, all finite"
         )
     texts = [*captions, *[""] * (len(moved) - len(captions))]
     solid = _solid(pattern)
