@@ -67,7 +67,7 @@ from foldyn.materials import (
     EnhancedLinear as EnhancedLinear,
     HingeLaw as HingeLaw,
 )
-from foldyn.patterns import Pattern as Pattern
+from foldyn.patterns import Pattern as Pattern, thicken as thicken
 from foldyn.results import (
     Quantity as Quantity,
     case_of as case_of,

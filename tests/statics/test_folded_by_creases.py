@@ -36,7 +36,7 @@ def test_a_miura_driven_to_compatible_angles(model, to):
         load_factors=np.linspace(0.1, 1, 10),
     )
     moved = structure.nodes + path.displacement.to_numpy()[-1]
-    np.testing.assert_allclose(distances(moved[:9]), distances(end.vertices), rtol=2e-6)
+    np.testing.assert_allclose(distances(moved[:9]), distances(end.vertices), rtol=1e-9)
     names = [name for name in path.data_vars if name.startswith("strain_")]
     halfway = sum(float(path[name][4]) for name in names)
     assert halfway > 0.0  # between, the angles are not compatible
@@ -66,7 +66,7 @@ def test_a_fold_that_goes_half_way(model, given):
         load_factors=[0.5, 1.0],
     )
     moved = structure.nodes + path.displacement.to_numpy()[-1]
-    assert np.linalg.norm(moved[4] - moved[0]) == pytest.approx(np.sqrt(2.0), rel=1e-7)
+    assert np.linalg.norm(moved[4] - moved[0]) == pytest.approx(np.sqrt(2.0), rel=1e-9)
 
 
 @pytest.mark.parametrize(("model", "method"), [("n5b8", "rk4"), ("n5b8", "newmark"),
@@ -79,6 +79,6 @@ def test_a_motion_that_ends_folded_half_way(model, method):
     case = fd.Case(structure, loads=[fold], damping=fd.Rayleigh(alpha=40.0))
     motion = fd.simulate(case, 0.8, method, every=0.1)
     moved = structure.nodes + motion.displacement.to_numpy()[-1]
-    assert np.linalg.norm(moved[4] - moved[0]) == pytest.approx(np.sqrt(2.0), rel=1e-3)
+    assert np.linalg.norm(moved[4] - moved[0]) == pytest.approx(np.sqrt(2.0), rel=2e-6)
     assert float(motion.work.max()) > 0.0
-    assert motion.attrs["energy_error"] < (1e-5 if method == "rk4" else 3e-3)
+    assert motion.attrs["energy_error"] < (1e-10 if method == "rk4" else 2e-5)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from foldyn.materials.law import Law
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
+from foldyn.structures import PanelSheet
 from foldyn.values import plain
 
 if TYPE_CHECKING:
@@ -101,5 +102,10 @@ def _written(value: Any) -> str:
         given = _given(value) if is_dataclass(value) else {}
         given.pop("name", None)
         return f"{value.name} ({_listed(given)})" if given else value.name
-    text = f"{value:.6g}" if isinstance(value, float) else str(plain(value))
+    if isinstance(value, Mapping):
+        return ", ".join(f"{word} {number:.6g}" for word, number in value.items())
+    if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):
+        text = ", ".join(f"{_written(part.panels)} with {_listed(part.own)}" for part in value)
+    else:
+        text = f"{value:.6g}" if isinstance(value, float) else str(plain(value))
     return text if len(text) <= MOST else f"{text[: MOST - 4]} ..."

@@ -16,14 +16,15 @@ from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.registry import ANALYSES, schema_of
+from foldyn.analyses.sections import FACES, HINGES
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.formats import read_pattern
 from foldyn.input_files import from_toml, read_text
-from foldyn.patterns import GENERATORS, Pattern
-from foldyn.structures import sheet_from
+from foldyn.patterns import GENERATORS, Pattern, thicken
+from foldyn.structures import Sheet, sheet_from
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
 MOST_MIB = 2
@@ -130,6 +131,9 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         pattern = _pattern(schema.pattern, path.parent)
     with faults.collected():
         sheet = sheet_from(schema.sheet.model_dump())
+    if HINGES in schema.pattern and not faults.found:
+        with faults.collected():
+            pattern = _thick(pattern, sheet, schema.pattern[HINGES])
     if schema.sheet.density is None and kind.needs_density and not schema.masses:
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
@@ -223,7 +227,7 @@ def _values(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str | int, ...]
 
 def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
     if "kind" in table:
-        arguments = {name: value for name, value in table.items() if name != "kind"}
+        arguments = {name: table[name] for name in table if name not in ("kind", HINGES)}
         with within("pattern"):
             return call_from(GENERATORS[table["kind"]], arguments)
     if "file" in table:
@@ -231,6 +235,16 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
             return read_pattern(folder / table["file"])
     with within("pattern: "):
         return Pattern(table["vertices"], table["faces"], table.get("assignments"))
+
+
+def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:
+    """The pattern with panels of the sheet's thickness, hinged at some height."""
+    thickness = sheet.values("thickness", len(pattern.faces))
+    try:
+        return thicken(pattern, thickness.tolist(), None if offset == FACES else offset)
+    except InputError as error:
+        own = {"offsets": f"pattern.{HINGES}", "thickness": "sheet.thickness"}
+        raise InputError(error.reason, own.get(error.key, "pattern")) from None
 
 
 def _check_vertices(schema: Any, count: int) -> None:

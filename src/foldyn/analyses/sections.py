@@ -39,6 +39,8 @@ from foldyn.structures.plate import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 
+HINGES, FACES = "hinge_offset", "faces"
+"""Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
@@ -92,14 +94,21 @@ def _pattern(value: Any) -> dict[str, Any]:
     if "kind" in value:
         _check_generator(value)
     elif "file" in value:
-        check_keys(value, ["file"])
+        check_keys(value, ["file", HINGES])
         if not isinstance(value["file"], str) or not value["file"]:
             raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
     else:
-        check_keys(value, ["vertices", "faces", "assignments"])
+        check_keys(value, ["vertices", "faces", "assignments", HINGES])
         if "faces" not in value:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
+    if HINGES in value and value[HINGES] != FACES:
+        if isinstance(value[HINGES], str):
+            raise InputError(
+                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one or one per crease',
+                f".{HINGES}",
+            )
+        number_or_list(f".{HINGES}", value[HINGES], "crease")
     return dict(value)
 
 
@@ -111,7 +120,7 @@ def _check_generator(value: Mapping[str, Any]) -> None:
     meant = nearest(kind, GENERATORS) if isinstance(kind, str) else None
     if meant is not None:
         with faults.collected():
-            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind"])
+            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind", HINGES])
     faults.tell()
 
 

@@ -28,7 +28,7 @@ from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
-from foldyn.patterns import Pattern
+from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize, sheet_from
 from foldyn.values import plain
 
@@ -139,6 +139,15 @@ class _Writer:
                 "face_offsets", np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
             ),
             "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
+            **self._boards(pattern.boards),
+        }
+
+    def _boards(self, boards: Boards | None) -> dict[str, Any]:
+        if boards is None:
+            return {}
+        return {
+            "board_corners": self._store("board_corners", boards.corners),
+            "board_thickness": self._store("board_thickness", boards.thickness),
         }
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
@@ -244,7 +253,10 @@ def _structure(sections: Mapping[str, Any]) -> Any:
     nodes = sections["nodes"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        pattern = Pattern(table["vertices"], faces, letters, table["name"])
+        boards = None
+        if "board_corners" in table:
+            boards = Boards(table["face_offsets"], table["board_corners"], table["board_thickness"])
+        pattern = Pattern(table["vertices"], faces, letters, table["name"], boards)
         sheet = sheet_from(sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
         least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)

@@ -1,7 +1,8 @@
 """How far actuated creases fold: by dihedral, by fold angle, or by a fraction of fully folded.
 
-The fold angle is that of the FOLD format, 180 degrees less the dihedral: 0 where the panels are
-flat, positive for a valley, negative for a mountain, 180 or -180 degrees where it is closed.
+The fold angle is that of the FOLD format: 0 where the panels are flat, positive for a valley,
+negative for a mountain, 180 or -180 degrees where it is closed. It is the dihedral of the flat
+panels less the dihedral: 180 degrees less it, but for thick panels (`Pattern.flat_dihedrals`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from foldyn.values import number, number_or_list, show
 
 SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
 """Sign of the fold angle of each assignment."""
+ROUNDING = 1e-9  # degrees
 Angles = float | tuple[float, ...]
 
 
@@ -63,26 +65,39 @@ def dihedrals(
     fraction: float | None,
     assigned: bool,
     letters: NDArray[np.str_],
+    flat: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Dihedrals (degrees) of creases with some `letters` (nc,); one of the first three is given.
+    """Dihedrals (degrees) of creases (nc,); one of the first three is given.
 
+    letters, flat : their assignments, and their dihedrals (degrees) where the panels are flat.
     assigned : whether the creases were chosen by their assignment, so that one fold angle for all
         of them is a size, and each folds the way it is assigned.
     """
     if angle is not None:
         return _each("angle", angle, len(letters))
     if fraction is not None:
-        return 180.0 - 180.0 * fraction * _signs("fraction", letters)
+        return flat - 180.0 * fraction * _signs("fraction", letters)
     folded = _each("fold_angle", fold_angle, len(letters))
     if not assigned or isinstance(fold_angle, tuple):
-        return 180.0 - folded
+        return flat - folded
     if folded[0] < 0.0:
         raise InputError(
             f" = {folded[0]:g}: is a size for creases chosen by assignment, each of which folds "
             "its own way; give at least 0",
             "fold_angle",
         )
-    return 180.0 - folded * _signs("fold_angle", letters)
+    return flat - folded * _signs("fold_angle", letters)
+
+
+def within_reach(angles: NDArray[np.float64], creases: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Dihedrals (degrees) from 0 to 360, rounding apart, as thick panels may leave them."""
+    beyond = creases[(angles < -ROUNDING) | (angles > 360.0 + ROUNDING)]
+    if beyond.size:
+        raise InputError(
+            f": crease {beyond[0]} cannot fold that far: its thick panels are hinged on the other "
+            "side; fold it less, or give its hinge another offset",
+        )
+    return np.clip(angles, 0.0, 360.0)
 
 
 def _each(name: str, value: Any, count: int) -> NDArray[np.float64]:

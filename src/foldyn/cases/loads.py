@@ -17,6 +17,7 @@ from foldyn.cases.folding import (
     check_fold_angles,
     check_fraction,
     dihedrals,
+    within_reach,
 )
 from foldyn.cases.following_loads import CreaseMoment, Pressure
 from foldyn.cases.history import History, as_history
@@ -188,14 +189,16 @@ class Actuate(Load):
         with within(f"{place}."):
             angles = dihedrals(
                 cast(Any, self.angle), cast(Any, self.fold_angle), cast(Any, self.fraction),
-                isinstance(self.creases, str), _letters(structure, creases),
+                isinstance(self.creases, str), *_of_creases(structure, creases),
             )  # fmt: skip
+        name = next(name for name in FOLDED if getattr(self, name) is not None)
+        with within(f"{place}.{name}"):
+            angles = within_reach(angles, creases)
         closed = angles[(angles == 0.0) | (angles == 360.0)]
         if closed.size and not structure.fold_law.closed_at_rest:
             shut = float(closed[0])
             turned = 180.0 - shut if isinstance(self.fold_angle, tuple) else self.fold_angle
             said = {"angle": shut, "fold_angle": turned, "fraction": self.fraction}
-            name = next(name for name in said if getattr(self, name) is not None)
             raise InputError(
                 f"{place}.{name} = {said[name]:g}: this fold law, free of stress at rest, has an "
                 "infinite moment there; give a dihedral between 0 and 360 degrees (flat: 180), or "
@@ -212,11 +215,13 @@ FOLDED: Mapping[str, Callable[[str, Any], Any]] = {
 """Arguments of `Actuate` that say how far creases fold, and their checks."""
 
 
-def _letters(structure: Any, creases: NDArray[np.int64]) -> NDArray[np.str_]:
-    """Assignments of creases; unassigned without a pattern."""
-    pattern = structure.pattern
-    letters = "U" * len(structure.folds) if pattern is None else pattern.assignments
-    return np.array(list(letters), dtype="<U1")[creases]
+def _of_creases(structure: Any, creases: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+    """Assignments of creases, and their dihedrals (degrees) where the panels are flat."""
+    pattern, count = structure.pattern, len(structure.folds)
+    if pattern is None:
+        return np.full(count, "U")[creases], np.full(count, 180.0)[creases]
+    letters = np.array(pattern.assignments, dtype="<U1")
+    return letters[creases], np.degrees(pattern.flat_dihedrals)[creases]
 
 
 LOADS: tuple[type[Load], ...] = (

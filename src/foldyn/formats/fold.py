@@ -96,6 +96,13 @@ def write(pattern: Pattern) -> str:
         JSON with vertices (two coordinates when all z are 0), faces, edges, their assignment
         and fold angle (180 minus the dihedral, degrees; 0 on the boundary), in meters.
     """
+    if pattern.boards is not None:
+        warnings.warn(
+            "pattern: the file has no place for the thickness of its panels and holds the planes "
+            "through their hinge lines; write the thin pattern, and thicken what is read",
+            FoldynWarning,
+            stacklevel=4,
+        )
     flat = not np.any(pattern.vertices[:, 2])
     folded = bool(np.any(np.abs(pattern.dihedrals - np.pi) > 1e-6)) or not flat
     row = edge_lookup(pattern.creases)
@@ -103,7 +110,7 @@ def write(pattern: Pattern) -> str:
     cuts = {edge for pair in pairs for edge in pair}
     edges = [edge_of(a, b) for a, b in pattern.edges.tolist()]
     rows = [row.get(edge) for edge in edges]
-    angles = 180.0 - np.degrees(pattern.dihedrals)
+    angles = 180.0 - np.degrees(pattern.dihedrals) + np.degrees(pattern.flat_dihedrals - np.pi)
     fields: dict[str, Any] = {
         "file_spec": 1.1,
         "file_creator": "Foldyn",

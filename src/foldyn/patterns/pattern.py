@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.patterns.boards import Boards
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
 from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup, edge_of
 from foldyn.values import LONGEST, SHORTEST
@@ -40,6 +41,8 @@ class Pattern:
         get the letter of their dihedral.
     name : str
         What to call the pattern.
+    boards : Boards, optional
+        The boards that thick panels stand for; see `thicken`.
 
     Attributes
     ----------
@@ -57,6 +60,9 @@ class Pattern:
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide the
         letter decides between 0 and 2 pi (0 without one).
+    flat_dihedrals : ndarray, shape (nc,)
+        Dihedral (rad) at which the two panels lie flat: pi, but of thick panels, whose boards lie
+        askew to the planes through their hinge lines.
     face_areas : ndarray, shape (m,)
         Areas (m2).
     face_normals : ndarray, shape (m, 3)
@@ -86,12 +92,14 @@ class Pattern:
     faces: tuple[tuple[int, ...], ...]
     assignments: tuple[str, ...]
     name: str
+    boards: Boards | None
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
     boundary: NDArray[np.int64] = field(init=False)
     crease_faces: NDArray[np.int64] = field(init=False)
     dihedrals: NDArray[np.float64] = field(init=False)
+    flat_dihedrals: NDArray[np.float64] = field(init=False)
     face_areas: NDArray[np.float64] = field(init=False)
     face_normals: NDArray[np.float64] = field(init=False)
     face_planarity: NDArray[np.float64] = field(init=False)
@@ -103,6 +111,7 @@ class Pattern:
         faces: Sequence[Sequence[int]] | NDArray[np.integer],
         assignments: Mapping[tuple[int, int], str] | Sequence[str] | None = None,
         name: str = "",
+        boards: Boards | None = None,
     ) -> None:
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
@@ -110,20 +119,27 @@ class Pattern:
         topology = build_topology(checked_faces(faces, len(points)), len(points))
         geometry = face_geometry(points, topology.faces)
         normals = geometry.face_normals
-        dihedrals, closed = crease_dihedrals(
-            points, normals, topology.creases, topology.crease_faces
-        )
+        graph = topology.creases, topology.crease_faces
+        dihedrals, closed = crease_dihedrals(points, normals, *graph)
         given, open_edges = _given_letters(assignments, topology.creases, topology.boundary)
         dihedrals[closed & (given == "M")] = 2 * np.pi
-        _warn_of_contradictions(given, topology.creases, dihedrals)
+        apart, flat = dihedrals, np.full(len(dihedrals), np.pi)
+        if boards is not None:
+            boards.check(topology.faces)
+            apart, closed = crease_dihedrals(points, boards.normals, *graph)
+            apart[closed & (given == "M")] = 2 * np.pi
+            flat = np.pi + dihedrals - apart
+        _warn_of_contradictions(given, topology.creases, apart)
         _warn_of_seams(seams(points, topology.faces, normals, topology.boundary), open_edges)
         values: dict[str, Any] = {
             **topology._asdict(),
             **geometry._asdict(),
             "vertices": points,
-            "assignments": tuple(np.where(given == "", _letters(dihedrals), given).tolist()),
+            "assignments": tuple(np.where(given == "", _letters(apart), given).tolist()),
             "name": name,
+            "boards": boards,
             "dihedrals": dihedrals,
+            "flat_dihedrals": flat,
             "size": float(np.linalg.norm(np.ptp(points, axis=0))),
         }
         for key, value in values.items():

@@ -1,6 +1,7 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
+from foldyn.plots.boards import draw_boards as draw_boards
 from foldyn.plots.energies import (
     energy_shares as energy_shares,
     plot_energies as plot_energies,

@@ -24,6 +24,8 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 """Numbers of nodes: an edge or a triangle in each row."""
 PAPER = "#F2DFB8"
+PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
+"""Colors of panels that differ from the rest of the sheet, by turns."""
 WIDTH = 7.0
 """Width of a figure, in inches."""
 # Margins around the seen box, and its largest height, in inches.
@@ -115,6 +117,20 @@ class Sheet3D:
     def highlights(self) -> bool:
         """Whether to highlight actuated creases: all of them would say nothing and hide panels."""
         return len(self.actuated) < len(self.pattern.creases)
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """Kinds of panels that differ from the rest of the sheet."""
+        return getattr(getattr(self.structure, "sheet", None), "panels", ())
+
+    @cached_property
+    def paper(self) -> NDArray[np.float64]:
+        """Color of each triangle (nt, 3): panels that differ from the sheet have their own."""
+        color = np.tile(to_rgb(PAPER), (len(self.triangles), 1))
+        for number, part in enumerate(self.parts):
+            own = np.isin(self.structure.triangle_panel, part.panels)
+            color[own] = to_rgb(PAPERS[number % len(PAPERS)])
+        return color
 
     def check_nodes(self, result: str, moved: Points, done: str = "computed") -> None:
         """Refuse displacements (..., n, 3) of another number of nodes."""
@@ -259,15 +275,21 @@ def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
     return ticks
 
 
-def shades(vertices: Points, triangles: Indices, color: str = PAPER) -> NDArray[np.float64]:
-    """Return a color per triangle, darker where it faces away from the light, shape (nt, 3)."""
+def shades(
+    vertices: Points, triangles: Indices, color: str | NDArray[np.float64] = PAPER
+) -> NDArray[np.float64]:
+    """Return a color per triangle, darker where it faces away from the light, shape (nt, 3).
+
+    color : of all triangles, or of each (nt, 3).
+    """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
     normals /= np.where(length > 0.0, length, 1.0)[:, None]
     # Both faces of paper reflect, so the sign of the normal must not matter.
     bright = 0.62 + 0.38 * np.abs(normals @ _LIGHT)
-    return np.clip(bright[:, None] * np.array(to_rgb(color)), 0.0, 1.0)
+    paper = np.array(to_rgb(color)) if isinstance(color, str) else color
+    return np.clip(bright[:, None] * paper, 0.0, 1.0)
 
 
 def pieces(vertices: Points, triangles: Indices) -> Points:
@@ -284,7 +306,9 @@ def pieces(vertices: Points, triangles: Indices) -> Points:
     return np.einsum("pcw,twd->tpcd", weights, vertices[triangles]).reshape(-1, 3, 3)
 
 
-def piece_colors(vertices: Points, triangles: Indices, color: str = PAPER) -> NDArray[np.float64]:
+def piece_colors(
+    vertices: Points, triangles: Indices, color: str | NDArray[np.float64] = PAPER
+) -> NDArray[np.float64]:
     """Return the `shades` of the `pieces` of all triangles, shape (np, 3)."""
     each = _divisions(len(triangles)) ** 2
     return np.repeat(shades(vertices, triangles, color), each, axis=0)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
@@ -34,6 +35,22 @@ def rest_keys(scale: float = 1.0, state: str = "undeformed") -> list[Line2D]:
     if scale != 1.0:
         keys.append(style.key(f"displacement times {scale:g}", linestyle="none"))
     return keys
+
+
+def panel_keys(sheet: Sheet3D) -> list[Patch]:
+    """Legend entries of the panels that differ from the rest of the sheet."""
+    return [
+        Patch(facecolor=scene.PAPERS[k % len(scene.PAPERS)], label=_differs(part.own))
+        for k, part in enumerate(sheet.parts)
+    ]
+
+
+def _differs(own: Mapping[str, float]) -> str:
+    words = {
+        "youngs_modulus": "E = {:.4g} Pa", "poissons_ratio": "ν = {:.4g}",
+        "thickness": "t = {:.4g} m", "density": "ρ = {:.4g} kg/m³",
+    }  # fmt: skip
+    return "panels with " + ", ".join(words[name].format(value) for name, value in own.items())
 
 
 class EdgeKind(NamedTuple):
@@ -132,7 +149,7 @@ class DrawnSheet:
         """Return corners and colors of the hidden pieces of panels, and of the others."""
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
-        colors = scene.piece_colors(points, triangles)
+        colors = scene.piece_colors(points, triangles, self._sheet.paper)
         hidden = hidden_points(
             corners.mean(axis=1), points, triangles, self._view, self._sheet.size
         )

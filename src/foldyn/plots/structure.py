@@ -19,7 +19,7 @@ from foldyn.plots import following, marks, scene, style
 from foldyn.plots import loads as histories
 from foldyn.plots.attachments import attachments
 from foldyn.plots.scene import Points, Sheet3D, View
-from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
+from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, panel_keys, rest_keys
 from foldyn.structures import Structure
 
 _MOST_LOADS_LISTED = 4
@@ -105,6 +105,7 @@ def draw_structure(
         everything.append(sheet.nodes)
         keys += rest_keys(scale)
     keys += edge_keys(sheet, elements, loads)
+    keys += panel_keys(sheet)
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += attached.keys
     keys += [key for group in arrows for key in group.keys]

@@ -36,8 +36,10 @@ AXIS = np.array(["x", "y", "z"])
 TAKEN = frozenset(
     {*MOTION, "time", "node", "axis", "support", "support_node", "support_axis", "case"}
     | {"rest_position", "vertices", "faces", "face_offsets", "assignments"}
+    | {"board_corners", "board_thickness"}
 )
 """Names that every motion has."""
+LENGTHS = ("rest_position", "vertices", "board_corners", "board_thickness")
 _OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 
 
@@ -279,6 +281,8 @@ def _case_variables(document: Document) -> dict[str, Any]:
         "faces": ("face_corner",),
         "face_offsets": ("face_bound",),
         "assignments": ("crease",),
+        "board_corners": ("face_corner", "axis"),
+        "board_thickness": ("face",),
         "tables_crease_stiffness": ("crease",),
         "tables_crease_rest": ("crease",),
     }
@@ -288,7 +292,7 @@ def _case_variables(document: Document) -> dict[str, Any]:
     for name, array in document.arrays.items():
         # the times and values of one table share a dimension
         own = (f"{name.rsplit('_', 1)[0]}_point",)
-        attributes = {"units": "m"} if name in ("rest_position", "vertices") else {}
+        attributes = {"units": "m"} if name in LENGTHS else {}
         variables[name] = (dimensions.get(name, own), array, attributes)
     return variables
 

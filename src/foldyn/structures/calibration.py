@@ -28,6 +28,7 @@ from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
 STIFFEST = 1e100  # N/m or kg: beyond, or below its inverse, squares and quotients overflow
+SAME = 1e-9  # relative difference of thicknesses that counts as none
 WEAK = 1e-3  # of thickness times side: bar areas below it leave a panel (almost) free to shear
 
 
@@ -175,9 +176,24 @@ def _merlin2_edges(area: NDArray, ends: list, pattern: Pattern, panel: int) -> N
 def check_sheet(sheet: Sheet, pattern: Pattern) -> None:
     """Refuse panels that are not there, and what is too far from 1 to compute with."""
     sheet.check_panels(len(pattern.faces))
+    _check_boards(sheet, pattern)
     edges = lengths(pattern.vertices, pattern.edges)
     for kind in sheet.kinds(len(pattern.faces))[0]:
         _check_scale(kind, float(edges.min()), float(edges.max()))
+
+
+def _check_boards(sheet: Sheet, pattern: Pattern) -> None:
+    """Refuse thick panels of another thickness than the sheet's."""
+    if pattern.boards is None:
+        return
+    drawn, own = pattern.boards.thickness, sheet.values("thickness", len(pattern.faces))
+    other = np.flatnonzero(np.abs(drawn - own) > SAME * own)
+    if other.size:
+        p = other[0]
+        raise InputError(
+            f"sheet: thickness = {own[p]:g} m of panel {p}, whose thick pattern was made with "
+            f"{drawn[p]:g} m: give both the same (in a case file, hinge_offset does)"
+        )
 
 
 def _check_scale(sheet: Sheet, low: float, high: float) -> None:

@@ -191,14 +191,19 @@ class Discretized:
             raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
         faces = self.pattern.faces if self.pattern is not None else ()
         count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
+        area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
+        areal_density = self.sheet.values("areal_density", count)
+        if self.pattern is not None and self.pattern.boards is not None:
+            drawn = np.bincount(self.triangle_panel, area)
+            areal_density = areal_density * (self.pattern.boards.areas / drawn)
         return Surface(
             nodes=self.nodes,
             faces=faces,
             centers=self.centers,
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
-            triangle_area=0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1),
-            areal_density=self.sheet.values("areal_density", count),
+            triangle_area=area,
+            areal_density=areal_density,
         )
 
     def _displacement(self, u: ArrayLike) -> NDArray:

@@ -189,8 +189,8 @@ class PanelShells:
             raise InputError(f"damping: beta = {case.rayleigh.beta}: this model takes alpha alone")
         if options.crease_stiffness is not None or options.crease_rest is not None:
             raise InputError("crease_stiffness, crease_rest: this model has those of the sheet")
-        if case.structure.sheet.panels:
-            raise InputError("sheet.panels: this model has one sheet for all panels")
+        if case.structure.sheet.panels or case.structure.pattern.boards is not None:
+            raise InputError("sheet, pattern: this model has one thin sheet for all panels")
         inner = slice(len(case.structure.pattern.vertices), None)
         if case.fixed[inner].any() or any(force[inner].any() for force, _ in case.load_terms):
             raise InputError("supports and loads: this model takes vertices of the pattern alone")

@@ -1,0 +1,77 @@
+"""`Boards`: the panels of a pattern as boards of some thickness, hinged beside their middles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Boards:
+    """Boards that a pattern's panels stand for; usually made by `thicken`.
+
+    Parameters
+    ----------
+    offsets : array_like, shape (np + 1,)
+        Board p has the corners offsets[p] to offsets[p + 1], one for each of its panel's.
+    corners : array_like, shape (m, 3)
+        Corners of the boards' middle surfaces at rest (m), around each panel as its face is.
+    thickness : array_like, shape (np,)
+        Thickness (m) of each board.
+
+    Attributes
+    ----------
+    areas : ndarray, shape (np,)
+        Areas of the middle surfaces (m2).
+    normals : ndarray, shape (np, 3)
+        Unit normals of the boards towards the front.
+    """
+
+    offsets: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    thickness: NDArray[np.float64]
+
+    def __init__(self, offsets: ArrayLike, corners: ArrayLike, thickness: ArrayLike) -> None:
+        for name, value, kind in (
+            ("offsets", offsets, np.int64),
+            ("corners", corners, np.float64),
+            ("thickness", thickness, np.float64),
+        ):
+            array = np.array(value, dtype=kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def of(self, panel: int) -> NDArray[np.float64]:
+        """Corners (k, 3) of one board's middle surface, m."""
+        return self.corners[self.offsets[panel] : self.offsets[panel + 1]]
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Areas of the middle surfaces (np,), m2."""
+        return np.linalg.norm(self._vectors, axis=1)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals of the boards (np, 3) towards the front."""
+        return self._vectors / self.areas[:, None]
+
+    @cached_property
+    def _vectors(self) -> NDArray[np.float64]:
+        """Newell's normals (np, 3), as long as the areas."""
+        vectors = np.empty((len(self.thickness), 3))
+        for panel in range(len(vectors)):
+            x = self.of(panel)
+            x = x - x.mean(axis=0)
+            vectors[panel] = 0.5 * np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+        return vectors
+
+    def check(self, faces: tuple[tuple[int, ...], ...]) -> None:
+        """Refuse boards that are not those of the faces of a pattern."""
+        sizes = np.array([len(face) for face in faces])
+        if not np.array_equal(np.diff(self.offsets), sizes) or len(self.thickness) != len(sizes):
+            raise InputError("boards: give one for each face, with as many corners")

@@ -1,0 +1,250 @@
+"""Thick panels: boards whose hinges lie on their faces, as thick origami is built.
+
+A crease is a line at some height along the front normal of the boards beside it: by default in the
+front face at a valley, where the two front faces meet when it closes, and in the back face at a
+mountain. Each panel of the thick pattern is the plane through its hinge lines; a board moves with
+its panel. Angles at which boards lie flat, their areas and pictures follow from `Pattern.boards`.
+
+A board with one hinge line, or with two parallel ones at opposite heights, is a plane through
+opposite edges of its section: the mass on this plane has the center of mass of the board and its
+moment of inertia about the hinge, (w^2 + t^2) m / 3 for a board of width w hinged in its face.
+
+Sources: T. Tachi, Rigid-foldable thick origami, Origami 5, 2011 (axes at the valley sides);
+Y. Chen, R. Peng, Z. You, Origami of thick panels, Science 349, 2015 (why vertices at which hinge
+lines of different heights meet move only with thicknesses that satisfy conditions of their own).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns.boards import Boards
+from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.values import SHORTEST, number_or_list, show
+
+SAME = 1e-9  # of the pattern's size: places and heights that count as one
+SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}
+"""Height of a hinge line in thicknesses, by assignment."""
+CONDITIONS = (
+    "hinge lines at different heights do not meet in a point, and boards of one thickness around "
+    "such a vertex cannot fold (Chen, Peng and You, Science 349, 2015); give offsets that are the "
+    "same at all creases of a vertex, or a pattern whose creases do not meet"
+)
+
+
+def thicken(
+    pattern: Pattern,
+    thickness: float | Sequence[float],
+    offsets: float | Sequence[float] | None = None,
+) -> Pattern:
+    """Give the panels of a pattern a thickness, and put each crease at its own height in it.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Flat or folded, with flat panels; its panels are the middle surfaces of the boards.
+    thickness : float or sequence of float
+        Thickness (m) of all panels, or of each.
+    offsets : float or sequence of float, optional
+        Height (m) of the hinge line of all creases, or of each, above the middle surfaces along
+        their front normals, at most half a thickness in size. By default valleys are hinged in
+        the front face, mountains in the back face, flat creases in the middle.
+
+    Returns
+    -------
+    Pattern
+        With the same numbers of vertices, panels and creases; its `boards` are the panels in
+        their thickness, and its `flat_dihedrals` the angles at which they lie flat.
+
+    Raises
+    ------
+    InputError
+        A value out of range, an unassigned crease without an offset, creases of different heights
+        that meet at a vertex, or boards that a closed ring of panels tears apart.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> strip = fd.Pattern([(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)],
+    ...                    [(0, 1, 4, 3), (1, 2, 5, 4)], {(1, 4): "V"})
+    >>> fd.thicken(strip, 0.1).vertices[[1, 2], 2].tolist()
+    [0.05, -0.05]
+    """
+    if pattern.boards is not None:
+        raise InputError(": its panels are thick already; thicken the thin one", "pattern")
+    sizes = _thickness(thickness, pattern)
+    height = _heights(offsets, sizes, pattern)
+    corners = _corner_heights(height, pattern)
+    shift = _shifts(height, pattern)
+    vertices = pattern.vertices.copy()
+    placed = np.zeros(len(vertices), bool)
+    middles = []
+    for panel, face in enumerate(pattern.faces):
+        middle = pattern.vertices[list(face)] + shift[panel]
+        middles.append(middle)
+        places = middle + corners[panel][:, None] * pattern.face_normals[panel]
+        for vertex, place in zip(face, places, strict=True):
+            if placed[vertex] and np.abs(place - vertices[vertex]).max() > SAME * pattern.size:
+                raise InputError(
+                    f": thick panels would part at vertex {vertex}, where they meet in a "
+                    "corner alone; give the panels vertices of their own there",
+                    "pattern",
+                )
+            vertices[vertex], placed[vertex] = place, True
+    starts = np.concatenate([[0], np.cumsum([len(face) for face in pattern.faces])])
+    boards = Boards(starts, np.concatenate(middles), sizes)
+    return Pattern(vertices, pattern.faces, pattern.assignments, pattern.name, boards)
+
+
+def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
+    """Thickness of each panel (np,)."""
+    sizes = np.array(number_or_list("thickness", given, "panel"))
+    count = len(pattern.faces)
+    if sizes.ndim and len(sizes) != count:
+        raise InputError(
+            f": {len(sizes)} values for {count} panels: give one for each", "thickness"
+        )
+    if not (sizes >= SHORTEST).all():
+        raise InputError(f" = {show(given)}: must be greater than 0", "thickness")
+    bent = np.flatnonzero(pattern.face_planarity > SAME)
+    if bent.size:
+        raise InputError(f": panel {bent[0]} is not flat, and a board is; cut it in two", "pattern")
+    return np.broadcast_to(sizes, (count,)).copy()
+
+
+def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float64]:
+    """Height (nc, 2) of each crease above the middle of the panel on either side."""
+    beside = sizes[pattern.crease_faces]
+    if offsets is None:
+        unknown = [k for k, letter in enumerate(pattern.assignments) if letter not in SIDES]
+        if unknown:
+            raise InputError(
+                f": crease {unknown[0]} is unassigned: give offsets, or make it a mountain, a "
+                "valley or flat",
+                "offsets",
+            )
+        return beside * np.array([SIDES[letter] for letter in pattern.assignments])[:, None]
+    height = np.array(number_or_list("offsets", offsets, "crease"))
+    count = len(pattern.creases)
+    if height.ndim and len(height) != count:
+        raise InputError(
+            f": {len(height)} values for {count} creases: give one for each", "offsets"
+        )
+    height = np.broadcast_to(height, (count,))
+    least = 0.5 * beside.min(axis=1, initial=np.inf)
+    beyond = np.flatnonzero(np.abs(height) > least * (1.0 + SAME))
+    if beyond.size:
+        k = beyond[0]
+        raise InputError(
+            f": crease {k} has {height[k]:g} m: must be at most half the thickness of the panels "
+            f"beside it in size, {least[k]:g} m",
+            "offsets",
+        )
+    return np.repeat(height[:, None], 2, axis=1)
+
+
+def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float64]]:
+    """Height of each panel's corners (k,) above its middle: those of the plane of hinge lines."""
+    row = edge_lookup(pattern.creases)
+    out = []
+    for panel, face in enumerate(pattern.faces):
+        found: dict[int, tuple[float, int]] = {}
+        for a, b in around(face):
+            crease = row.get(edge_of(a, b))
+            if crease is None:
+                continue
+            own = height[crease, int(pattern.crease_faces[crease, 0] != panel)]
+            for vertex in (a, b):
+                before, other = found.setdefault(vertex, (own, crease))
+                if abs(before - own) > SAME * pattern.size:
+                    raise InputError(
+                        f": creases {other} and {crease} meet at vertex {vertex} at different "
+                        f"heights, {before:g} and {own:g} m: {CONDITIONS}",
+                        "pattern",
+                    )
+        out.append(_plane(panel, face, {v: h for v, (h, _) in found.items()}, pattern))
+    return out
+
+
+def _plane(
+    panel: int, face: tuple[int, ...], known: dict[int, float], pattern: Pattern
+) -> NDArray[np.float64]:
+    """Heights (k,) of a panel's corners, some of which are `known`, on one plane.
+
+    Where the known ones lie on a line, the plane goes through the panel's centroid: the mass on it
+    then has the board's center of mass.
+    """
+    if not known:
+        return np.zeros(len(face))
+    normal = pattern.face_normals[panel]
+    x = pattern.vertices[list(face)]
+    first = x[1] - x[0]
+    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
+    flat = (x - x[0]) @ axes.T
+    span = float(np.ptp(flat, axis=0).max())
+    points = np.array([flat[face.index(v)] for v in known])
+    heights = np.array([*known.values()])
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spread[-1] < SAME * span:  # on a line
+        points = np.vstack([points, _centroid(flat)])
+        heights = np.append(heights, 0.0)
+    system = np.column_stack([np.ones(len(points)), points / span])
+    plane = np.linalg.lstsq(system, heights, rcond=None)[0]
+    if np.abs(system @ plane - heights).max() > SAME * pattern.size:
+        raise InputError(
+            f": hinge lines of panel {panel} do not lie in one plane: make them parallel, or give "
+            "them one height",
+            "pattern",
+        )
+    return np.column_stack([np.ones(len(flat)), flat / span]) @ plane
+
+
+def _centroid(x: NDArray) -> NDArray[np.float64]:
+    """Centroid (2,) of the area of a polygon x (k, 2)."""
+    y = np.roll(x, -1, axis=0)
+    cross = x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]
+    return ((x + y) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
+
+
+def _shifts(height: NDArray, pattern: Pattern) -> NDArray[np.float64]:
+    """Displacement (np, 3) of each board from its thin panel, so that the hinge lines coincide.
+
+    The first panel of each connected part stays.
+    """
+    normal = pattern.face_normals
+    step = height[:, :1] * normal[pattern.crease_faces[:, 0]]
+    step = step - height[:, 1:] * normal[pattern.crease_faces[:, 1]]
+    beside: list[list[tuple[int, NDArray]]] = [[] for _ in pattern.faces]
+    for (one, two), way in zip(pattern.crease_faces.tolist(), step, strict=True):
+        beside[one].append((two, way))
+        beside[two].append((one, -way))
+    shift = np.full((len(pattern.faces), 3), np.nan)
+    for seed in range(len(shift)):
+        if not np.isnan(shift[seed, 0]):
+            continue
+        shift[seed] = 0.0
+        queue = deque([seed])
+        while queue:
+            panel = queue.popleft()
+            for other, way in beside[panel]:
+                if np.isnan(shift[other, 0]):
+                    shift[other] = shift[panel] + way
+                    queue.append(other)
+    one, two = pattern.crease_faces.T
+    torn = np.abs(shift[two] - shift[one] - step).max(axis=1, initial=0.0) > SAME * pattern.size
+    if torn.any():
+        k = int(np.flatnonzero(torn)[0])
+        a, b = pattern.creases[k].tolist()
+        raise InputError(
+            f": thick panels do not close a ring: they part at crease {k} (vertices {a}, {b}); cut "
+            "the ring open there, or give offsets",
+            "pattern",
+        )
+    return shift

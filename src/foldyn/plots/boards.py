@@ -1,0 +1,124 @@
+"""Picture of thick panels: the boards that a pattern's panels stand for, in their thickness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.patterns import Boards, Pattern
+from foldyn.plots.scene import Indices, Points, Sheet3D, View
+from foldyn.plots.sheet import rest_keys, side_by_side
+from foldyn.structures import Structure
+
+
+def draw_boards(
+    case_or_structure: Case | Structure | Pattern,
+    displacement: ArrayLike | None = None,
+    captions: Sequence[str] = (),
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw thick panels as boards, with the lines on which they are hinged.
+
+    Boards move with their panels as rigid bodies, by least squares of the corners' distances.
+
+    Parameters
+    ----------
+    case_or_structure : Case, Structure or Pattern
+        Of a pattern made by `thicken`.
+    displacement : array_like, shape (n, 3) or (k, n, 3), optional
+        Node displacements (m) of one state, or of several side by side; at rest by default.
+    captions : sequence of str, optional
+        What stands below each state.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The boards at rest in gray behind each state.
+
+    Raises
+    ------
+    InputError
+        The panels are not thick, or the displacement has another shape or is not finite.
+    """
+    sheet = Sheet3D.of(case_or_structure)
+    pattern = sheet.pattern
+    if pattern is None or pattern.boards is None:
+        raise InputError("case_or_structure: its panels are not thick; see foldyn.thicken")
+    still = np.zeros(sheet.nodes.shape)
+    given = still if displacement is None else np.array(displacement, dtype=np.float64)
+    moved: Points = given[None] if given.ndim == 2 else given
+    if moved.ndim != 3 or moved.shape[1:] != still.shape or not np.isfinite(moved).all():
+        raise InputError(
+            f"displacement: shape {given.shape}; give {still.shape} for one state, with the "
+            "number of states in front for several, all finite"
+        )
+    texts = [*captions, *[""] * (len(moved) - len(captions))]
+    solid = _solid(pattern)
+    vertices = sheet.nodes[: len(pattern.vertices)]
+    shapes = [_placed(solid, pattern, vertices + u[: len(vertices)]) for u in moved]
+    notes = [] if displacement is None else rest_keys()
+    return side_by_side(solid, np.array(shapes), texts, View(*view), notes, title)[0]
+
+
+def _solid(pattern: Pattern) -> Sheet3D:
+    """Boards at rest: the pattern's vertices, for the hinge lines, then the corners of each."""
+    boards = cast(Boards, pattern.boards)
+    nodes, triangles, edges = [pattern.vertices], [], []
+    first = len(pattern.vertices)
+    for panel, face in enumerate(pattern.faces):
+        half = 0.5 * boards.thickness[panel] * boards.normals[panel]
+        size = len(face)
+        nodes += [boards.of(panel) - half, boards.of(panel) + half]
+        back, front = np.arange(size) + first, np.arange(size) + first + size
+        for ring in (back, front):
+            triangles += [(ring[0], a, b) for a, b in pairwise(ring[1:])]
+            edges += list(zip(ring, np.roll(ring, -1), strict=True))
+        for a, b, c, d in zip(back, np.roll(back, -1), np.roll(front, -1), front, strict=True):
+            triangles += [(a, b, c), (a, c, d)]
+        edges += list(zip(back, front, strict=True))
+        first += 2 * size
+    drawn = SimpleNamespace(
+        creases=pattern.creases, boundary=_rows(edges), assignments=pattern.assignments
+    )
+    return Sheet3D(drawn, None, None, np.concatenate(nodes), _rows(triangles))
+
+
+def _rows(rows: list) -> Indices:
+    return np.array(rows, dtype=np.int64)
+
+
+def _placed(solid: Sheet3D, pattern: Pattern, moved: Points) -> Points:
+    """Nodes of the boards where the vertices have moved to (nv, 3)."""
+    out = solid.nodes.copy()
+    out[: len(moved)] = moved
+    first = len(moved)
+    for face in pattern.faces:
+        rest, now = pattern.vertices[list(face)], moved[list(face)]
+        turn, size = _rotation(rest - rest.mean(axis=0), now - now.mean(axis=0)), 2 * len(face)
+        board = slice(first, first + size)
+        out[board] = now.mean(axis=0) + (out[board] - rest.mean(axis=0)) @ turn.T
+        first += size
+    return out
+
+
+def _rotation(rest: Points, now: Points) -> Points:
+    """Rotation matrix that takes points (k, 3) nearest to others.
+
+    Source: W. Kabsch, Acta Cryst. A32, 1976.
+    """
+    left, _, right = np.linalg.svd(now.T @ rest)
+    left[:, 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
+    return left @ right
