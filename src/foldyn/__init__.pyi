@@ -50,6 +50,7 @@ from foldyn.cases import (
     State as State,
     Step as Step,
     Table as Table,
+    Temperature as Temperature,
     TotalForce as TotalForce,
 )
 from foldyn.dynamics import (

@@ -15,6 +15,7 @@ from foldyn.mechanics.following import (
     joined,
     moments,
     pressures,
+    pushes,
     put_following,
     tensions,
 )
@@ -38,16 +39,27 @@ def triangles(x) -> Following:
 
 
 def hinges(x) -> Following:
-    turned = np.array([[3 * NODES, 3 * NODES + 2], [-1, -1]])
     rows = np.array([[0, 1, 2, 3], [3, 4, 5, 6]])
-    return moments(x, rows, np.array([0.7, 0.3]), turned, np.array([0.4, 0.0]))
+    return moments(x[rows], rows, np.array([0.7, 0.3]))
+
+
+def clamps(x) -> Following:
+    """The second hinge's last wing rides on the mean of its axis."""
+    rows = np.array([[0, 1, 2, 3], [3, 4, 5, 6]])
+    ridden = rows.copy()
+    ridden[1, 3] = -1
+    return moments(x[rows], ridden, np.array([0.7, 0.3]))
+
+
+def hidden(x) -> Following:
+    return pushes(np.array([3 * NODES, 3 * NODES + 2]), np.array([0.4, -0.1]))
 
 
 def bars(x) -> Following:
     return tensions(x, np.array([[0, 5], [2, 6]]), np.array([1.5, -2.0]))
 
 
-@pytest.mark.parametrize("kind", [triangles, hinges, bars])
+@pytest.mark.parametrize("kind", [triangles, hinges, clamps, bars])
 def test_the_tangent_is_the_derivative_of_the_force(kind, x, u) -> None:
     loads = joined([(kind(x), 1)])
     error = tangent_error(
@@ -86,10 +98,14 @@ def test_bars_have_the_potential_of_a_constant_tension(x, u) -> None:
     assert force.reshape(-1, 3)[0] @ (x[5] - x[0]) > 0.0
 
 
-def test_a_hinge_pushes_its_hidden_dofs(x, u) -> None:
-    loads = joined([(hinges(x), 0)])
-    force = following_force(loads, u, FACTOR)[3 * NODES :]
-    np.testing.assert_allclose(force, [-1.3 * 0.7 * 0.4, 0.0, -1.3 * 0.7 * 0.4, 0.0])
+def test_hidden_dofs_are_pushed_whatever_the_displacement(x, u) -> None:
+    loads = joined([(hidden(x), 0)])
+    expected = np.zeros_like(u)
+    expected[3 * NODES :: 2] = [0.4 * 1.3, -0.1 * 1.3]
+    for state in (u, 2.0 * u):
+        np.testing.assert_array_equal(following_force(loads, state, FACTOR), expected)
+    assert not following_tangent(loads, u, FACTOR).nnz
+    assert loads.acts
 
 
 def test_a_free_body_feels_neither_force_nor_moment_of_hinges_and_bars(x, u) -> None:

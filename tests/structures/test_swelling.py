@@ -26,7 +26,7 @@ def test_hinges_turn_as_on_a_paraboloid(scheme: str) -> None:
         turned = np.concatenate(s.dihedrals(u)) - s.body.rest_angles
         swelling = s.swollen(np.zeros(2), np.full(2, curvature))
         assert (swelling.turns[: len(s.folds)] < 0.0).all()  # as at a valley
-        assert not swelling.tension.any()
+        assert not swelling.forces.tension.any()
         return float(np.abs(swelling.turns - turned).max() / np.abs(turned).max())
 
     coarse, fine = error(1e-2), error(1e-3)
@@ -38,7 +38,7 @@ def test_bars_between_panels_take_the_mean() -> None:
     s = fd.discretize(STRIP, SHEET, bar_law="linear")
     both = s.swollen(np.array([1e-3, 3e-3]), np.zeros(2))
     for ends, tension, area, length in zip(
-        both.ends.tolist(), both.tension, s.bar_area, s.bar_length, strict=True
+        both.forces.bars.tolist(), both.forces.tension, s.bar_area, s.bar_length, strict=True
     ):
         panels = [p for p, t in zip(s.triangle_panel, s.triangles, strict=True) if {*ends} <= {*t}]
         strain = np.mean([1e-3 + 2e-3 * p for p in panels])

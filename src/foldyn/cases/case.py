@@ -344,6 +344,10 @@ class Case(Damped):
     def _turned(self) -> Summands:
         for change, history in self.actuation_terms:
             yield np.pad(change, (0, len(self.body.rest_angles) - len(change))), history
+        for place, load in self._loads():
+            turns = load.turns(self.structure, place)
+            if turns is not None and turns.any():
+                yield turns, load.history
 
     def _actuated(self) -> Summands:
         first: dict[int, str] = {}  # the load that actuates a crease

@@ -14,7 +14,7 @@ from foldyn.cases.load import Load
 from foldyn.cases.regions import check_panels, resolve_panels
 from foldyn.cases.selection import check_creases, resolve_creases
 from foldyn.errors import InputError
-from foldyn.mechanics.following import Following, moments, pressures
+from foldyn.mechanics.following import Following, joined, moments, pressures, pushes
 from foldyn.values import brief, number, number_or_list, show
 
 
@@ -118,9 +118,10 @@ class CreaseMoment(Load):
         pieces = structure.fold_pieces
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
-        return moments(
-            structure.nodes, pieces.hinges[chosen], part, pieces.turned[chosen], pieces.turn[chosen]
-        )
+        hinges, turned = pieces.hinges[chosen], pieces.turned[chosen]
+        turning, has = moments(structure.nodes[hinges], hinges, part), turned >= 0
+        back = -(part * pieces.turn[chosen])[:, None] * np.ones(2)
+        return joined([(turning, 0), (pushes(turned[has], back[has]), 0)])
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""

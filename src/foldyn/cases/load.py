@@ -48,6 +48,10 @@ class Load(Part):
         """Creases that it actuates, and the change (rad) of their rest angles; None if none."""
         return None
 
+    def turns(self, structure: Any, place: str) -> NDArray[np.float64] | None:
+        """Changes (nr,), rad, of `Body.rest_angles` beside those of creases; None if none."""
+        return None
+
     def following(self, structure: Any, place: str) -> Following | None:
         """Forces that depend on the displacement, at factor 1; None if it has none."""
         return None

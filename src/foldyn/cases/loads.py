@@ -25,6 +25,7 @@ from foldyn.cases.load import Load, check_held
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.cases.shared_loads import LineLoad, TotalForce
 from foldyn.cases.supports import signed
+from foldyn.cases.temperature import Temperature
 from foldyn.errors import InputError, within
 from foldyn.values import brief, show, vector
 
@@ -37,6 +38,7 @@ __all__ = [
     "LineLoad",
     "Load",
     "Pressure",
+    "Temperature",
     "TotalForce",
 ]
 
@@ -232,6 +234,7 @@ LOADS: tuple[type[Load], ...] = (
     LineLoad,
     Pressure,
     CreaseMoment,
+    Temperature,
 )
 """All kinds. Which one a table of a case file means, its keys that no other kind has tell: where it
 has those of several, the last kind, where it has none, the first."""

@@ -5,10 +5,11 @@ history. With x the positions of its nodes and p, M, N its value times the facto
 
 - a triangle with corners x1, x2, x3 under pressure p: p/6 (x2 - x1) x (x3 - x1) on each corner.
   On a closed surface this is p times the gradient of the volume inside;
-- a hinge with moment M: M times the gradient of its angle, the dihedral less `turn` times the two
-  hidden dofs `turned` (the rotations of a shell's sides). Potential -M angle;
+- a hinge with moment M: M times the gradient of its dihedral, potential -M angle. A wing that is no
+  node rides on the mean displacement of the axis' ends;
 - a bar from a to b with tension N (N/m, the second Piola-Kirchhoff force over the rest length):
-  -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2.
+  -N d on b and N d on a, d = x_b - x_a. Potential N (|d|^2 - |d at rest|^2) / 2;
+- a hidden dof with a constant force (that on a rotation of a shell's sides is a moment).
 
 The derivative of a pressure's forces is not symmetric triangle by triangle; on a closed surface,
 and on an open one whose rim is held, the sum is (Hibbitt, Int. J. Solids Struct. 15, 1979).
@@ -27,7 +28,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
+from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 
 ASYMMETRIC = 1e-3  # share of the stiffness of loads that is not symmetric and not to be overlooked
 NO_POTENTIAL = (
@@ -37,33 +38,34 @@ NO_POTENTIAL = (
 
 
 class Following(NamedTuple):
-    """Entries of t triangles, h hinges, b bars; `row` numbers histories."""
+    """Entries of t triangles, h hinges, b bars, d hidden dofs; `row` numbers histories."""
 
     triangles: NDArray  # (t, 3) nodes, counter-clockwise from the front
     sides: NDArray  # (t, 2, 3) rest vectors from the first corner to the others, m
     pressure: NDArray  # (t,) Pa, positive along the front's normal
     pressure_row: NDArray  # (t,)
-    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l
+    hinges: NDArray  # (h, 4) nodes: axis j, k, wings i, l; -1 for a wing l that rides
     corners: NDArray  # (h, 4, 3) their rest positions from any origin nearby, m
-    turned: NDArray  # (h, 2) hidden dofs; -1 for none
-    turn: NDArray  # (h,) rad/m
     moment: NDArray  # (h,) N m, positive where it opens the dihedral
     moment_row: NDArray  # (h,)
     bars: NDArray  # (b, 2) nodes
     vectors: NDArray  # (b, 3) rest vectors from the first to the second, m
     tension: NDArray  # (b,) N/m
     tension_row: NDArray  # (b,)
+    hidden: NDArray  # (d,) dofs
+    push: NDArray  # (d,) N
+    push_row: NDArray  # (d,)
 
     @property
     def acts(self) -> bool:
         """Whether there are entries."""
-        return bool(len(self.pressure) + len(self.moment) + len(self.tension))
+        return any(map(len, (self.pressure, self.moment, self.tension, self.push)))
 
     def placed(self, rank: NDArray) -> Following:
         """The same for nodes that stand at the places rank (n,)."""
         return self._replace(
             triangles=_whole(rank[self.triangles]),
-            hinges=_whole(rank[self.hinges]),
+            hinges=_whole(np.append(rank, -1)[self.hinges]),
             bars=_whole(rank[self.bars]),
         )
 
@@ -79,16 +81,11 @@ def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
     )
 
 
-def moments(
-    x: NDArray, hinges: NDArray, moment: NDArray, turned: NDArray, turn: NDArray
-) -> Following:
-    """Moments (h,), N m, on hinges (h, 4) of nodes at x (n, 3); `turned`, `turn`: `Following`."""
-    corners = x[hinges]
+def moments(corners: NDArray, hinges: NDArray, moment: NDArray) -> Following:
+    """Moments (h,), N m, on hinges (h, 4) whose nodes are at corners (h, 4, 3) at rest."""
     return _none()._replace(
         hinges=_whole(hinges),
         corners=_real(corners - corners.mean(axis=1, keepdims=True)),
-        turned=_whole(turned),
-        turn=_real(turn),
         moment=_real(moment),
         moment_row=np.zeros(len(hinges), np.int64),
     )
@@ -104,13 +101,19 @@ def tensions(x: NDArray, bars: NDArray, tension: NDArray) -> Following:
     )
 
 
+def pushes(dofs: NDArray, push: NDArray) -> Following:
+    """Constant forces (d,), N, on hidden dofs (d,)."""
+    row = np.zeros(len(dofs), np.int64)
+    return _none()._replace(hidden=_whole(dofs), push=_real(push), push_row=row)
+
+
 def joined(parts: Iterable[tuple[Following, int]]) -> Following:
     """All entries of several, each part with the number of its history."""
     numbered = [_none()]
     for part, row in parts:
         rows = {
             name: np.full_like(getattr(part, name), row)
-            for name in ("pressure_row", "moment_row", "tension_row")
+            for name in ("pressure_row", "moment_row", "tension_row", "push_row")
         }
         numbered.append(part._replace(**rows))
     return Following(*map(np.concatenate, zip(*numbered, strict=True)))
@@ -125,8 +128,9 @@ def _none() -> Following:
 
     return Following(
         whole(3), real(2, 3), real(), whole(),
-        whole(4), real(4, 3), whole(2), real(), real(), whole(),
+        whole(4), real(4, 3), real(), whole(),
         whole(2), real(3), real(), whole(),
+        whole(), real(), whole(),
     )  # fmt: skip
 
 
@@ -163,7 +167,9 @@ def asymmetry(matrix: sparse.csr_array) -> float:
 def following_places(loads: Following) -> tuple[NDArray, NDArray]:
     """Row and column (e,) of each entry that `put_following` gives."""
     rows, columns = [], []
-    for nodes in (loads.triangles, loads.hinges, loads.bars):
+    # what a wing that rides has stands, as zero, at the first node
+    hinges = np.where(loads.hinges < 0, loads.hinges[:, :1], loads.hinges)
+    for nodes in (loads.triangles, hinges, loads.bars):
         width = 3 * nodes.shape[1]
         dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, width)
         rows.append(np.repeat(dofs, width, axis=1).ravel())
@@ -182,16 +188,20 @@ def _edges(loads, u, t, a, b):
 
 @kernel
 def _hinge(loads, u, h, points, gradient):
-    """Corners of a hinge and the gradient of its dihedral, (4, 3) both."""
+    """Corners of a hinge and the gradient of its dihedral, (4, 3) both; whether a wing rides."""
+    j, k = loads.hinges[h, 0], loads.hinges[h, 1]
     for v in range(4):
         for c in range(3):
-            points[v, c] = loads.corners[h, v, c] + u[3 * loads.hinges[h, v] + c]
+            node = loads.hinges[h, v]
+            moved = 0.5 * (u[3 * j + c] + u[3 * k + c]) if node < 0 else u[3 * node + c]
+            points[v, c] = loads.corners[h, v, c] + moved
     p, g = flat(points), flat(gradient)
     found = dihedral_gradient(
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
     )
-    for k in range(12):
-        g[k] = found[1 + k]
+    for i in range(12):
+        g[i] = found[1 + i]
+    return loads.hinges[h, 3] < 0
 
 
 @kernel
@@ -209,13 +219,13 @@ def add_following(loads, u, factor, out):
                 out[3 * loads.triangles[t, v] + c] += push
     for h in range(loads.moment.size):
         moment = loads.moment[h] * factor[loads.moment_row[h], 0]
-        _hinge(loads, u, h, points, gradient)
-        for v in range(4):
-            for c in range(3):
+        rides = _hinge(loads, u, h, points, gradient)
+        for c in range(3):
+            if rides:
+                gradient[0, c] += 0.5 * gradient[3, c]
+                gradient[1, c] += 0.5 * gradient[3, c]
+            for v in range(3 if rides else 4):
                 out[3 * loads.hinges[h, v] + c] += moment * gradient[v, c]
-        for k in range(2):
-            if loads.turned[h, k] >= 0:
-                out[loads.turned[h, k]] -= moment * loads.turn[h]
     for e in range(loads.tension.size):
         pull = loads.tension[e] * factor[loads.tension_row[e], 0]
         first, second = loads.bars[e, 0], loads.bars[e, 1]
@@ -223,6 +233,8 @@ def add_following(loads, u, factor, out):
             along = pull * (loads.vectors[e, c] + u[3 * second + c] - u[3 * first + c])
             out[3 * first + c] += along
             out[3 * second + c] -= along
+    for e in range(loads.push.size):
+        out[loads.hidden[e]] += loads.push[e] * factor[loads.push_row[e], 0]
 
 
 @kernel
@@ -266,9 +278,13 @@ def put_following(loads, u, factor, symmetric, out):
                         out[at] = -p * value
                         at += 1
     for h in range(loads.moment.size):
-        _hinge(loads, u, h, points, gradient)
+        rides = _hinge(loads, u, h, points, gradient)
         block[:] = 0.0
         add_hessian(points, gradient, -loads.moment[h] * factor[loads.moment_row[h], 0], block)
+        if rides:
+            carry_wing(block)
+            block[3] = 0.0
+            block[:, :, 3] = 0.0
         values = flat(block)
         for k in range(values.size):
             out[at + k] = values[k]

@@ -15,6 +15,7 @@ from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
+from foldyn.mechanics.following import joined, moments, pushes, tensions
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
@@ -164,14 +165,14 @@ class Shell(Discretized):
         hidden = np.bincount(
             model.rotation[turned], (model.sign * moment)[turned], minlength=model.rotations
         )
-        return Swelling(
-            turns=np.zeros(len(self.folds)),
-            ends=corners[:, :, :2].reshape(-1, 2),
-            tension=tension.ravel(),
-            hinges=model.hinges,
-            moment=on_hinge,
-            hidden=model.per_reach * hidden,
+        sides, hinges = corners[:, :, :2].reshape(-1, 2), model.hinges
+        rows = np.where(hinges < len(self.nodes), hinges, -1)
+        parts = (
+            tensions(self.nodes, sides, tension.ravel()),
+            moments(model.rest[hinges], rows, on_hinge),
+            pushes(self.nodes.size + np.arange(model.rotations), model.per_reach * hidden),
         )
+        return Swelling(np.zeros(len(self.folds)), joined((part, 0) for part in parts))
 
     @cached_property
     def folds(self) -> NDArray:

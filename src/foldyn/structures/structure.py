@@ -16,6 +16,7 @@ from foldyn.algebra.solvers import Fill
 from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
 from foldyn.mechanics.attached_body import attached
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.following import joined, moments, tensions
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.structures.body import GROUPS, BarsHingesBody
@@ -203,8 +204,14 @@ class Structure(Discretized):
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
         tension = -stiffness * self.bar_law.stress(1.0 + free)
-        none = np.zeros(0)
-        return Swelling(turns, self.bars, tension, np.zeros((0, 4), np.int64), none, none)
+        parts = [tensions(self.nodes, self.bars, tension)]
+        if len(self.clamps):
+            edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
+            panel = panel_of_triangle(self.triangles, self.triangle_panel, self.clamps)
+            turn = -curvature[panel] * chord_turns(self.nodes[self.clamps])
+            rows = np.column_stack([self.clamps, np.full(len(self.clamps), -1)])
+            parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
+        return Swelling(turns, joined((part, 0) for part in parts))
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""

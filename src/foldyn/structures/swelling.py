@@ -21,16 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.mechanics.following import Following
+
 
 class Swelling(NamedTuple):
-    """What swollen panels add to a structure: k tensions, h moments, r hidden dofs."""
+    """What swollen panels add to a structure."""
 
     turns: NDArray  # (nr,) changes of rest angles, rad
-    ends: NDArray  # (k, 2) nodes of what would be longer
-    tension: NDArray  # (k,) constant force per length, N/m
-    hinges: NDArray  # (h, 4)
-    moment: NDArray  # (h,) on their dihedrals, N m
-    hidden: NDArray  # (r,) forces on the hidden dofs, N
+    forces: Following
 
 
 def chord_turns(corners: NDArray) -> NDArray:

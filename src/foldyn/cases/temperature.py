@@ -1,0 +1,123 @@
+"""`Temperature`: panels that stretch and curl as they are warmed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.history import History, as_history
+from foldyn.cases.load import Load
+from foldyn.cases.regions import check_panels, resolve_panels
+from foldyn.errors import InputError
+from foldyn.mechanics.following import Following
+from foldyn.structures import Laminate
+from foldyn.structures.laminate import check_layers
+from foldyn.structures.swelling import Swelling
+from foldyn.values import brief, number
+
+MOST_STRAIN = 0.2  # free strain beyond which the laws of the sheet say nothing
+
+
+@brief
+@dataclass(frozen=True)
+class Temperature(Load):
+    """Panels that are warmer than at rest, times a history.
+
+    Free panels would stretch by `expansion` times the change, and curl towards their front by
+    `curvature` times it, without any stress; where they may not, they push. Other causes of free
+    strains act in the same way: moisture, growth, a swelling gel.
+
+    Bars and hinges get the rest angles of a paraboloid of that curvature; both models are exact for
+    small slopes. Between the factors 0 and 1 the free strain is proportional to the factor to the
+    first order in the strain.
+
+    Parameters
+    ----------
+    change : float
+        Change of the temperature, K, at factor 1.
+    expansion : float
+        Free strain per kelvin, 1/K.
+    curvature : float
+        Free curvature per kelvin, 1/(m K), positive where the sheet bends as at a valley.
+    panels : int, sequence of int, or "all"
+        Panels by number; all by default.
+    layers : sequence of (float, float, float), optional
+        Instead of expansion and curvature: thickness (m), Young's modulus (Pa) and expansion (1/K)
+        of bonded layers from the back to the front, as of `Laminate`. The stiffness of the panels
+        stays that of their sheet; `Laminate.sheet` gives the one that fits the layers.
+    history : History or callable, optional
+        Factor of time; constant by default.
+    """
+
+    change: float
+    expansion: float | None = None
+    curvature: float | None = None
+    panels: int | str | Sequence[int] = "all"
+    layers: Sequence[Sequence[float]] | None = None
+    history: History | Callable[[Any], Any] | None = None
+
+    keys = {
+        "temperature": "change",
+        "expansion": "expansion",
+        "curvature": "curvature",
+        "panels": "panels",
+        "layers": "layers",
+    }
+    apart = "a temperature acts on panels"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "change", number("change", self.change, unit="K"))
+        object.__setattr__(self, "panels", check_panels("panels", self.panels))
+        object.__setattr__(self, "history", as_history(self.history))
+        given = [name for name in ("expansion", "curvature") if getattr(self, name) is not None]
+        for name in given:
+            object.__setattr__(self, name, number(name, getattr(self, name)))
+        if self.layers is not None:
+            object.__setattr__(self, "layers", check_layers("layers", self.layers))
+            if given:
+                raise InputError(f": the layers give the {given[0]}; leave it out", given[0])
+        elif not given:
+            raise InputError(
+                ": give expansion (1/K), curvature (1/(m K)), or both, or the layers", "expansion"
+            )
+        strain = self.change * self._per_kelvin[0]
+        if abs(strain) > MOST_STRAIN:
+            raise InputError(
+                f" = {self.change:g}: a free strain of {strain:.3g}; the laws of the sheet hold "
+                f"up to about {MOST_STRAIN:g}: check the units (K, 1/K)",
+                "change",
+            )
+
+    @property
+    def _per_kelvin(self) -> tuple[float, float]:
+        """Expansion (1/K) and curvature (1/(m K))."""
+        if self.layers is not None:
+            laminate = Laminate(self.layers)
+            return laminate.expansion, laminate.curvature
+        return self.expansion or 0.0, self.curvature or 0.0
+
+    def _swelling(self, structure: Any, place: str) -> Swelling:
+        if structure.pattern is None:
+            raise InputError(f"{place}: this structure has no pattern with panels")
+        chosen = np.zeros(len(structure.pattern.faces))
+        triangles = resolve_panels(structure, self.panels, f"{place}.panels")
+        chosen[structure.triangle_panel[triangles]] = self.change
+        expansion, curvature = self._per_kelvin
+        return structure.swollen(chosen * expansion, chosen * curvature)
+
+    def following(self, structure: Any, place: str) -> Following:
+        """See `Load`."""
+        return self._swelling(structure, place).forces
+
+    def turns(self, structure: Any, place: str) -> NDArray[np.float64]:
+        """See `Load`."""
+        return self._swelling(structure, place).turns
+
+    def table(self) -> dict[str, Any]:
+        """Its table of plain values, without the history."""
+        return {key: value for key, value in super().table().items() if value is not None}
