@@ -63,6 +63,15 @@ def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
     assert len(case.actuated_creases) == len(case.structure.folds)
 
 
+def test_the_loads_page_shows_a_case_that_can_be_made():
+    names: dict = {}
+    (block,) = blocks("loads.md", "python")
+    exec(compile(block, "loads.md", "exec"), names)
+    assert len(names["case"].following_terms) == 2
+    listed = (DOCS / "loads.md").read_text("utf-8")
+    assert all(f"`fd.{kind.__name__}(" in listed for kind in LOADS)
+
+
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):
     page, *_, slow, _ = blocks("case-file.md", "toml")
     rest = re.sub(r'mass = \["circumcenter", "consistent"\]\n', "", page)

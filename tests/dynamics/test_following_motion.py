@@ -205,3 +205,26 @@ def test_a_state_of_a_path_takes_the_loads_by_its_factor() -> None:
     assert linearize(case, state, load_factor=0.5).residual < 1e-6
     with pytest.warns(FoldynWarning, match="load_factor of its pressure and moments"):
         assert linearize(case, state).residual > 0.01
+
+
+def test_frequency_responses_about_a_loaded_state_agree_with_motions() -> None:
+    """The direct one takes the stiffness of the loads, the stepped sine their forces."""
+    pattern = fd.Pattern(
+        [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]],
+        [[0, 1, 4, 3], [1, 2, 5, 4]],
+        {(1, 4): "V"},
+    )
+    s = bars(pattern, fd.Sheet(1e5, 0.25, 0.01, 1.0), crease_stiffness=0.005)
+    held = [fd.Fix(np.flatnonzero(s.nodes[:, 0] < 1.0 + 1e-9).tolist(), "xyz")]
+    loads = [fd.Pressure(0.004, [1]), fd.CreaseMoment([0], -0.002)]
+    case, drive = fd.Case(s, held, loads, fd.Rayleigh(alpha=0.5)), fd.Force([2, 5], (0, 0, 1e-6))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        found = [
+            fd.frf(case, drive, [0.15], state="equilibrium", method=method).receptance
+            for method in ("direct", "stepped_sine")
+        ]
+        unloaded = fd.frf(case, drive, [0.15]).receptance
+    direct, stepped, rest = (one.sel(node=2, axis="z").values[0] for one in (*found, unloaded))
+    assert abs(stepped - direct) < 1e-3 * abs(direct)
+    assert abs(rest - direct) > 0.1 * abs(direct)  # so that the state matters

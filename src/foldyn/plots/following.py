@@ -52,7 +52,7 @@ def _rows(numbers: NDArray) -> Iterator[tuple[int, ...]]:
 def _share(numbers: list[int], values: NDArray, added: bool, history: Any) -> Share:
     """Values of entries by panel or crease: their sum, or what all have in common."""
     found, which = np.unique(numbers, return_inverse=True)
-    total = np.bincount(which, values)
+    total = np.bincount(which, values).astype(float)
     return Share(found, total if added else total / np.bincount(which), history)
 
 
