@@ -139,7 +139,7 @@ def test_bad_files(path, old, new, message):
 
 
 def test_a_file_without_density_needs_a_mass_on_each_free_node(tmp_path):
-    text = FILE.replace("density = 100.0\n", "").replace('[[loads]]\ngravity = [0, 0, -0.01]\n', "")
+    text = FILE.replace("density = 100.0\n", "").replace("[[loads]]\ngravity = [0, 0, -0.01]\n", "")
     start = text.index("[analysis]")
     text = text[:start] + '[analysis]\nkind = "modes"\ncount = 1\n'
     (tmp_path / "case.toml").write_text(text, "utf-8")

@@ -185,6 +185,8 @@ class PanelShells:
             raise InputError("supports: this model takes `Fix` alone")
         if not all(isinstance(one, Force) for one in case.loads):
             raise InputError("loads: this model takes `Force` alone")
+        if case.masses or options.clamped:
+            raise InputError("masses, clamped: this model takes neither")
         if case.damping.beta:
             raise InputError(f"damping: beta = {case.damping.beta}: this model takes alpha alone")
         if options.crease_stiffness is not None or options.crease_rest is not None:
