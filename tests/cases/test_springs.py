@@ -249,6 +249,21 @@ def test_the_energy_balance_of_a_shell_closes_with_springs():
     assert motion.attrs["energy_error"] < 1e-3
 
 
+@pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
+def test_creases_that_fold_by_themselves_work_against_springs(method):
+    s = structure("bars and hinges", FOLD, HEAVY, clamped=[(0, 1)])
+    springs = [fd.Spring(2.0, [4], direction="z"), fd.Spring(3.0, between=[(2, 5)])]
+    fold = fd.Actuate([0], 150.0, fd.Ramp(0.2, smooth=True))
+    case = fd.Case(s, [fd.Fix([0, 1]), *springs], [fold], fd.Rayleigh(0.5, 1e-5))
+    motion = fd.simulate(case, 0.2, method, every=0.02)
+    assert motion.attrs["energy_error"] < 1e-4
+    assert float(motion.work.max()) > 0.01
+    assert float(motion.strain_springs.max()) > 0.0
+    path = fd.trace(fd.Case(s, case.supports, [fd.Actuate([0], 150.0)]))
+    strain = sum(float(path[name][-1]) for name in case.energy_groups)
+    assert strain == pytest.approx(float(path.work[-1]), rel=1e-3)
+
+
 def test_the_critical_step_sees_stiff_springs():
     s = structure("bars and hinges", sheet=HEAVY, mass="panel")
     slack, stiff = (fd.critical_step(fd.Case(s, [fd.Spring(k, everywhere(s))])) for k in (1.0, 1e8))

@@ -185,8 +185,10 @@ class PanelShells:
             raise InputError("supports: this model takes `Fix` alone")
         if not all(isinstance(one, Force) for one in case.loads):
             raise InputError("loads: this model takes `Force` alone")
-        if case.rayleigh.beta:
-            raise InputError(f"damping: beta = {case.rayleigh.beta}: this model takes alpha alone")
+        if case.masses or options.clamped or options.rigid is not None:
+            raise InputError("masses, clamped, rigid: this model takes none of them")
+        if case.rayleigh.beta or len(case.dampings) > 1:
+            raise InputError("damping: this model takes alpha of Rayleigh alone")
         if options.crease_stiffness is not None or options.crease_rest is not None:
             raise InputError("crease_stiffness, crease_rest: this model has those of the sheet")
         if case.structure.sheet.panels or case.structure.pattern.boards is not None:
