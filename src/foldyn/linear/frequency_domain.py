@@ -157,7 +157,7 @@ def _amplitudes(
     """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values."""
     own = damping.diagonal()
     detuned = values - omega**2
-    scale = np.sqrt(np.outer(own, own))
+    scale = np.sqrt(np.abs(np.outer(own, own)))
     if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
         try:
             return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
