@@ -104,11 +104,7 @@ class Case(Damped):
         for place, support in self._supports(Fix, Impose):
             with faults.collected():
                 self._nodes_of(place, support)
-        for place, dashpot in self.dashpots:
-            with faults.collected():
-                dashpot.ends(self.structure, place)
-        with faults.collected():
-            _ = self.crease_damping
+        self._check_damping(faults)
         for place, load in self._loads():
             with faults.collected():
                 load.loaded(self.structure, place)

@@ -16,7 +16,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import loads as histories
-from foldyn.plots import marks, scene, style
+from foldyn.plots import dashpots, marks, scene, style
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure
@@ -49,7 +49,7 @@ def draw_structure(
     supports : bool
         Mark held and moved nodes: one triangle per direction, and the names of the directions. An
         arrow from each node with an imposed displacement, and one from the middle of a moving
-        base.
+        base. Dashpots as a cup and a piston.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         and one from the center of mass along gravity. Actuated creases are highlighted.
@@ -86,6 +86,7 @@ def draw_structure(
     groups = _supports(sheet, points, marked, sight) if supports else []
     length = min(0.17 * size, 0.8 * edge)
     arrows = _motions(sheet, points, length, sight) if supports else []
+    arrows += _dashpots(sheet, points, 0.5 * length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
     triangles = np.concatenate([group.triangles for group in groups] or [np.zeros((0, 3, 3))])
     heads = np.concatenate([group.heads for group in arrows] or [np.zeros((0, 3, 3))])
@@ -179,6 +180,16 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
         *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),
         *_arrows(base, length, sight, style.BASE, histories.describe_base),
     ]
+
+
+def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Arrows]:
+    """Return the lines of the dashpots."""
+    lines = dashpots.dashpot_lines(sheet.case, points, size, sight)
+    if not len(lines):
+        return []
+    texts = dict.fromkeys(dashpots.describe_dashpot(one) for _, one in sheet.case.dashpots)
+    keys = [style.key(text, color=style.DASHPOT, linewidth=1.8) for text in texts]
+    return [_Arrows(lines, np.zeros((0, 3, 3)), style.DASHPOT, keys[:_MOST_LOADS_LISTED])]
 
 
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:

@@ -42,6 +42,7 @@ IMPOSED = ORANGE
 IMPOSED_TEXT = "#8A5A00"  # the same, dark enough to be read
 BASE = SKY
 LOAD = PURPLE
+DASHPOT = BLACK
 GRAVITY = BLACK
 
 DPI = 150

@@ -11,6 +11,9 @@ from scipy import sparse
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
 
+HIDDEN = 12  # place of an element's dofs without mass among its own, and their factor in the matrix:
+MEAN = 0.5**0.5  # they have the mean velocity of a step, whose change is half that at its end
+
 
 class Weights(NamedTuple):
     """Factors of the matrices in that of an iteration."""
@@ -65,6 +68,7 @@ class ElementBlocks:
         if not len(self._gradient):
             return
         put_gradients(self._elements, np.ascontiguousarray(u), self._gradient)
+        self._gradient[:, HIDDEN:] *= MEAN
         weighted = self._elements.coefficient[:, None] * self._gradient
         values = (weighted[:, :, None] * self._gradient[:, None, :])[self._pairs]
         out[:] = self._still
