@@ -84,7 +84,8 @@ def test_stored_and_read_back(damping, supports, tmp_path):
         ),
         ("[damping]\ncreases = 0.001\n", fd.CreaseDamping(0.001), ()),
         (
-            '[damping]\ncreases = [{ coefficient = 1e-3, creases = [0] }, { coefficient = 2e-3 }]\n',
+            "[damping]\ncreases = "
+            "[{ coefficient = 1e-3, creases = [0] }, { coefficient = 2e-3 }]\n",
             (fd.CreaseDamping(1e-3, [0]), fd.CreaseDamping(2e-3)),
             (),
         ),

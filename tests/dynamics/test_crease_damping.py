@@ -100,7 +100,9 @@ def test_rotation_of_the_whole_changes_nothing():
     found = []
     for turn in (Rotation.identity(), Rotation.from_rotvec([0.4, -1.0, 2.0])):
         pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
-        turned = fd.Pattern(turn.apply(np.array(pattern.vertices)), pattern.faces, pattern.assignments)
+        turned = fd.Pattern(
+            turn.apply(np.array(pattern.vertices)), pattern.faces, pattern.assignments
+        )
         sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
         s = fd.discretize(
             turned, sheet, fold_law="linear", bend_law="linear", crease_stiffness=K,
@@ -129,7 +131,7 @@ def check_folding(case: fd.Case, motion, angle: np.ndarray, tolerance: float) ->
     assert np.degrees(abs(angle[-1] - angle[0])) > 100.0
     rate = np.gradient(angle, 0.01, edge_order=2)
     taken = 0.02 * np.trapezoid(rate**2, dx=0.01)
-    assert float(motion.dissipated[-1]) == pytest.approx(taken, rel=3e-3)
+    assert float(motion.dissipated[-1]) == pytest.approx(taken, rel=3e-4)
     assert motion.attrs["energy_error"] < tolerance
 
 
@@ -139,7 +141,7 @@ def test_a_large_folding(method):
     implicit = METHODS[method].implicit
     case, motion = large_folding("bars", method, 1e7, **({"dt": 0.005} if implicit else {}))
     angle = np.array([case.structure.dihedrals(u)[0][0] for u in motion.displacement.values])
-    check_folding(case, motion, angle, 1e-3)
+    check_folding(case, motion, angle, 1e-4)
 
 
 def test_a_large_folding_of_the_shell():
@@ -151,4 +153,4 @@ def test_a_large_folding_of_the_shell():
     one, two = (np.cross(axis, x[:, hinge[k]] - x[:, hinge[0]]) for k in (2, 3))
     cosine = (one * two).sum(axis=1)
     cosine /= np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
-    check_folding(case, motion, np.arccos(cosine), 2e-3)
+    check_folding(case, motion, np.arccos(cosine), 1e-4)

@@ -175,5 +175,7 @@ def test_a_sheet_with_strong_dampers_stays_stable(method):
 
 def test_dashpots_that_cost_many_steps_are_told():
     case = damped(fd.Dashpot(2000.0 * C, nodes=[1]))
-    with pytest.warns(fd.errors.FoldynWarning, match="the dashpots make the critical step .* times"):
+    with pytest.warns(
+        fd.errors.FoldynWarning, match="the dashpots make the critical step .* times"
+    ):
         fd.simulate(case, 0.01)

@@ -94,7 +94,7 @@ def test_rigid_motions_dissipate_nothing(model):
     x = case.structure.nodes + q[:n]
     q[:n] = turn.apply(x) - case.structure.nodes
     v = np.zeros_like(q)
-    v[:n] = np.cross([0.3, 1.0, -2.0], turn.apply(x)) + [1.0, 2.0, 3.0]
+    v[:n] = np.cross([0.3, 1.0, -2.0], turn.apply(x)) + np.arange(3.0)
     force = np.zeros_like(q)
     assert add_viscous_elements(dampers(case).elements, q, v, force) < 1e-25
     assert np.abs(force).max() < 1e-13

@@ -39,7 +39,7 @@ class Damped:
     @property
     def dampings(self) -> tuple[Damping, ...]:
         """Its kinds of damping."""
-        return self.damping if isinstance(self.damping, tuple) else (self.damping,)
+        return tuple(self.damping) if isinstance(self.damping, Sequence) else (self.damping,)
 
     def _check_damping(self, faults: Faults) -> None:
         """Refuse nodes and creases that are not there."""

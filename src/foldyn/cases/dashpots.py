@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases.decode import Part
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.values import brief, number, show, vector
+from foldyn.values import brief, indices, number, show, vector
 
 AXES = "xyz"
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
@@ -106,12 +106,12 @@ def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
     several = len(listed) > 0 and all(isinstance(one, list | tuple | np.ndarray) for one in listed)
     pairs = []
     for pair in listed if several else [value]:
-        numbers = check_nodes(pair, name) if not isinstance(pair, str) else ()
+        numbers = () if isinstance(pair, str) else indices(name, pair, "node", "as in [0, 5]")
         if len(numbers) != 2 or min(numbers) < 0:
             raise InputError(
                 f" = {show(value)}: must be two nodes, as in [0, 5], or pairs of them", name
             )
-        pairs.append((int(numbers[0]), int(numbers[1])))
+        pairs.append((numbers[0], numbers[1]))
     return tuple(pairs)
 
 

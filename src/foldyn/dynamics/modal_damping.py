@@ -129,9 +129,7 @@ def _swinging(
         found = int(swings.sum())
         if wanted is None or found >= wanted:
             kept = np.flatnonzero(swings)[:wanted]
-            return Spectrum(
-                spectrum.values[kept], spectrum.shapes[:, kept], math.nan, len(kept), 0
-            )
+            return Spectrum(spectrum.values[kept], spectrum.shapes[:, kept], math.nan, len(kept), 0)
         if sought == pencil.finite:
             raise InputError(
                 f": ratios of {wanted} modes, but only {found} swing; give fewer", "damping.modal"

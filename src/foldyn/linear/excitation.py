@@ -8,7 +8,8 @@ motion relative to it, the equation of motion M x'' + C x' + K x = 0 on the free
 
 because a translation strains nothing: K t = 0, and so is what beta K0, creases, dashpots between
 nodes and modal damping make of it. Rayleigh's alpha M and the dashpots to the ground, C_g, damp the
-absolute motion, as air does, and therefore drag at the moving body; beta K0 damps the strain. For one mass m on a spring k
+absolute motion, as air does, and therefore drag at the moving body; beta K0 damps the strain. For
+one mass m on a spring k
 
     x / y = (k + i w beta k) / (k - w^2 m + i w (alpha m + beta k)),
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
+from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
-from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
@@ -111,11 +111,11 @@ def modal(
 ) -> Answer:
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
-    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and creases,
-    beta K0 about a state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
-    is the response of all other modes at the squared frequency s: 0, or slightly below for a body
-    that is free to move (mode acceleration: Craig and Kurdila, Fundamentals of Structural
-    Dynamics, 2nd ed. 2006, chapter 11).
+    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and
+    creases, beta K0 about a state where the tangent is not K0) stay coupled.
+    r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the
+    squared frequency s: 0, or slightly below for a body that is free to move (mode acceleration:
+    Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
 
     At a resonance without damping the response is nan.
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.dynamics.progress import Reporter, reporter
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.linear.excitation import Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
@@ -141,8 +141,8 @@ def frf(
 
     Notes
     -----
-    Damping is all that the case has, linearized in the state. Peaks and their damping: `linear.peaks_of`; velocities and
-    accelerations per force: `linear.convert`.
+    Damping is all that the case has, linearized in the state. Peaks and their damping:
+    `linear.peaks_of`; velocities and accelerations per force: `linear.convert`.
 
     Examples
     --------

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.cases import Case, State
 from foldyn.errors import FoldynWarning
-from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.plots import loads as histories
 from foldyn.plots import dashpots, marks, scene, style
+from foldyn.plots import loads as histories
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, rest_keys
 from foldyn.structures import Structure

@@ -11,7 +11,9 @@ from scipy import sparse
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
 
-HIDDEN = 12  # place of an element's dofs without mass among its own, and their factor in the matrix:
+HIDDEN = (
+    12  # place of an element's dofs without mass among its own, and their factor in the matrix:
+)
 MEAN = 0.5**0.5  # they have the mean velocity of a step, whose change is half that at its end
 
 
@@ -52,8 +54,8 @@ class ElementBlocks:
 
     def settle(self, constant: NDArray, where: NDArray) -> None:
         """Know the constant damping (nnz, 3, 3), and where (k,) its blocks stand there."""
-        keys = block_keys(self.blocks.indptr, self.blocks.indices)
-        block = np.searchsorted(keys, self._row // 3 * (self.blocks.shape[0] // 3) + self._column // 3)
+        keys, rows = block_keys(self.blocks.indptr, self.blocks.indices), self.blocks.shape[0] // 3
+        block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
         self._slot = 9 * where[block] + 3 * (self._row % 3) + self._column % 3
         self._still = constant.copy()
 
