@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -88,3 +91,19 @@ def test_values_of_the_damping_can_be_varied(tmp_path):
     case = case_of_document(path, document).case()
     assert case.damping == (fd.Rayleigh(0.2), fd.ModalDamping([0.02, 0.05]), fd.CreaseDamping(0.0))
     assert case.dashpots[1][1].coefficient == 0.0
+
+
+def test_the_page_on_damping_works(tmp_path):
+    """Its case in Python and its tables in a case file."""
+    text = (Path(__file__).resolve().parents[2] / "docs/damping.md").read_text("utf-8")
+    ((_, code), (_, tables)) = re.findall(r"^```(python|toml)\n(.*?)^```$", text, re.M | re.S)
+    names: dict = {}
+    exec(compile(code, "damping.md", "exec"), names)
+    assert names["case"].modal_damping.modes == 2 and len(names["case"].dashpots) == 2
+    path = tmp_path / "case.toml"
+    sheet = CASE.partition("[damping]")[0].format(model=MODELS["bars"])
+    sheet = sheet.replace('"simple_fold"', '"miura"\ncells = [2, 2]').replace("= 120", "= 60")
+    path.write_text(sheet + tables + ANALYSES["modes"])
+    case = fd.read_case(path).case()
+    assert case.rayleigh.alpha == 0.1 and case.modal_damping.modes == 2
+    assert case.dashpots[1][1].between == ((0, 20), (4, 24))
