@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 import foldyn as fd
-from foldyn.linear import linearize
 from foldyn.algebra.eigen import Pencil, lowest
+from foldyn.linear import linearize
 from foldyn.linear.modes import rigid_space, unresisted
 
 

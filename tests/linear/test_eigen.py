@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from foldyn.errors import ComputationError, InputError
 from foldyn.algebra import eigen
 from foldyn.algebra.eigen import Pencil
+from foldyn.errors import ComputationError, InputError
 
 N = 150
 SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(

@@ -12,8 +12,8 @@ from bodies import PATTERNS, body, flat, hinged_panel, miura, paper_specimen
 from scipy.linalg import eigh
 
 import foldyn as fd
-from foldyn.errors import FoldynWarning, InputError
 from foldyn.algebra import eigen
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import linearize, modes
 
 STRAIGHT = {"fold_law": "linear", "bend_law": "linear"}

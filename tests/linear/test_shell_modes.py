@@ -8,8 +8,8 @@ from bodies import SHEET, flat, miura
 from scipy.linalg import eigh
 
 import foldyn as fd
-from foldyn.errors import InputError
 from foldyn.algebra import eigen
+from foldyn.errors import InputError
 from foldyn.linear import linearize, mac, modes
 from foldyn.shells import shell
 

@@ -141,10 +141,8 @@ class Case(Damped):
         for place, support in self._supports(Fix, Impose, Link):
             with faults.collected():
                 self._nodes_of(place, support)
-        for place, dashpot in self.dashpots:
-            with faults.collected():
-                dashpot.ends(self.structure, place)
-        for name in ("springs", "point_masses", "crease_damping"):
+        self._check_damping(faults)
+        for name in ("springs", "point_masses"):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh
 from foldyn.cases.dashpots import Dashpot
+from foldyn.errors import Faults
 from foldyn.structures.discretized import read_only
 
 
@@ -38,7 +39,17 @@ class Damped:
     @property
     def dampings(self) -> tuple[Damping, ...]:
         """Its kinds of damping."""
-        return self.damping if isinstance(self.damping, tuple) else (cast(Damping, self.damping),)
+        return tuple(self.damping) if isinstance(self.damping, Sequence) else (self.damping,)
+
+    def _check_damping(self, faults: Faults) -> None:
+        """Refuse nodes and creases that are not there."""
+        for place, dashpot in self.dashpots:
+            with faults.collected():
+                dashpot.ends(self.structure, place)
+        for part in self.dampings:
+            if isinstance(part, CreaseDamping):
+                with faults.collected():
+                    part.per_length(self.structure, "damping")
 
     @cached_property
     def rayleigh(self) -> Rayleigh:

@@ -107,12 +107,12 @@ def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
     several = len(listed) > 0 and all(isinstance(one, list | tuple | np.ndarray) for one in listed)
     pairs = []
     for pair in listed if several else [value]:
-        numbers = indices(name, pair, "node", "as in [0, 5]") if not isinstance(pair, str) else ()
+        numbers = () if isinstance(pair, str) else indices(name, pair, "node", "as in [0, 5]")
         if len(numbers) != 2 or min(numbers) < 0:
             raise InputError(
                 f" = {show(value)}: must be two nodes, as in [0, 5], or pairs of them", name
             )
-        pairs.append((int(numbers[0]), int(numbers[1])))
+        pairs.append((numbers[0], numbers[1]))
     return tuple(pairs)
 
 

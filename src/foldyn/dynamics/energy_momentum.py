@@ -6,8 +6,9 @@
 with F the forces of `implicit.discrete_gradient`, C the damping but for alpha M, that of elements
 that follow the motion at (u0 + u1)/2 (a rigid motion dissipates nothing), and p at each end of the
 step those of all loads, also of those that depend on the displacement. Without damping and loads
-the energy of any structure and the momenta of a free one stay what they are, with any step, to the tolerance of the
-equations and to rounding; with them the energy balance closes as exactly. Of order 2 (Simo and
+the energy of any structure and the momenta of a free one stay what they are, with any step, to the
+tolerance of the equations and to rounding; with them the energy balance closes as exactly. Of order
+2 (Simo and
 Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
 """
 
@@ -166,13 +167,12 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
 
 @kernel
 def _halfway(h, s):
-    """Middle and mean velocity of a step from s.displacement to s.velocity: s.stage[0], s.product."""
-    u0, u1, middle, speed = (
-        flat(s.displacement),
-        flat(s.velocity),
-        flat(s.stage[0]),
-        flat(s.product),
-    )
+    """Middle and mean velocity, s.stage[0] and s.product, of a step.
+
+    It goes from s.displacement to s.velocity.
+    """
+    u0, u1 = flat(s.displacement), flat(s.velocity)
+    middle, speed = flat(s.stage[0]), flat(s.product)
     for i in range(u0.size):
         middle[i] = 0.5 * (u0[i] + u1[i])
         speed[i] = (u1[i] - u0[i]) / h

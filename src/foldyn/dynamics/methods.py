@@ -140,11 +140,9 @@ class Integrator(NamedTuple):
         """See `critical_step`."""
         if self.growth is None:
             return np.inf
-        omega, rate = (
-            largest_frequency(case, u),
-            damper_rate(case, u)
-            + modal_rows(case, None if u is None else np.asarray(u, float)).rate,
-        )
+        start = None if u is None else np.asarray(u, float)
+        rate = damper_rate(case, u) + modal_rows(case, start).rate
+        omega = largest_frequency(case, u)
         return MARGIN * stability_limit(self.growth, omega, case.rayleigh, rate)
 
 

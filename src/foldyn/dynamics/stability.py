@@ -80,9 +80,8 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     Hinges count with at least their nominal stiffness, so that superlinear bends, which have
     none at rest, cannot make the answer too small.
     """
-    return float(
-        np.sqrt(max(_largest_quotient(case, case.body.tangent(_state(case, u), 1.0)), 0.0))
-    )
+    tangent = case.body.tangent(_state(case, u), 1.0)
+    return float(np.sqrt(max(_largest_quotient(case, tangent), 0.0)))
 
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:

@@ -113,11 +113,11 @@ def modal(
 ) -> Answer:
     """Superpose modes: x = Phi q + r with (Lambda - w^2 + i w Phi' C Phi) q = Phi' f.
 
-    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and creases,
-    beta K0 about a state where the tangent is not K0) stay coupled. r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f
-    is the response of all other modes at the squared frequency s: 0, or slightly below for a body
-    that is free to move (mode acceleration: Craig and Kurdila, Fundamentals of Structural
-    Dynamics, 2nd ed. 2006, chapter 11).
+    The matrix of the modal damping is taken whole: modes that damping couples (dashpots and
+    creases, beta K0 about a state where the tangent is not K0) stay coupled.
+    r = (K - s M)^-1 f - Phi (Lambda - s)^-1 Phi' f is the response of all other modes at the
+    squared frequency s: 0, or slightly below for a body that is free to move (mode acceleration:
+    Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd ed. 2006, chapter 11).
 
     At a resonance without damping the response is nan.
 
@@ -158,7 +158,7 @@ def _amplitudes(
     """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values."""
     own = damping.diagonal()
     detuned = values - omega**2
-    scale = np.sqrt(np.outer(own, own))
+    scale = np.sqrt(np.abs(np.outer(own, own)))
     if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
         try:
             return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))

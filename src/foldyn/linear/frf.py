@@ -141,8 +141,8 @@ def frf(
 
     Notes
     -----
-    Damping is all that the case has, linearized in the state. Peaks and their damping: `linear.peaks_of`; velocities and
-    accelerations per force: `linear.convert`.
+    Damping is all that the case has, linearized in the state. Peaks and their damping:
+    `linear.peaks_of`; velocities and accelerations per force: `linear.convert`.
 
     Examples
     --------

@@ -61,8 +61,8 @@ def stepped_sine(rig: Rig, frequency: NDArray, options: SteppedSine, report: Rep
     """
     if "start" in {getattr(part, "state", "rest") for part in rig.case.dampings}:
         raise InputError(
-            'damping: with state = "start" each motion would take K0 or modes where the one before has '
-            'ended; use state = "rest", or method = "impulse" or "burst_random"'
+            'damping: with state = "start" each motion would take K0 or modes where the one before '
+            'has ended; use state = "rest", or method = "impulse" or "burst_random"'
         )
     response = np.empty((len(frequency), *rig.state.shape), complex)
     unsteady, spent = np.empty(len(frequency)), np.zeros(len(frequency))

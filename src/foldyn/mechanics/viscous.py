@@ -1,8 +1,8 @@
 """Viscous elements whose direction follows the motion: axial dashpots and creases.
 
 Each resists the rate of a scalar s(q) of the dofs, a distance or an angle, with the force
-c (ds/dt) grad s, ds/dt = grad s . v. It takes the power c (ds/dt)^2, which is none in rigid motions,
-and its matrix in a state is c grad s grad s'. Grad s is sparse: the columns of `dofs`.
+c (ds/dt) grad s, ds/dt = grad s . v. It takes the power c (ds/dt)^2, which is none in rigid
+motions, and its matrix in a state is c grad s grad s'. Grad s is sparse: the columns of `dofs`.
 
 The angle of a hinge is its dihedral less a multiple of two dofs beside displacements, if it has
 them, as a piece of a shell's crease does.

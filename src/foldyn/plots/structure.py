@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.plots import following, marks, scene, style
+from foldyn.plots import dashpots, following, marks, scene, style
 from foldyn.plots import loads as histories
 from foldyn.plots.attachments import attachments
 from foldyn.plots.scene import Points, Sheet3D, View
@@ -50,7 +50,7 @@ def draw_structure(
     supports : bool
         Mark held and moved nodes: one triangle per direction, and the names of the directions. An
         arrow from each node with an imposed displacement, and one from the middle of a moving
-        base. Springs are zigzags, clamped edges are hatched.
+        base. Springs are zigzags, dashpots a cup and a piston, clamped edges are hatched.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         one from each panel under pressure, two about each crease with a moment, towards the panels
@@ -89,6 +89,7 @@ def draw_structure(
     groups = _supports(sheet, points, marked, sight) if supports else []
     length = min(0.17 * size, 0.8 * edge)
     arrows = _motions(sheet, points, length, sight) if supports else []
+    arrows += _dashpots(sheet, points, 0.5 * length, sight) if supports else []
     arrows += _loads(sheet, points, length, sight) if loads else []
     attached = attachments(sheet, points, marked, sight, supports, loads)
     triangles = np.concatenate([group.triangles for group in groups] or [np.zeros((0, 3, 3))])
@@ -186,6 +187,16 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
         *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),
         *_arrows(base, length, sight, style.BASE, histories.describe_base),
     ]
+
+
+def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Arrows]:
+    """Return the lines of the dashpots."""
+    lines = dashpots.dashpot_lines(sheet.case, points, size, sight)
+    if not len(lines):
+        return []
+    texts = dict.fromkeys(dashpots.describe_dashpot(one) for _, one in sheet.case.dashpots)
+    keys = [style.key(text, color=style.DASHPOT, linewidth=1.8) for text in texts]
+    return [_Arrows(lines, np.zeros((0, 3, 3)), style.DASHPOT, keys[:_MOST_LOADS_LISTED])]
 
 
 def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:

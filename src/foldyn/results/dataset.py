@@ -88,8 +88,8 @@ def trajectory_dataset(
     known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
     values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
-    own = (getattr(part, "history", None) for part in (*case.supports, *case.loads))
-    called = any(type(history) not in (*HISTORIES.values(), type(None)) for history in own)
+    histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads))
+    called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
     return result_dataset("trajectory", case, data, along, statistics, times)

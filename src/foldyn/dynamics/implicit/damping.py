@@ -11,6 +11,11 @@ from scipy import sparse
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
 
+HIDDEN = (
+    12  # place of an element's dofs without mass among its own, and their factor in the matrix:
+)
+MEAN = 0.5**0.5  # they have the mean velocity of a step, whose change is half that at its end
+
 
 class Weights(NamedTuple):
     """Factors of the matrices in that of an iteration."""
@@ -49,10 +54,8 @@ class ElementBlocks:
 
     def settle(self, constant: NDArray, where: NDArray) -> None:
         """Know the constant damping (nnz, 3, 3), and where (k,) its blocks stand there."""
-        keys = block_keys(self.blocks.indptr, self.blocks.indices)
-        block = np.searchsorted(
-            keys, self._row // 3 * (self.blocks.shape[0] // 3) + self._column // 3
-        )
+        keys, rows = block_keys(self.blocks.indptr, self.blocks.indices), self.blocks.shape[0] // 3
+        block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
         self._slot = 9 * where[block] + 3 * (self._row % 3) + self._column % 3
         self._still = constant.copy()
 
@@ -67,6 +70,7 @@ class ElementBlocks:
         if not len(self._gradient):
             return
         put_gradients(self._elements, np.ascontiguousarray(u), self._gradient)
+        self._gradient[:, HIDDEN:] *= MEAN
         weighted = self._elements.coefficient[:, None] * self._gradient
         values = (weighted[:, :, None] * self._gradient[:, None, :])[self._pairs]
         out[:] = self._still

@@ -1,11 +1,13 @@
 """The matrix of one iteration: stiffness, mass and damping with the weights of a step.
 
-Modal damping, a product with rows of all dofs, would fill the matrix. It is added to what is
-factorized, A, by the formula of Woodbury: (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1.
-
 All three stand as 3x3 blocks of one pattern, so that a step's matrix is one pass over them, which
 puts the entries between free dofs straight into what is factorized: a band with the nodes numbered
 along the sheet or, where that would be too wide, a sparse matrix.
+
+Modal damping, a product with rows G of all dofs, would fill the matrix. It is added to what is
+factorized, A, by Woodbury's formula,
+
+    (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1.
 """
 
 from __future__ import annotations

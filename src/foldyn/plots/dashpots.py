@@ -1,0 +1,65 @@
+"""Dashpots in pictures of a structure: a cup and a piston, to another node or to the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foldyn.cases import Case, Dashpot
+from foldyn.plots.scene import Points, View
+
+CUP = (-0.5, 0.5)  # beginning and end of the cup along the line, in lengths of it
+PISTON = 0.1  # where the piston is
+SHARE = 0.4  # of the line that the cup takes at most
+HALF = 0.45  # width of the cup over twice its length
+REACH = 1.8  # lengths of the cup from a node to the ground
+
+
+def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points:
+    """Segments (k, 2, 3) of all dashpots of a case, at node positions (n, 3).
+
+    size : length of a cup, m.
+    """
+    segments: list[Points] = []
+    for place, dashpot in case.dashpots:
+        for ends in dashpot.ends(case.structure, place):
+            start = points[ends[0]]
+            grounded = len(ends) == 1
+            end = _ground(dashpot, start, size) if grounded else points[ends[1]]
+            segments += _symbol(start, end, size, view, grounded)
+    return np.array(segments).reshape(-1, 2, 3)
+
+
+def describe_dashpot(dashpot: Dashpot) -> str:
+    """Say in words how strong a dashpot is, and what it ties."""
+    to = "to the ground" if dashpot.between is None else "between nodes"
+    return f"dashpot {dashpot.coefficient:.4g} N s/m {to}"
+
+
+def _ground(dashpot: Dashpot, node: Points, size: float) -> Points:
+    """Where the ground stands: along the direction, or below."""
+    along = dashpot.along
+    return node + REACH * size * (np.array([0.0, 0.0, -1.0]) if along is None else along)
+
+
+def _symbol(start: Points, end: Points, size: float, view: View, grounded: bool) -> list[Points]:
+    length = float(np.linalg.norm(end - start))
+    if length <= 0.0:
+        return []
+    along = (end - start) / length
+    across = np.cross(view.basis[2], along)
+    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else view.basis[0]
+    cup = min(size, SHARE * length)
+    middle, half = 0.5 * (start + end), HALF * cup * across
+    bottom, top = (middle + at * cup * along for at in CUP)
+    piston = middle + PISTON * cup * along
+    lines = [
+        (start, bottom),
+        (bottom - half, bottom + half),
+        (bottom - half, top - half),
+        (bottom + half, top + half),
+        (piston - 0.7 * half, piston + 0.7 * half),
+        (piston, end),
+    ]
+    if grounded:
+        lines.append((end - 1.3 * half, end + 1.3 * half))
+    return [np.array(line) for line in lines]

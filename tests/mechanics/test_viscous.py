@@ -1,0 +1,113 @@
+"""Axial dashpots and damped creases: directions, forces, power and matrix, for both models."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import foldyn as fd
+from foldyn.dynamics.dampers import dampers
+from foldyn.mechanics.viscous import (
+    WIDTH,
+    add_viscous_elements,
+    put_gradients,
+    viscous_elements_work,
+)
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+C = 0.3  # N m s/rad per m
+RNG = np.random.default_rng(4)
+
+
+def damped(model: str) -> fd.Case:
+    """A Miura cell with damped creases and dashpots between its corners."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=60, dihedral=80)
+    s = fd.discretize(pattern, SHEET) if model == "bars" else fd.shell(pattern, SHEET, divisions=2)
+    axial = fd.Dashpot(0.7, between=[(0, 8), (2, 6)])
+    return fd.Case(s, [axial], damping=fd.CreaseDamping(C))
+
+
+def state(case: fd.Case, size: float) -> np.ndarray:
+    """Random dofs (rows, 3) of a size (m)."""
+    body, out = case.body, np.zeros((case.body.rows, 3))
+    out.reshape(-1)[: body.size] = size * RNG.standard_normal(body.size)
+    return out
+
+
+def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
+    """Distances (m) of the dashpots and angles (rad) of the hinges of the folds."""
+    n = len(case.structure.nodes)
+    x = case.structure.nodes + q.reshape(-1, 3)[:n]
+    lengths = [np.linalg.norm(x[b] - x[a]) for a, b in case.dashpots[0][1].between]
+    work = case.body.workspaces(1)[0]
+    case.body.internal(q.reshape(-1)[: case.body.size], work)
+    hinges = case.body.fold_hinges()
+    angles = work.fold_angle
+    if len(angles) != len(hinges.fold):  # bars and hinges: all hinges stand there
+        angles = case.body.angles(q)[case.structure.hinge_of_fold]
+    return np.concatenate([lengths, angles])
+
+
+@pytest.mark.parametrize("model", ["bars", "shell"])
+def test_directions_are_gradients(model):
+    """Of the distance between nodes, and of the very angle that resists folding."""
+    case = damped(model)
+    elements, q = dampers(case).elements, state(case, 0.02)
+    found = np.zeros((len(elements.coefficient), WIDTH))
+    put_gradients(elements, q, found)
+    for _ in range(3):
+        along, h = state(case, 1.0), 1e-6
+        exact = (scalars(case, q + h * along) - scalars(case, q - h * along)) / (2 * h)
+        rates = (found * along.ravel()[elements.dofs]).sum(axis=1)
+        assert rates == pytest.approx(exact, rel=1e-6, abs=1e-7)
+
+
+@pytest.mark.parametrize("model", ["bars", "shell"])
+def test_force_power_and_matrix_agree(model):
+    """Force = C(u) v, power = v' C v = sum of c rate^2; the coefficient is c times the length."""
+    case = damped(model)
+    parts, q, v = dampers(case), state(case, 0.02), state(case, 1.0)
+    elements, force = parts.elements, np.zeros_like(q)
+    power = add_viscous_elements(elements, q, v, force)
+    m = case.body.size
+    matrix = parts.matrix(q.ravel()[:m])
+    assert force.ravel()[:m] == pytest.approx(matrix @ v.ravel()[:m], rel=1e-12, abs=1e-12)
+    assert power == pytest.approx((force * v).sum(), rel=1e-12)
+    h = 1e-6
+    rates = (scalars(case, q + h * v) - scalars(case, q - h * v)) / (2 * h)
+    assert power == pytest.approx((elements.coefficient * rates**2).sum(), rel=1e-7)
+    creases = case.structure.pattern.creases
+    length = np.linalg.norm(np.diff(case.structure.nodes[creases], axis=1), axis=2).sum()
+    assert elements.coefficient.sum() == pytest.approx(2 * 0.7 + C * length)
+    shift = state(case, 1.0)
+    work = viscous_elements_work(elements, q, v, shift)
+    assert work == pytest.approx((force * shift).sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("model", ["bars", "shell"])
+def test_rigid_motions_dissipate_nothing(model):
+    """However far the sheet has turned and folded: no force, no power."""
+    case = damped(model)
+    n = len(case.structure.nodes)
+    turn, q = Rotation.from_rotvec([1.0, -2.0, 0.5]), state(case, 0.02)
+    x = case.structure.nodes + q[:n]
+    q[:n] = turn.apply(x) - case.structure.nodes
+    v = np.zeros_like(q)
+    v[:n] = np.cross([0.3, 1.0, -2.0], turn.apply(x)) + np.arange(3.0)
+    force = np.zeros_like(q)
+    assert add_viscous_elements(dampers(case).elements, q, v, force) < 1e-25
+    assert np.abs(force).max() < 1e-13
+
+
+def test_what_cannot_be_damped_is_said():
+    """A model that does not tell which hinges are those of a fold is refused, not left undamped."""
+    case = damped("bars")
+    body = case.body
+    hinges = body.fold_hinges()
+    body.fold_hinges = lambda: hinges._replace(
+        fold=hinges.fold[1:], nodes=hinges.nodes[1:], corners=hinges.corners[1:],
+        hidden=hinges.hidden[1:],
+    )  # fmt: skip
+    with pytest.raises(fd.errors.InputError, match="cannot damp crease 0"):
+        dampers(case)
