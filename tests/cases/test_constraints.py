@@ -124,7 +124,10 @@ OFF = r"supports\[0\].nodes: node 4 lies off the plane of nodes \[0, 1, 2\] by 0
             r"rigid = \[2\]: panel 2 is out of range; the pattern has panels 0 to 1",
         ),
         (lambda: fd.shell(FOLD, SHEET, 2, rigid="none"), 'rigid = "none": must be "all"'),
-        (lambda: fd.discretize(BENT, SHEET, rigid="all"), r"rigid: panel 0 is not flat: node 0 lies 0.07 of"),
+        (
+            lambda: fd.discretize(BENT, SHEET, rigid="all"),
+            r"rigid: panel 0 is not flat: node 0 lies 0.07 of",
+        ),
         (lambda: fd.shell(BENT, SHEET, 2, rigid=[0]), "rigid: panel 0 is not flat"),
     ],
 )

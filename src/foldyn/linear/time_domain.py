@@ -18,11 +18,12 @@ from foldyn.cases import (
     Force,
     History,
     Impose,
+    Link,
     State,
     Table,
     resolve_nodes,
 )
-from foldyn.cases.supports import AXES, Support
+from foldyn.cases.supports import Support, unit_vector
 from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Drive
@@ -92,12 +93,12 @@ class Rig:
 
     def _held(self) -> list[Support]:
         """Supports that stay where the state puts them; a base of the case's own stands still."""
-        held: list[Support] = [s for s in self.case.supports if isinstance(s, Fix)]
+        held: list[Support] = [s for s in self.case.supports if isinstance(s, Fix | Link)]
         for support in self.case.supports:
             if isinstance(support, Impose):
                 nodes = resolve_nodes(self.case.structure, support.nodes, "nodes")
-                where = self.state[nodes, AXES.index(support.axis)]
-                held.append(Impose(nodes.tolist(), support.axis, where.tolist()))
+                where = self.state[nodes] @ unit_vector(support.direction or support.axis)
+                held.append(replace(support, nodes=nodes, value=where.tolist(), history=None))
         return held
 
     def driven(self, history: History) -> Case:
