@@ -26,8 +26,8 @@ def test_elimination_spans_the_null_space(seed) -> None:
     free = np.setdiff1d(np.flatnonzero(~held), solved.slaves)
     basis = solved.basis.toarray()
     # x gives back held dofs, and the values of the equations kept
-    np.testing.assert_allclose(rows[solved.kept] @ basis[:, solved.slaves], np.eye(len(solved.kept)),
-                               atol=1e-12)  # fmt: skip
+    given = rows[solved.kept] @ basis[:, solved.slaves]
+    np.testing.assert_allclose(given, np.eye(len(solved.kept)), atol=1e-12)
     np.testing.assert_array_equal(basis[held], np.eye(24)[held])
     # free motions: all that satisfy the equations with held dofs at rest
     expected = null_space(np.vstack([rows, np.eye(24)[held]]))

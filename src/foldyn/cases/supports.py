@@ -179,7 +179,7 @@ class Link(Part):
         if self.to is None:
             axes = "xyz" if self.axes is None else self.axes
             object.__setattr__(self, "axes", check_axes("axes", axes))
-            if not isinstance(self.nodes, str) and len(self.nodes) < 2:
+            if not isinstance(self.nodes, str) and np.size(self.nodes) < 2:
                 raise InputError(
                     f" = {show(self.nodes)}: a link ties at least two nodes; give them all, or the "
                     "three nodes on which one rides, as in to = (0, 1, 2)",

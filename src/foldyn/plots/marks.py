@@ -13,7 +13,7 @@ from foldyn.plots.scene import Points, View
 _DIRECTIONS = np.radians(np.arange(90.0, 450.0, 30.0))
 
 
-def _billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
+def billboard(tip: Points, along: Points, length: float, half: float, view: View) -> Points:
     """Return a triangle (3, 3) that points along a unit vector and faces the viewer."""
     across = np.cross(view.basis[2], along)
     size = np.linalg.norm(across)
@@ -54,7 +54,7 @@ def support_triangles(
             # The triangle stands outside the sheet; on the middle plane, below or before it.
             outside = -1.0 if points[node, k] > middle[k] + 0.05 * size and k != 2 else 1.0
             along[k] = np.sign(moves[node, k]) or outside
-            triangles.append(_billboard(points[node], along, size, 0.38 * size, view))
+            triangles.append(billboard(points[node], along, size, 0.38 * size, view))
     return np.array(triangles).reshape(-1, 3, 3), held
 
 
@@ -83,7 +83,7 @@ def load_arrows(
     for node in np.flatnonzero(size > 0.0):
         along = vectors[node] / size[node]
         tip = points[node] + length * max(size[node] / longest, 1.0 / 3.0) * along
-        head = _billboard(tip, along, 0.3 * length, 0.11 * length, view)
+        head = billboard(tip, along, 0.3 * length, 0.11 * length, view)
         shafts.append([points[node], 0.5 * (head[1] + head[2])])
         heads.append(head)
     return np.array(shafts).reshape(-1, 2, 3), np.array(heads).reshape(-1, 3, 3)

@@ -41,6 +41,7 @@ SUPPORT = GREEN
 IMPOSED = ORANGE
 IMPOSED_TEXT = "#8A5A00"  # the same, dark enough to be read
 BASE = SKY
+LINK = BLACK
 LOAD = PURPLE
 GRAVITY = BLACK
 
