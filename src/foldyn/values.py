@@ -74,11 +74,16 @@ def shortened(text: str) -> str:
 
 
 def brief(cls: type[T]) -> type[T]:
-    """Give a data class a repr of one short line: arrays by their shape, lists by their ends."""
+    """Give a data class a repr of one short line: arrays by their shape, lists by their ends.
+
+    Arguments that are None unless given are left out.
+    """
 
     def shown(self: Any) -> str:
         given = (
-            f"{item.name}={_brief(getattr(self, item.name))}" for item in fields(self) if item.repr
+            f"{item.name}={_brief(getattr(self, item.name))}"
+            for item in fields(self)
+            if item.repr and not (item.default is None and getattr(self, item.name) is None)
         )
         return f"{type(self).__name__}({', '.join(given)})"
 

@@ -12,7 +12,7 @@ from foldyn.cases import Case, Constant, Fix, Force, Pulse, Rayleigh, State
 from foldyn.errors import FoldynWarning, InputError
 
 POINTS = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], dtype=float)
-STRUCTURE = SimpleNamespace(nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS))
+STRUCTURE = SimpleNamespace(nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=())
 
 
 def test_fixed_and_free_dofs() -> None:
@@ -78,7 +78,7 @@ def test_a_load_beside_held_axes_is_silent() -> None:
         (lambda: Fix(0, "xw"), 'axes = "xw": must be letters of "xyz"'),
         (lambda: Fix(0, ""), 'axes = "": must be letters'),
         (lambda: Fix(0, "xx"), 'axes = "xx": an axis is listed twice'),
-        (lambda: Fix(0, None), "axes = None: must be letters"),
+        (lambda: Fix(0, 3), "axes = 3: must be letters"),
         (lambda: Force(0, (1, 0)), r"vector = \[1, 0\]: must be three numbers"),
         (lambda: Force(0, (1, 0, np.nan)), r"vector\[2\] = nan: must be a finite number"),
         (lambda: Force(0, 1.0), "vector = 1.0: must be three numbers"),

@@ -8,7 +8,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
-from foldyn.plots import draw_structure, style
+from foldyn.plots import draw_structure, plot_load_history, style, ties
 from foldyn.plots.scene import View
 from foldyn.plots.visibility import hidden_points, split_edges
 
@@ -193,3 +193,31 @@ def test_edges_are_cut_where_a_panel_begins():
     np.testing.assert_allclose(np.sort(hidden[0, :, 0]), [0.0, 0.75], atol=2 / 24)
     length = np.linalg.norm(np.ptp(np.concatenate([visible, hidden]), axis=1), axis=1).sum()
     assert length == pytest.approx(3.0, rel=1e-12)
+
+
+def test_directions_and_links_are_marked(structure):
+    """A triangle with its tip at the node along each direction; a dotted line for each link."""
+    normal = np.array([-1.0, 0.0, 2.0]) / np.sqrt(5.0)
+    supports = [
+        cases.Fix([0], "xyz"),
+        cases.Fix([6, 8], direction=(-1, 0, 2)),
+        cases.Impose([7], direction=(1, 0, -1), value=0.05),
+        cases.Link([3, 5], axes="z"),
+        cases.Link([12], to=[4, 5, 7]),
+    ]
+    case = cases.Case(structure, supports)
+    figure = draw_structure(case)
+    texts = _keys(figure)
+    assert "link (nodes tied together)" in texts
+    assert "moved 0.05 m along (0.707, 0, -0.707) on node 7" in texts
+    held = ties.direction_triangles(case, cases.Fix, structure.nodes, 0.1, View())
+    np.testing.assert_allclose(held[:, 0], structure.nodes[[6, 8]])
+    inward = held[:, 0] - held[:, 1:].mean(axis=1)
+    np.testing.assert_allclose(inward, np.tile(0.1 * normal, (2, 1)), atol=1e-12)
+    pushed = ties.direction_triangles(case, cases.Impose, structure.nodes, 0.1, View())
+    pushes = (pushed[0, 0] - pushed[0, 1:].mean(axis=0)) / 0.1
+    np.testing.assert_allclose(pushes, np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0), atol=1e-12)
+    drawn = ties.links(case, structure.nodes)
+    assert len(drawn.segments) == 1 + 3
+    labels = [t.get_text() for t in plot_load_history(case, 1.0).legends[0].get_texts()]
+    assert labels[0].startswith("moved 0.05 m along (0.707, 0, -0.707) on node 7")

@@ -204,8 +204,9 @@ class PathAnalysis(Analysis):
 
     def shown(self, case: Case) -> NDArray[np.int64]:
         """Those with a force, else those that supports move, else all that can move."""
-        if not case.loaded_nodes.size and case.imposed.any():
-            return np.flatnonzero(case.imposed.any(axis=1))
+        moved = [vectors.any(axis=1) for vectors, _ in case.prescribed_terms]
+        if not case.loaded_nodes.size and np.any(moved):
+            return np.flatnonzero(np.any(moved, axis=0))
         return super().shown(case)
 
     sections = staticmethod(path_sections)

@@ -300,6 +300,18 @@ class Case(Damped):
             moved = self._straight.carried(vector)
             yield self._tied(moved, place, {place: support.value}), support.history
 
+    @cached_property
+    def prescribed_terms(self) -> Terms:
+        """What each `Impose` says, alone, along its axis or direction: (n, 3), m, with history."""
+        return _summed(self._prescribed()) if self.constraints else self.imposed_terms
+
+    def _prescribed(self) -> Summands:
+        for place, support in self._supports(Impose):
+            vector = np.zeros((len(self.structure.nodes), 3))
+            along = np.multiply.outer(support.value, unit_vector(support.direction or support.axis))
+            vector[self._nodes_of(place, support)] = along
+            yield vector, support.history
+
     def _tied(self, shape: NDArray, place: str, values: Mapping[str, Any]) -> NDArray:
         """Displacements (n, 3), m, when supports move as in a shape and by values along theirs."""
         ties = self.constraints

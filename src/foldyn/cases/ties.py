@@ -64,7 +64,8 @@ def _along(support: Fix | Impose, owner: str, nodes: NDArray) -> list[Equation]:
     """The displacement of each node along a direction, which its largest component names."""
     unit = unit_vector(support.direction)
     axes = [int(k) for k in np.argsort(-np.abs(unit), kind="stable") if unit[k] != 0.0]
-    return [Equation(owner, [3 * node + k for k in axes], unit[axes]) for node in nodes.tolist()]
+    values = unit[axes].tolist()
+    return [Equation(owner, [3 * node + k for k in axes], values) for node in nodes.tolist()]
 
 
 def _link(structure: Any, link: Link, place: str, nodes: NDArray) -> list[Equation]:

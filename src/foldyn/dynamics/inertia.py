@@ -31,6 +31,7 @@ class Inertia(NamedTuple):
     indptr: NDArray
     indices: NDArray
     data: NDArray
+    ties: Ties
     factor_of_axis: NDArray  # (3,) which factor serves each axis
     start: NDArray  # (factors + 1,) first row of each factor in the arrays below
     nodes: NDArray  # free nodes of each factor; with constraints free dofs
@@ -43,7 +44,6 @@ class Inertia(NamedTuple):
     upper_row: NDArray
     upper: NDArray
     pivot: NDArray  # 1 / diagonal of U
-    ties: Ties
 
 
 def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
@@ -89,9 +89,9 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
         mass.indptr.astype(np.int64),
         mass.indices.astype(np.int64),
         mass.data.astype(float),
+        ties,
         factor_of_axis.ravel(),
         *_join(factors),
-        ties=ties,
     )
 
 

@@ -14,7 +14,8 @@ from foldyn.cases.selection import resolve_creases
 from foldyn.cases.supports import unit_vector
 from foldyn.plots import style
 from foldyn.plots.following import Share, moments, pressures
-from foldyn.values import number, show
+from foldyn.plots.ties import base_vectors
+from foldyn.values import number
 
 _SAMPLES = 2001
 _LISTED = 3
@@ -110,16 +111,17 @@ def _peak(vectors: np.ndarray) -> float:
 
 
 def _imposed_curves(case: Case) -> list[_Curve]:
-    """Curves of imposed displacements, one for each history, value and axis."""
+    """Curves of imposed displacements, one for each history, value and axis or direction."""
     curves = []
-    for vectors, history in case.imposed_terms:
+    for _, history in case.prescribed_terms:
         groups: dict[tuple[str, float], list[int]] = {}
         for support in case.supports:
             if isinstance(support, Impose) and support.history == history:
-                unit = unit_vector(support.axis or support.direction)
-                along = support.axis or show(support.direction)
-                for node in resolve_nodes(case.structure, support.nodes).tolist():
-                    groups.setdefault((along, float(vectors[node] @ unit)), []).append(node)
+                nodes = resolve_nodes(case.structure, support.nodes).tolist()
+                along = support.axis or _direction(unit_vector(support.direction))
+                values = np.broadcast_to(np.asarray(support.value, float), (len(nodes),))
+                for node, value in zip(nodes, values.tolist(), strict=True):
+                    groups.setdefault((along, value), []).append(node)
         curves += _some(
             [
                 _Curve(
@@ -138,7 +140,9 @@ def _base_curves(case: Case) -> list[_Curve]:
     return [
         _Curve(value, f"base moved {value:.4g} m along {axis}", history)
         for vectors, history in case.base_terms
-        for axis, value in zip("xyz", signed_peak(vectors).tolist(), strict=True)
+        for axis, value in zip(
+            "xyz", signed_peak(base_vectors(case, vectors)).tolist(), strict=True
+        )
         if value
     ]
 
@@ -252,7 +256,7 @@ def _direction(unit: np.ndarray) -> str:
     axis = int(np.abs(unit).argmax())
     if abs(unit[axis]) > 1.0 - 1e-12:
         return f"{'-' if unit[axis] < 0 else '+'}{'xyz'[axis]}"
-    return "(" + ", ".join(f"{c:.3g}" for c in unit) + ")"
+    return "(" + ", ".join(f"{c + 0.0:.3g}" for c in unit) + ")"
 
 
 def history_name(history: Any) -> str:

@@ -215,7 +215,7 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
 
 def moved_supports(case: Case) -> tuple[list[int], str] | None:
     """Nodes that supports move together and farthest, and the direction; None where none moves."""
-    motion = sum((vector for vector, _ in case.imposed_terms), np.zeros(case.imposed.shape))
+    motion = sum((vector for vector, _ in case.prescribed_terms), np.zeros(case.imposed.shape))
     if not motion.any():
         return None
     largest, direction = farthest(motion)

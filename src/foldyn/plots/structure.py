@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike
 
-from foldyn.cases import Case
+from foldyn.cases import Case, Fix, Impose
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.plots import dashpots, following, marks, scene, style
+from foldyn.plots import dashpots, following, marks, scene, style, ties
 from foldyn.plots import loads as histories
 from foldyn.plots.attachments import attachments
 from foldyn.plots.scene import Points, Sheet3D, View
@@ -48,9 +48,10 @@ def draw_structure(
     numbers : bool or "all"
         Write the numbers of the pattern's vertices; "all" also those of all other nodes.
     supports : bool
-        Mark held and moved nodes: one triangle per direction, and the names of the directions. An
-        arrow from each node with an imposed displacement, and one from the middle of a moving
-        base. Springs are zigzags, dashpots a cup and a piston, clamped edges are hatched.
+        Mark held and moved nodes: one triangle per direction, and the names of the directions that
+        are axes. An arrow from each node with an imposed displacement, and one from the middle of
+        a moving base. Springs are zigzags, dashpots a cup and a piston, clamped edges are hatched;
+        dotted lines and rings show nodes that are linked.
     loads : bool
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         one from each panel under pressure, two about each crease with a moment, towards the panels
@@ -110,6 +111,9 @@ def draw_structure(
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += attached.keys
     keys += [key for group in arrows for key in group.keys]
+    linked = ties.links(sheet.case, points) if supports and sheet.case else None
+    if linked is not None and len(linked.nodes):
+        keys.append(linked.key)
 
     columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
     rows = -(-len(keys) // columns)
@@ -123,6 +127,10 @@ def draw_structure(
     for group in arrows:
         scene.add_segments(axes, group.shafts, group.color, 1.8, zorder=7.0)
         marks.add_triangles(axes, group.heads, group.color, 7.5)
+    if linked is not None and len(linked.nodes):
+        scene.add_segments(axes, linked.segments, style.LINK, 1.4, "dotted", zorder=6.5)
+        look = {"s": 22.0, "facecolors": "none", "edgecolors": style.LINK, "linewidths": 1.0}
+        axes.scatter(*linked.nodes.T, depthshade=False, zorder=6.5, **look)
     _write_labels(axes, sheet, points, numbers, groups, (triangles, shafts, heads), sight)
     return style.finish(figure, keys, columns)
 
@@ -164,24 +172,27 @@ class _Arrows(NamedTuple):
 def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[_Supports]:
     """Return the marks of the nodes that are held, and of those that are moved."""
     fixed, imposed = np.asarray(sheet.case.fixed), np.asarray(sheet.case.imposed)
-    moves = sum((vectors for vectors, _ in sheet.case.imposed_terms), np.zeros(points.shape))
+    moves = sum((vectors for vectors, _ in sheet.case.prescribed_terms), np.zeros(points.shape))
     kinds = [
-        (fixed & ~imposed, style.SUPPORT, style.SUPPORT, "support (directions held)"),
-        (imposed, style.IMPOSED, style.IMPOSED_TEXT, "imposed displacement (directions)"),
+        (Fix, fixed & ~imposed, style.SUPPORT, style.SUPPORT, "support (directions held)"),
+        (Impose, imposed, style.IMPOSED, style.IMPOSED_TEXT, "imposed displacement (directions)"),
     ]
-    return [
-        _Supports(*marks.support_triangles(points, mask, size, sight, moves), *look)
-        for mask, *look in kinds
-        if mask.any()
-    ]
+    groups = []
+    for kind, mask, *look in kinds:
+        straight, axes = marks.support_triangles(points, mask, size, sight, moves)
+        oblique = ties.direction_triangles(sheet.case, kind, points, size, sight)
+        if len(straight) or len(oblique):
+            groups.append(_Supports(np.concatenate([straight, oblique]), axes, *look))
+    return groups
 
 
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
-    imposed = [(points, vectors) for vectors, _ in sheet.case.imposed_terms]
+    imposed = [(points, vectors) for vectors, _ in sheet.case.prescribed_terms]
+    moved = [ties.base_vectors(sheet.case, vectors) for vectors, _ in sheet.case.base_terms]
     base = [
         (points[vectors.any(axis=1)].mean(axis=0)[None], histories.signed_peak(vectors)[None])
-        for vectors, _ in sheet.case.base_terms
+        for vectors in moved
     ]
     return [
         *_arrows(imposed, length, sight, style.IMPOSED, histories.describe_imposed),

@@ -101,6 +101,7 @@ def _direction(vector: NDArray) -> str:
     if abs(vector[axis]) > 1.0 - 1e-6:
         return AXES[axis]
     shown = vector / np.abs(vector).max() * (1 if vector[axis] > 0 else -1)
+    shown = np.where(np.abs(shown) > FREE, shown, 0.0)
     return "(" + ", ".join(f"{value + 0.0:.3g}" for value in shown) + ")"
 
 

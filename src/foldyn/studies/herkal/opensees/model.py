@@ -183,6 +183,8 @@ class PanelShells:
         case, options = self.case, self.case.structure.options
         if not all(isinstance(one, Fix) for one in case.supports):
             raise InputError("supports: this model takes `Fix` alone")
+        if case.constraints:
+            raise InputError("supports: this model takes axes, and panels that bend, alone")
         if not all(isinstance(one, Force) for one in case.loads):
             raise InputError("loads: this model takes `Force` alone")
         if case.masses or options.clamped or options.rigid is not None:

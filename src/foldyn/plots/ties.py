@@ -1,0 +1,65 @@
+"""Marks of what ties displacements together: supports along directions, and links."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from foldyn.cases import Case, Fix, Impose, Link, resolve_nodes
+from foldyn.cases.supports import unit_vector
+from foldyn.plots import marks, style
+from foldyn.plots.scene import Points, View
+
+
+class Links(NamedTuple):
+    """Lines between nodes that are tied together, and the nodes."""
+
+    segments: Points  # (k, 2, 3)
+    nodes: Points  # (m, 3)
+
+    @property
+    def key(self) -> Line2D:
+        """Its legend entry."""
+        look = {"color": style.LINK, "marker": "o", "markersize": 5.0, "markerfacecolor": "none"}
+        return style.key("link (nodes tied together)", linestyle="dotted", **look)
+
+
+def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
+    """Triangles (k, 3, 3) of the nodes that `Fix` or `Impose`, the kind, holds along directions."""
+    middle, found = points.mean(axis=0), []
+    for support in case.supports:
+        if not isinstance(support, Fix | Impose) or type(support) is not kind:
+            continue
+        if support.direction is None:
+            continue
+        nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
+        for node, value in zip(nodes, _values(support, len(nodes)), strict=True):
+            # it pushes where it moves; else it stands below the sheet, or outside
+            outward = unit[2] if abs(unit[2]) > 1e-9 else unit @ (middle - points[node])
+            along = unit * (np.sign(value) or np.sign(outward) or 1.0)
+            found.append(marks.billboard(points[node], along, size, 0.38 * size, sight))
+    return np.array(found).reshape(-1, 3, 3)
+
+
+def _values(support: Fix | Impose, count: int) -> Points:
+    return np.broadcast_to(getattr(support, "value", 0.0), (count,))
+
+
+def links(case: Case, points: Points) -> Links:
+    """Lines from the first of some linked nodes to the others, or from riders to their carriers."""
+    segments, tied = [], []
+    for support in case.supports:
+        if isinstance(support, Link):
+            nodes = resolve_nodes(case.structure, support.nodes).tolist()
+            first, others = ([nodes[0]], nodes[1:]) if support.to is None else (support.to, nodes)
+            segments += [[points[a], points[b]] for a in first for b in others]
+            tied += [points[node] for node in nodes]
+    return Links(np.array(segments).reshape(-1, 2, 3), np.array(tied).reshape(-1, 3))
+
+
+def base_vectors(case: Case, vectors: Points) -> Points:
+    """Displacements of a base (n, 3) at the nodes held along axes, if there are such."""
+    alone = np.where(case.fixed, vectors, 0.0)
+    return alone if alone.any() else vectors
