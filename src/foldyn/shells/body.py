@@ -20,6 +20,7 @@ from foldyn.shells.kernels import (
     ShellModel,
     ShellWork,
     fold,
+    ride,
     shell_energy,
     shell_force,
     shell_work,
@@ -143,6 +144,7 @@ class ShellBody(Body):
         work = shell_work(model)
         if len(rows):
             fold(model, u, x, work)
+            ride(model, u, work)
         turns = work.gradient[rows]
         turns[:, :6] += 0.5 * np.tile(turns[:, 9:], (1, 2))
         return unit_rows(model.hinges[rows, :3], turns[:, :9], self.size)

@@ -74,24 +74,16 @@ def shell_work(model: ShellModel) -> ShellWork:
     )  # fmt: skip
 
 
-@scalar
-def moved(model, u, e, v, c):
-    """Displacement (m) along axis c of node v of hinge e, the mean of j and k for a wing."""
-    node = model.hinges[e, v]
-    if node < u.shape[0]:
-        return u[node, c]
-    return 0.5 * (u[model.hinges[e, 0], c] + u[model.hinges[e, 1], c])
-
-
 @kernel
 def fold(model, u, x, work):
-    """Dihedrals, their gradients and the dihedrals of the creases at a state."""
-    rest = model.rest
+    """Dihedrals, their gradients and those of the creases at a state; see `ride` for wings."""
+    rest, n = model.rest, u.shape[0]
     p = np.empty(12)
     for e in range(model.hinges.shape[0]):
         for v in range(4):
+            node = model.hinges[e, v]
             for c in range(3):
-                p[3 * v + c] = rest[model.hinges[e, v], c] + moved(model, u, e, v, c)
+                p[3 * v + c] = rest[node, c] + (u[node, c] if node < n else 0.0)
         found = dihedral_gradient(
             p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
         )
@@ -104,6 +96,33 @@ def fold(model, u, x, work):
         one, other = model.piece_rotations[k]
         both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
         work.fold_angle[k] = model.hinge_rest[e] + work.turn[e] - model.per_reach * both
+
+
+@kernel
+def ride(model, u, work):
+    """Dihedrals of the hinges with wings, the last ones, where these ride on j and k."""
+    wings, p = model.rest.shape[0] - model.nodes, np.empty((4, 3))
+    for e in range(model.hinges.shape[0] - wings, model.hinges.shape[0]):
+        wing_points(model, u, e, p)
+        found = dihedral_gradient(
+            p[0, 0], p[0, 1], p[0, 2], p[1, 0], p[1, 1], p[1, 2],
+            p[2, 0], p[2, 1], p[2, 2], p[3, 0], p[3, 1], p[3, 2],
+        )  # fmt: skip
+        work.angle[e] = found[0]
+        work.turn[e] = found[0] - model.hinge_rest[e]
+        for c in range(12):
+            work.gradient[e, c] = found[1 + c]
+
+
+@scalar
+def wing_points(model, u, e, out):
+    """Points (4, 3) of a hinge with a wing."""
+    j, k = model.hinges[e, 0], model.hinges[e, 1]
+    for c in range(3):
+        for v in range(3):
+            node = model.hinges[e, v]
+            out[v, c] = model.rest[node, c] + u[node, c]
+        out[3, c] = model.rest[model.hinges[e, 3], c] + 0.5 * (u[j, c] + u[k, c])
 
 
 @kernel
@@ -133,6 +152,7 @@ def side_rotations(model, x, turn, t, out):
 def shell_energy(model, u, x, work, out):
     """Energies (J) of membrane, bending and creases, to out (3,)."""
     fold(model, u, x, work)
+    ride(model, u, work)
     e, beta = np.empty(3), np.empty(3)
     out[:] = 0.0
     for t in range(model.triangles.shape[0]):
@@ -155,6 +175,7 @@ def shell_energy(model, u, x, work, out):
 def shell_force(model, u, x, force, couple, work):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
     fold(model, u, x, work)
+    ride(model, u, work)
     n = u.shape[0]
     force[:] = 0.0
     couple[:] = 0.0
@@ -191,13 +212,21 @@ def shell_force(model, u, x, force, couple, work):
     for h in range(model.hinges.shape[0]):
         for v in range(4):
             node = model.hinges[h, v]
+            if node < n:
+                for c in range(3):
+                    force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+    carry(model, force, work)
+
+
+@kernel
+def carry(model, force, work):
+    """Give the forces on wings to the nodes on which they ride."""
+    wings = model.rest.shape[0] - model.nodes
+    for h in range(model.hinges.shape[0] - wings, model.hinges.shape[0]):
+        for end in range(2):
             for c in range(3):
-                pull = work.moment[h] * work.gradient[h, 3 * v + c]
-                if node < n:
-                    force[node, c] += pull
-                else:
-                    force[model.hinges[h, 0], c] += 0.5 * pull
-                    force[model.hinges[h, 1], c] += 0.5 * pull
+                carried = 0.5 * work.moment[h] * work.gradient[h, 9 + c]
+                force[model.hinges[h, end], c] += carried
 
 
 @overload(force_of, inline="always")

@@ -19,10 +19,11 @@ from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.shells.kernels import (
     ShellModel,
     fold,
-    moved,
+    ride,
     shell_work,
     side_rotations,
     side_strains,
+    wing_points,
 )
 
 
@@ -213,9 +214,12 @@ def _add_triangles(model, pattern, u, x, work, data):
 def _curvature(model, u, work, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):
+        node = model.hinges[h, v]
         for c in range(3):
-            points[v, c] = model.rest[model.hinges[h, v], c] + moved(model, u, h, v, c)
+            points[v, c] = model.rest[node, c] + (u[node, c] if node < u.shape[0] else 0.0)
             gradient[v, c] = work.gradient[h, 3 * v + c]
+    if model.hinges[h, 3] >= model.nodes:
+        wing_points(model, u, h, points)
     out[:] = 0.0
     add_hessian(points, gradient, work.moment[h], out)
     if model.hinges[h, 3] >= model.nodes:
@@ -274,6 +278,7 @@ def shell_tangent(
     """
     data, work = np.zeros(len(pattern.indices)), shell_work(model)
     fold(model, u, x, work)
+    ride(model, u, work)
     work.moment[:] = 0.0
     _add_triangles(model, pattern, u, x, work, data)
     _add_hinges(model, pattern, u, work, data)
