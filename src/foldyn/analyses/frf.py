@@ -23,8 +23,8 @@ from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, pa
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys, given_keys
+from foldyn.cases.directions import DIRECTIONS, check_axis
 from foldyn.cases.models import SHELL
-from foldyn.cases.supports import DIRECTIONS, check_axis
 from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf

@@ -30,8 +30,9 @@ from foldyn.analyses.sections import (
 )
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
+from foldyn.cases.directions import AXES, DIRECTIONS, check_axis
 from foldyn.cases.loads import load_from
-from foldyn.cases.supports import AXES, DIRECTIONS, check_axis, support_from
+from foldyn.cases.supports import support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
 from foldyn.values import indices, number, show

@@ -25,11 +25,12 @@ from foldyn.cases.damping import (
     dampings_of,
 )
 from foldyn.cases.decode import check_keys, law_from
+from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import load_from
 from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import AXES, check_pairs, support_from
+from foldyn.cases.supports import support_from
 from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS

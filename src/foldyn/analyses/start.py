@@ -10,7 +10,7 @@ from pydantic import PlainValidator, model_validator
 
 from foldyn.analyses.sections import Section, Vector, Whole
 from foldyn.cases import Case, State
-from foldyn.cases.supports import AXES
+from foldyn.cases.directions import AXES
 from foldyn.dynamics import initial_state
 from foldyn.errors import InputError, within
 from foldyn.results import load

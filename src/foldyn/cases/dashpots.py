@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import Part
+from foldyn.cases.directions import check_direction, check_pairs, unit_vector
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.values import brief, indices, number, show, vector
+from foldyn.values import brief, number, show
 
-AXES = "xyz"
-DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 NEAR = 1e-12  # of the structure's size: nodes closer than that have no line between them
 
 
@@ -99,37 +98,3 @@ class Dashpot(Part):
     def along(self) -> NDArray[np.float64] | None:
         """Unit vector (3,) in which it acts; None without a fixed direction."""
         return None if self.direction is None else unit_vector(self.direction)
-
-
-def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
-    """Return pairs of different nodes, from one pair or several."""
-    listed = value if isinstance(value, list | tuple | np.ndarray) else ()
-    several = len(listed) > 0 and all(isinstance(one, list | tuple | np.ndarray) for one in listed)
-    pairs = []
-    for pair in listed if several else [value]:
-        numbers = () if isinstance(pair, str) else indices(name, pair, "node", "as in [0, 5]")
-        if len(numbers) != 2 or min(numbers) < 0:
-            raise InputError(
-                f" = {show(value)}: must be two nodes, as in [0, 5], or pairs of them", name
-            )
-        pairs.append((numbers[0], numbers[1]))
-    return tuple(pairs)
-
-
-def check_direction(name: str, value: Any) -> str | tuple[float, float, float]:
-    """Return a direction: the name of an axis with its sign, or a vector that is not zero."""
-    if isinstance(value, str):
-        if value not in DIRECTIONS:
-            listed = ", ".join(f'"{one}"' for one in DIRECTIONS)
-            raise InputError(f" = {show(value)}: must be one of {listed}, or a vector", name)
-        return value
-    return vector(name, value, nonzero=True)
-
-
-def unit_vector(direction: str | Sequence[float]) -> NDArray[np.float64]:
-    """Unit vector (3,) of a checked direction."""
-    if isinstance(direction, str):
-        sign = -1.0 if direction.startswith("-") else 1.0
-        return sign * np.eye(3)[AXES.index(direction[-1])]
-    along = np.array(direction)
-    return along / np.linalg.norm(along)

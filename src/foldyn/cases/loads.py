@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import given_keys
+from foldyn.cases.directions import signed
 from foldyn.cases.folding import (
     check_angles,
     check_fold_angles,
@@ -24,7 +25,6 @@ from foldyn.cases.history import History, as_history
 from foldyn.cases.load import Load, check_held
 from foldyn.cases.selection import check_creases, check_nodes, resolve_creases, resolve_nodes
 from foldyn.cases.shared_loads import LineLoad, TotalForce
-from foldyn.cases.supports import signed
 from foldyn.cases.temperature import Temperature
 from foldyn.errors import InputError, within
 from foldyn.values import brief, show, vector

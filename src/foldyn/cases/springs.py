@@ -1,17 +1,95 @@
-"""Springs of a case as arrays."""
+"""Springs: from nodes to the ground, or between nodes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import Spring
+from foldyn.cases.decode import Part
+from foldyn.cases.directions import check_pairs
+from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.attached import GROUND, Springs, no_springs
+from foldyn.values import brief, number
+
+
+@brief
+@dataclass(frozen=True)
+class Spring(Part):
+    """Linear springs: from nodes to the ground, or between nodes.
+
+    To the ground each node is pulled back with k (u . d), u its displacement from the rest position
+    and d a direction. The foot stands still in space; no base motion moves it.
+
+    Between two nodes a spring pulls along the current line between them with k (l - l0), l their
+    distance; with a direction, along that with k (u_b - u_a) . d, wherever they are.
+
+    Parameters
+    ----------
+    stiffness : float
+        k of each spring (N/m), above 0.
+    nodes : int, sequence of int, or str, optional
+        Nodes that stand on the ground: numbers, or an expression over the pattern's vertices.
+    between : sequence of (int, int), optional
+        Pairs of nodes, instead of `nodes`.
+    direction : {"x", "y", "z", "-x", "-y", "-z"} or sequence of float, shape (3,), optional
+        d, of any length. Without it springs to the ground act along all three axes, and those
+        between nodes along the line between them.
+    rest_length : float, optional
+        l0 of springs between nodes without a direction (m); their distance at rest by default.
+    """
+
+    stiffness: float
+    nodes: int | str | Sequence[int] | None = None
+    between: Sequence[Sequence[int]] | None = None
+    direction: str | Sequence[float] | None = None
+    rest_length: float | None = None
+
+    keys = {
+        "nodes": "nodes",
+        "between": "between",
+        "stiffness": "stiffness",
+        "direction": "direction",
+        "rest_length": "rest_length",
+    }
+    missing = {"stiffness": "give it (N/m) for each spring"}
+    apart = "springs are a support of their own"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        stiffness = number("stiffness", self.stiffness, above=0.0, unit="N/m")
+        object.__setattr__(self, "stiffness", stiffness)
+        if (self.nodes is None) == (self.between is None):
+            raise InputError(
+                ": give nodes, for springs to the ground, or between, for springs between nodes"
+            )
+        if self.nodes is not None:
+            object.__setattr__(self, "nodes", check_nodes(self.nodes))
+        else:
+            object.__setattr__(self, "between", check_pairs("between", self.between))
+        if self.direction is not None:
+            object.__setattr__(self, "direction", check_direction("direction", self.direction))
+        if self.rest_length is None:
+            return
+        rest = number("rest_length", self.rest_length, least=0.0, unit="m")
+        object.__setattr__(self, "rest_length", rest)
+        if self.between is None or self.direction is not None:
+            raise InputError(
+                f" = {rest:g}: only for springs along the line between nodes; leave it out, or "
+                "give between and no direction",
+                "rest_length",
+            )
+
+    def table(self) -> dict[str, Any]:
+        """Its table of plain values."""
+        written = {key: value for key, value in super().table().items() if value is not None}
+        if "between" in written:
+            written["between"] = [list(pair) for pair in written["between"]]
+        return written
 
 
 def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
@@ -68,8 +146,7 @@ def spring_ends(structure: Any, spring: Spring, place: str) -> NDArray[np.int64]
 def spring_directions(spring: Spring) -> NDArray[np.float64] | None:
     """Unit vectors (k, 3) along which a part's springs act; None of the line between their ends."""
     if spring.direction is not None:
-        vector = np.array(spring.direction)
-        return (vector / np.linalg.norm(vector))[None]
+        return unit_vector(spring.direction)[None]
     return np.eye(3) if spring.nodes is not None else None
 
 

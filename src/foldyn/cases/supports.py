@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from foldyn.cases.dashpots import AXES, DIRECTIONS, Dashpot
+from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.decode import Part, given_keys
+from foldyn.cases.directions import check_axes, check_axis, check_direction
 from foldyn.cases.history import History, as_history
 from foldyn.cases.selection import check_nodes
+from foldyn.cases.springs import Spring
 from foldyn.errors import InputError
-from foldyn.values import brief, choice, indices, number, number_or_list, show, vector
+from foldyn.values import brief, indices, number, number_or_list, show
 
 
 @brief
@@ -149,85 +148,6 @@ class BaseMotion(Part):
 
 @brief
 @dataclass(frozen=True)
-class Spring(Part):
-    """Linear springs: from nodes to the ground, or between nodes.
-
-    To the ground each node is pulled back with k (u . d), u its displacement from the rest position
-    and d a direction. The foot stands still in space; no base motion moves it.
-
-    Between two nodes a spring pulls along the current line between them with k (l - l0), l their
-    distance; with a direction, along that with k (u_b - u_a) . d, wherever they are.
-
-    Parameters
-    ----------
-    stiffness : float
-        k of each spring (N/m), above 0.
-    nodes : int, sequence of int, or str, optional
-        Nodes that stand on the ground: numbers, or an expression over the pattern's vertices.
-    between : sequence of (int, int), optional
-        Pairs of nodes, instead of `nodes`.
-    direction : {"x", "y", "z", "-x", "-y", "-z"} or sequence of float, shape (3,), optional
-        d, of any length. Without it springs to the ground act along all three axes, and those
-        between nodes along the line between them.
-    rest_length : float, optional
-        l0 of springs between nodes without a direction (m); their distance at rest by default.
-    """
-
-    stiffness: float
-    nodes: int | str | Sequence[int] | None = None
-    between: Sequence[Sequence[int]] | None = None
-    direction: str | Sequence[float] | None = None
-    rest_length: float | None = None
-
-    keys = {
-        "nodes": "nodes",
-        "between": "between",
-        "stiffness": "stiffness",
-        "direction": "direction",
-        "rest_length": "rest_length",
-    }
-    missing = {"stiffness": "give it (N/m) for each spring"}
-    apart = "springs are a support of their own"
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        stiffness = number("stiffness", self.stiffness, above=0.0, unit="N/m")
-        object.__setattr__(self, "stiffness", stiffness)
-        if (self.nodes is None) == (self.between is None):
-            raise InputError(
-                ": give nodes, for springs to the ground, or between, for springs between nodes"
-            )
-        if self.nodes is not None:
-            object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        else:
-            object.__setattr__(self, "between", check_pairs("between", self.between))
-        if isinstance(self.direction, str):
-            axis, sign = signed("direction", self.direction)
-            object.__setattr__(self, "direction", tuple(sign * (k == axis) + 0.0 for k in range(3)))
-        elif self.direction is not None:
-            given = vector("direction", self.direction, nonzero=True)
-            object.__setattr__(self, "direction", given)
-        if self.rest_length is None:
-            return
-        rest = number("rest_length", self.rest_length, least=0.0, unit="m")
-        object.__setattr__(self, "rest_length", rest)
-        if self.between is None or self.direction is not None:
-            raise InputError(
-                f" = {rest:g}: only for springs along the line between nodes; leave it out, or "
-                "give between and no direction",
-                "rest_length",
-            )
-
-    def table(self) -> dict[str, Any]:
-        """Its table of plain values."""
-        written = {key: value for key, value in super().table().items() if value is not None}
-        if "between" in written:
-            written["between"] = [list(pair) for pair in written["between"]]
-        return written
-
-
-@brief
-@dataclass(frozen=True)
 class Link(Part):
     """Nodes tied together, exactly: by equal displacements, or to three others.
 
@@ -338,56 +258,6 @@ def support_from(table: Any, folder: Path | None = None) -> Support:
     if moved and not given & {"axis", "direction"}:
         raise InputError(': missing; give the axis of the displacement, as in axis = "x"', ".axis")
     return (Impose if moved else Fix).of(table, folder)
-
-
-def check_axis(name: str, axis: Any) -> str:
-    """Return the name of one axis."""
-    if not isinstance(axis, str) or axis not in tuple(AXES):
-        raise InputError(f' = {show(axis)}: must be one of "x", "y" and "z"', name)
-    return axis
-
-
-def check_axes(name: str, axes: Any) -> str:
-    """Return the letters of some axes, each once."""
-    if not isinstance(axes, str) or not axes or set(axes) - set(AXES):
-        raise InputError(f' = {show(axes)}: must be letters of "xyz", as in "xz"', name)
-    if len(set(axes)) < len(axes):
-        raise InputError(f" = {show(axes)}: an axis is listed twice", name)
-    return axes
-
-
-def check_direction(name: str, direction: Any) -> str | tuple[float, ...]:
-    """Return a direction as it was given: a vector that is not zero, or a name as "-z"."""
-    if isinstance(direction, str):
-        return choice(name, direction, DIRECTIONS)
-    return vector(name, direction, nonzero=True)
-
-
-def unit_vector(direction: Any) -> NDArray[np.float64]:
-    """Unit vector (3,) of a checked direction."""
-    if isinstance(direction, str):
-        axis, sign = signed("direction", direction)
-        return sign * np.eye(3)[axis]
-    return np.array(direction) / np.linalg.norm(direction)
-
-
-def signed(name: str, direction: Any) -> tuple[int, float]:
-    """Return the number of the axis and the sign of a direction: "-z" is (2, -1)."""
-    direction = choice(name, direction, DIRECTIONS)
-    return AXES.index(direction[-1]), -1.0 if direction.startswith("-") else 1.0
-
-
-def check_pairs(name: str, pairs: Any) -> tuple[tuple[int, int], ...]:
-    """Return pairs of distinct nodes, checked but for their range."""
-    if isinstance(pairs, str) or not isinstance(pairs, Sequence | np.ndarray) or not len(pairs):
-        raise InputError(f" = {show(pairs)}: must be pairs of nodes, as in [[0, 3], [1, 4]]", name)
-    checked = []
-    for k, pair in enumerate(pairs):
-        ends = indices(f"{name}[{k}]", pair, "node", "two to a spring")
-        if len(ends) != 2 or min(ends) < 0:
-            raise InputError(f" = {show(pair)}: must be two nodes, as in [0, 3]", f"{name}[{k}]")
-        checked.append((ends[0], ends[1]))
-    return tuple(checked)
 
 
 def check_per_node(name: str, value: Any, nodes: Any) -> float | tuple[float, ...]:

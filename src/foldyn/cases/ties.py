@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.constraints import AGREES, STRUCTURE, Equation
+from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
-from foldyn.cases.supports import AXES, Fix, Impose, Link, unit_vector
+from foldyn.cases.supports import Fix, Impose, Link
 from foldyn.errors import InputError
 from foldyn.structures.plate import OFF_PLANE, on_plate
 from foldyn.values import show

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, resolve_nodes
-from foldyn.cases.supports import AXES, check_axis
+from foldyn.cases.directions import AXES, check_axis
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
 from foldyn.values import whole

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import BaseMotion, Case, Constant, Force
-from foldyn.cases.supports import AXES
+from foldyn.cases.directions import AXES
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.linearized import Linearized
 from foldyn.values import show

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.supports import AXES, signed
+from foldyn.cases.directions import AXES, signed
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.linear.frf import PER_FORCE, convert, quantity_of
 from foldyn.signals import (

@@ -22,7 +22,8 @@ from foldyn.cases import (
     Table,
     resolve_nodes,
 )
-from foldyn.cases.supports import Support, unit_vector
+from foldyn.cases.directions import unit_vector
+from foldyn.cases.supports import Support
 from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Drive

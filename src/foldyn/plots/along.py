@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from foldyn.cases.supports import signed
+from foldyn.cases.directions import signed
 from foldyn.errors import InputError
 from foldyn.values import choice
 

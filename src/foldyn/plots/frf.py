@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from foldyn.cases.supports import DIRECTIONS, signed
+from foldyn.cases.directions import DIRECTIONS, signed
 from foldyn.errors import InputError
 from foldyn.linear import convert
 from foldyn.linear.frf import PER_FORCE, quantity_of

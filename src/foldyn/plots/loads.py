@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from foldyn.cases import Actuate, Case, Impose, resolve_nodes
+from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases
-from foldyn.cases.supports import unit_vector
 from foldyn.plots import style
 from foldyn.plots.following import Share, moments, pressures
 from foldyn.plots.ties import base_vectors

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.cases.supports import signed
+from foldyn.cases.directions import signed
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import (

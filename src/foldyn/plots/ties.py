@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from foldyn.cases import Case, Fix, Impose, Link, resolve_nodes
-from foldyn.cases.supports import unit_vector
+from foldyn.cases.directions import unit_vector
 from foldyn.plots import marks, style
 from foldyn.plots.scene import Points, View
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.cases.supports import AXES
+from foldyn.cases.directions import AXES
 from foldyn.experiment.calibration.fit_problem import PredictedRun
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from foldyn.cases import Case
-from foldyn.cases.supports import AXES
+from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import Measurement, NodeValues, column
 from foldyn.signals import sampling_interval, spectrum

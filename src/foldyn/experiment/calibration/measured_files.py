@@ -12,8 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases.csv_table import read_headings, read_numbers, some
+from foldyn.cases.directions import AXES
 from foldyn.cases.selection import check_nodes
-from foldyn.cases.supports import AXES
 from foldyn.errors import InputError, within
 from foldyn.experiment.calibration.measured import (
     IMPOSED,
