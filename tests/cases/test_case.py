@@ -12,7 +12,9 @@ from foldyn.cases import Case, Constant, Fix, Force, Pulse, Rayleigh, State
 from foldyn.errors import FoldynWarning, InputError
 
 POINTS = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], dtype=float)
-STRUCTURE = SimpleNamespace(nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=())
+STRUCTURE = SimpleNamespace(
+    nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=(), clamped_nodes=()
+)
 
 
 def test_fixed_and_free_dofs() -> None:

@@ -12,7 +12,9 @@ from foldyn.cases import BaseMotion, Case, Fix, Force, Harmonic, Impose, Ramp
 from foldyn.errors import FoldynWarning, InputError
 
 POINTS = np.array([[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], dtype=float)
-STRUCTURE = SimpleNamespace(nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=())
+STRUCTURE = SimpleNamespace(
+    nodes=POINTS, pattern=SimpleNamespace(vertices=POINTS), plates=(), clamped_nodes=()
+)
 
 
 def test_imposed_dofs_are_supported_and_told_apart() -> None:

@@ -115,19 +115,19 @@ class CreaseMoment(Load):
         creases, moment = self.of_creases(structure, place)
         each = np.zeros(len(structure.folds))
         each[creases] = moment
-        pieces = structure.fold_pieces
+        pieces = structure.body.fold_hinges()
         chosen = np.isin(pieces.fold, creases)
         part = (each[pieces.fold] * pieces.share)[chosen]
-        hinges, turned = pieces.hinges[chosen], pieces.turned[chosen]
-        turning, has = moments(structure.nodes[hinges], hinges, part), turned >= 0
-        back = -(part * pieces.turn[chosen])[:, None] * np.ones(2)
-        return joined([(turning, 0), (pushes(turned[has], back[has]), 0)])
+        turning = moments(pieces.corners[chosen], pieces.nodes[chosen], part)
+        hidden = pieces.hidden[chosen]
+        back = -part[:, None] * pieces.per_hidden * np.ones(2)
+        return joined([(turning, 0), (pushes(hidden[hidden >= 0], back[hidden >= 0]), 0)])
 
     def check(self, structure: Any, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse moments of creases between panels that are held."""
         creases, _ = self.of_creases(structure, place)
-        pieces = structure.fold_pieces
-        held = fixed[pieces.hinges].all(axis=(1, 2)) & (pieces.turned < 0).all(axis=1)
+        pieces = structure.body.fold_hinges()
+        held = fixed[pieces.nodes].all(axis=(1, 2)) & (pieces.hidden < 0).all(axis=1)
         still = np.intersect1d(creases, pieces.fold[held])
         if still.size:
             raise InputError(

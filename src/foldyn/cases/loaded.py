@@ -100,6 +100,10 @@ class Loaded:
         pairs = [load.rest_changes(self.structure, place) for place, load in self._loads()]
         return union([pair[0] for pair in pairs if pair is not None])
 
+    def placed(self, kind: type) -> Iterator[tuple[str, Any]]:
+        """Loads of one kind, with their places for messages."""
+        return (pair for pair in self._loads() if isinstance(pair[1], kind))
+
     def _loads(self) -> Iterator[tuple[str, Load]]:
         """Loads with their places for messages."""
         return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))

@@ -179,10 +179,6 @@ class Actuate(Load):
         object.__setattr__(self, given[0], FOLDED[given[0]](given[0], getattr(self, given[0])))
         object.__setattr__(self, "history", as_history(self.history))
 
-    def table(self) -> dict[str, Any]:
-        """See `Part`."""
-        return {key: value for key, value in super().table().items() if value is not None}
-
     def rest_changes(
         self, structure: Any, place: str
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -112,10 +112,6 @@ class TotalForce(Spread):
             object.__setattr__(self, "panels", check_panels("panels", self.panels))
         object.__setattr__(self, "history", as_history(self.history))
 
-    def table(self) -> dict[str, Any]:
-        """See `Part`."""
-        return {key: value for key, value in super().table().items() if value is not None}
-
     def measure(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Spread`."""
         if self.edges is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.decode import Part
-from foldyn.cases.directions import check_pairs
+from foldyn.cases.directions import check_direction, check_pairs, unit_vector
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.mechanics.attached import GROUND, Springs, no_springs
@@ -83,13 +83,6 @@ class Spring(Part):
                 "give between and no direction",
                 "rest_length",
             )
-
-    def table(self) -> dict[str, Any]:
-        """Its table of plain values."""
-        written = {key: value for key, value in super().table().items() if value is not None}
-        if "between" in written:
-            written["between"] = [list(pair) for pair in written["between"]]
-        return written
 
 
 def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:

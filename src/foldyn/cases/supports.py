@@ -54,10 +54,6 @@ class Fix(Part):
             )
         object.__setattr__(self, "direction", check_direction("direction", self.direction))
 
-    def table(self) -> dict[str, Any]:
-        """See `Part`."""
-        return {key: value for key, value in super().table().items() if value is not None}
-
 
 @brief
 @dataclass(frozen=True)
@@ -108,10 +104,6 @@ class Impose(Part):
             object.__setattr__(self, "direction", check_direction("direction", self.direction))
         object.__setattr__(self, "value", check_per_node("value", self.value, self.nodes))
         object.__setattr__(self, "history", as_history(self.history))
-
-    def table(self) -> dict[str, Any]:
-        """See `Part`."""
-        return {key: value for key, value in super().table().items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -193,10 +185,6 @@ class Link(Part):
         if len(corners) != 3:
             raise InputError(f" = {show(self.to)}: must be three nodes", "to")
         object.__setattr__(self, "to", corners)
-
-    def table(self) -> dict[str, Any]:
-        """See `Part`."""
-        return {key: value for key, value in super().table().items() if value is not None}
 
 
 Support = Fix | Impose | BaseMotion | Spring | Dashpot | Link

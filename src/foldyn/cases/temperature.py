@@ -117,7 +117,3 @@ class Temperature(Load):
     def turns(self, structure: Any, place: str) -> NDArray[np.float64]:
         """See `Load`."""
         return self._swelling(structure, place).turns
-
-    def table(self) -> dict[str, Any]:
-        """Its table of plain values, without the history."""
-        return {key: value for key, value in super().table().items() if value is not None}

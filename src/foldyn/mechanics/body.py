@@ -53,6 +53,12 @@ class FoldHinges(NamedTuple):
     hidden: NDArray  # (k, 2) dofs; -1 without them
     per_hidden: float  # rad/m
 
+    @property
+    def share(self) -> NDArray:
+        """Length of each (k,) over that of its whole fold."""
+        length = np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
+        return length / np.bincount(self.fold, length)[self.fold]
+
 
 class Blocks(Protocol):
     """A body's tangent as 3x3 blocks, for the matrix of an implicit step.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn import mechanics
-from foldyn.cases import Case
+from foldyn.cases import Case, CreaseMoment, Pressure
+from foldyn.cases.regions import resolve_panels
 from foldyn.plots.scene import Points
 
 STEPS = 12  # of an arc
@@ -26,34 +26,18 @@ class Share(NamedTuple):
 
 def pressures(case: Case) -> list[Share]:
     """Pressure on panels, one for each load."""
-    panel = dict(zip(_rows(case.structure.triangles), case.structure.triangle_panel, strict=True))
-    return [
-        _share([panel[row] for row in _rows(load.triangles)], load.pressure, False, history)
-        for load, history in case.following_terms
-        if len(load.pressure)
-    ]
+    structure, found = case.structure, []
+    for place, load in case.placed(Pressure):
+        triangles = resolve_panels(structure, load.panels, f"{place}.panels")
+        panels = np.unique(structure.triangle_panel[triangles])
+        found.append(Share(panels, np.full(len(panels), load.pressure), load.history))
+    return found
 
 
 def moments(case: Case) -> list[Share]:
     """Moments of whole creases, one for each load."""
-    pieces = case.structure.fold_pieces
-    fold = dict(zip(_rows(pieces.hinges), pieces.fold, strict=True))
-    return [
-        _share([fold[row] for row in _rows(load.hinges)], load.moment, True, history)
-        for load, history in case.following_terms
-        if len(load.moment)
-    ]
-
-
-def _rows(numbers: NDArray) -> Iterator[tuple[int, ...]]:
-    return map(tuple, numbers.tolist())
-
-
-def _share(numbers: list[int], values: NDArray, added: bool, history: Any) -> Share:
-    """Values of entries by panel or crease: their sum, or what all have in common."""
-    found, which = np.unique(numbers, return_inverse=True)
-    total = np.bincount(which, values).astype(float)
-    return Share(found, total if added else total / np.bincount(which), history)
+    placed = case.placed(CreaseMoment)
+    return [Share(*load.of_creases(case.structure, place), load.history) for place, load in placed]
 
 
 def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:
@@ -76,9 +60,9 @@ def crease_arcs(case: Case, points: Points, share: Share, radius: float) -> Poin
     They lie on the front. Those of a positive moment point towards the panels, which it opens;
     those of a negative one away from them.
     """
-    pieces, arcs = case.structure.fold_pieces, []
+    pieces, arcs = case.structure.body.fold_hinges(), []
     for crease, moment in zip(share.numbers, share.value, strict=True):
-        own = pieces.hinges[pieces.fold == crease]
+        own = pieces.nodes[pieces.fold == crease]
         ends = points[own[:, :2]].reshape(-1, 3)
         middle = own[np.linalg.norm(points[own[:, :2]].mean(1) - ends.mean(0), axis=1).argmin()]
         j, k, i, _ = points[middle]

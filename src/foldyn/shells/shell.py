@@ -28,7 +28,7 @@ from foldyn.structures.calibration import check_sheet
 from foldyn.structures.clamps import clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import check_kinds
-from foldyn.structures.discretized import Discretized, FoldPieces, HingeKind, read_only
+from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
 from foldyn.structures.plate import Plate, checked_panels, rigid_plates
@@ -181,23 +181,6 @@ class Shell(Discretized):
         rows = np.zeros((len(self.fold_stiffness), 4), np.int64)
         rows[crease] = self.sides.hinges[self.sides.piece_hinge[first]]
         return read_only(rows)
-
-    @property
-    def fold_pieces(self) -> FoldPieces:
-        """See `Discretized`."""
-        ends = self.sides
-        hinges = ends.hinges[ends.piece_hinge]
-        turned = self.nodes.size + ends.piece_rotations
-        turn = np.full(len(hinges), 1.0 / self._reach)
-        return FoldPieces(hinges, ends.piece_crease, self._piece_shares, turned, turn)
-
-    @cached_property
-    def _piece_shares(self) -> NDArray:
-        """Length of each piece of a crease (c,) over that of the whole crease."""
-        ends = self.sides
-        length = lengths(self.nodes, ends.hinges[ends.piece_hinge])
-        whole = np.bincount(ends.piece_crease, length, len(self.fold_stiffness))
-        return length / whole[ends.piece_crease]
 
     @cached_property
     def edge_nodes(self) -> NDArray:

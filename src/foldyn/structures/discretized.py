@@ -32,19 +32,6 @@ class HingeKind(NamedTuple):
     rest: NDArray
 
 
-class FoldPieces(NamedTuple):
-    """The k hinges by which folds turn: one for each fold, or one for each piece of a crease.
-
-    The angle of a piece is the dihedral of its hinge less `turn` times the dofs `turned`.
-    """
-
-    hinges: NDArray  # (k, 4) nodes: axis j, k, wings i, l
-    fold: NDArray  # (k,)
-    share: NDArray  # (k,) of the length of the whole crease
-    turned: NDArray  # (k, 2) hidden dofs of the body, -1 for none
-    turn: NDArray  # (k,) rad/m
-
-
 def read_only(array: NDArray) -> NDArray:
     """Return the array, which nobody can change from now on."""
     array.setflags(write=False)
@@ -149,13 +136,6 @@ class Discretized:
         page on mass rules.
         """
         return read_only(inertia_tensor(self.nodes, self.mass))
-
-    @property
-    def fold_pieces(self) -> FoldPieces:
-        """The hinges by which folds turn."""
-        count = len(self.folds)
-        none = np.full((count, 2), -1)
-        return FoldPieces(self.folds, np.arange(count), np.ones(count), none, np.zeros(count))
 
     @cached_property
     def edge_nodes(self) -> NDArray:
