@@ -116,7 +116,10 @@ def test_case_files(text, damping, supports, tmp_path):
         ("[damping]\ncreases = [99]\n", r"damping.creases = \[99\]: must be a number"),
         ("[damping]\ncreases = { coefficient = 1, creases = [99] }\n", "crease 99 is out of range"),
         ("[damping]\ncreases = [{ coefficient = 1 }, {}]\n", r"creases\[1\].coefficient: missing"),
-        ("[[supports]]\nbetween = [0, 8]\n", r"supports\[1\].dashpot: missing"),
+        (
+            "[[supports]]\nbetween = [0, 8]\n",
+            r"supports\[1\]: between is for springs and dashpots: give stiffness",
+        ),
         ("[[supports]]\ndashpot = 1\n", r"supports\[1\].nodes: give either nodes"),
         ("[[supports]]\ndashpot = 1\nnodes = [1]\nbetween = [1, 2]\n", "between: give either"),
         ("[[supports]]\ndashpot = 1\nbetween = [1]\n", r"between = \[1\]: must be two nodes"),

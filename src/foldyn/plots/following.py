@@ -36,8 +36,11 @@ def pressures(case: Case) -> list[Share]:
 
 def moments(case: Case) -> list[Share]:
     """Moments of whole creases, one for each load."""
-    placed = case.placed(CreaseMoment)
-    return [Share(*load.of_creases(case.structure, place), load.history) for place, load in placed]
+    found = []
+    for place, load in case.placed(CreaseMoment):
+        creases, moment = load.of_creases(case.structure, place)
+        found.append(Share(creases, moment, load.history))
+    return found
 
 
 def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:
