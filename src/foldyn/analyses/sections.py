@@ -36,7 +36,7 @@ from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
 from foldyn.structures.creases import per_crease
-from foldyn.structures.plate import checked_panels
+from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
 from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
 

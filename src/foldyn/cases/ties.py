@@ -13,7 +13,7 @@ from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.supports import Fix, Impose, Link
 from foldyn.errors import InputError
-from foldyn.structures.plate import OFF_PLANE, on_plate
+from foldyn.structures.rigid_plates import OFF_PLANE, on_plate
 from foldyn.values import show
 
 

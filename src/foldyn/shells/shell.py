@@ -31,7 +31,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
-from foldyn.structures.plate import Plate, checked_panels, rigid_plates
+from foldyn.structures.rigid_plates import Plate, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
 

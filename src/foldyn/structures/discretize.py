@@ -18,7 +18,7 @@ from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
-from foldyn.structures.plate import checked_panels
+from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure
 from foldyn.structures.swelling import panel_of_triangle

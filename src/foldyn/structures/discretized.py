@@ -17,7 +17,7 @@ from foldyn.materials import HingeLaw, hinge_law
 from foldyn.mechanics.body import Body
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
-from foldyn.structures.plate import Plate
+from foldyn.structures.rigid_plates import Plate
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling
 

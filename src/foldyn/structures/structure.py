@@ -25,7 +25,7 @@ from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
-from foldyn.structures.plate import Plate, rigid_plates
+from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
 from foldyn.values import choice
