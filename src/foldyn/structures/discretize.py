@@ -14,6 +14,7 @@ from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
+from foldyn.structures import plate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths, n4b5, n5b8
 from foldyn.structures.sheet import Sheet
@@ -32,7 +33,7 @@ def discretize(
     bar_law: str | BarLaw = "ogden",
     fold_law: str | HingeLaw = EnhancedLinear(),
     bend_law: str | HingeLaw = "superlinear",
-    calibration: Literal["standard", "merlin2"] = "standard",
+    calibration: Literal["standard", "merlin2", "plate"] = "standard",
     crease_stiffness: float | Sequence[float] | None = None,
     crease_rest: float | Sequence[float] | None = None,
     centers: Mapping[int, ArrayLike] | None = None,
@@ -50,11 +51,13 @@ def discretize(
         Mass rule, one of `foldyn.structures.MASS_RULES`.
     bar_law : {"ogden", "linear"} or BarLaw
     fold_law, bend_law : {"linear", "superlinear", "enhanced"} or HingeLaw
-    calibration : {"standard", "merlin2"}
+    calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
-        `foldyn.structures.calibration`).
+        `foldyn.structures.calibration`); "plate" makes panels bend and twist as thin plates do, for
+        small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float or sequence, optional
         Stiffness per length (N m/rad per m) of all creases or of each, instead of the calibration.
+        With "plate" the panels beside a crease still give way to its moment.
     crease_rest : float or sequence, optional
         Rest dihedral (degrees, between 0 and 360) of all creases or of each, in the order of
         `pattern.creases`, instead of the pattern's own.
@@ -96,6 +99,13 @@ def discretize(
     outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
 
+    folds = fold_stiffness(crease_stiffness, pattern, sheet)
+    if calibration == "plate":
+        folds = plate.fold_stiffness(folds, pattern, sheet)
+        bends = plate.bend_stiffness(mesh, pattern, sheet)
+    else:
+        bends = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2)
+
     x = mesh.nodes
     return Structure(
         nodes=x,
@@ -105,10 +115,10 @@ def discretize(
         options=options,
         pattern=pattern,
         folds=mesh.folds,
-        fold_stiffness=fold_stiffness(crease_stiffness, pattern, sheet),
+        fold_stiffness=folds,
         fold_rest=fold_rest(crease_rest, mesh.folds, x, pattern),
         bends=mesh.bends,
-        bend_stiffness=calibrate.bend_stiffness(mesh, pattern, sheet, merlin2),
+        bend_stiffness=bends,
         bend_rest=hinge_angles(x, mesh.bends),
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,

@@ -26,7 +26,7 @@ FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of
 """Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
 SCHEMES = ("n5b8", "n4b5")
-CALIBRATIONS = ("standard", "merlin2")
+CALIBRATIONS = ("standard", "merlin2", "plate")
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ModelOptions:
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
     bend_law: str | HingeLaw = "superlinear"
-    calibration: Literal["standard", "merlin2"] = "standard"
+    calibration: Literal["standard", "merlin2", "plate"] = "standard"
     crease_stiffness: float | Sequence[float] | None = None
     crease_rest: float | Sequence[float] | None = None
 

@@ -1,0 +1,106 @@
+"""Stiffness of bends and folds that makes panels bend as thin plates: `calibration="plate"`.
+
+With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
+
+spoke of a quad (N5B8)      (1 - nu) G A (1/Dp^2 + 1/Dq^2) s, whole spoke; Dp, Dq the diagonals,
+                            s = sqrt(A/(W H)), W and H the means of opposite edges;
+spoke of a larger polygon   4 (1 - nu) G A / sum (h1^2 + h2^2), h1 and h2 the angles by which its
+                            spokes turn in the two curvatures without mean, of size 1;
+diagonal (N4B5)             2 (1 - nu) G A s / D^2, A the area of its two triangles;
+fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2).
+
+All four spokes of a quad are alike. The twist of a parallelogram, with its corners at +w and -w in
+turn, then has the stiffness 32 (1 - nu) G s/A, which without s is that of a plate whose edges stay
+straight, and a panel gives way at its center to the moments of its creases about as a plate does,
+which bends about its shorter diagonal. s stands for the edges of skew panels that do not stay
+straight; c for what a crease's moment bends beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import around, edge_of
+from foldyn.structures.mesh import Mesh, double_areas, lengths
+from foldyn.structures.sheet import Sheet
+
+COMPLIANCE = 0.12  # c of panels of more than three corners, which give way at their centers too
+TRIANGLE = (0.22, 0.6, 1.2)  # c of triangles with no edge free, with one, with two
+
+
+def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of each whole bend (N m/rad), in the mesh's order."""
+    bends = np.empty(len(mesh.inner))
+    twist = (1.0 - sheet.poissons_ratio) * sheet.bending_modulus
+    first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    for panel, face in enumerate(pattern.faces):
+        rows = slice(first[panel], first[panel + 1])
+        x = pattern.vertices[list(face)]
+        if mesh.centers[panel] < 0:
+            area = _wings(mesh.nodes, mesh.bends[rows])
+            length = lengths(mesh.nodes, mesh.inner[rows])
+            bends[rows] = 2.0 * twist * area * (_skew(x, area) if len(x) == 4 else 1.0) / length**2
+            continue
+        spokes = x - mesh.nodes[mesh.centers[panel]]
+        area = 0.5 * np.linalg.norm(np.cross(spokes, np.roll(spokes, -1, axis=0)), axis=1).sum()
+        if len(x) == 4:
+            diagonal2 = ((x[:2] - x[2:]) ** 2).sum(axis=1)
+            bends[rows] = twist * area * (1.0 / diagonal2).sum() * _skew(x, area)
+        else:
+            bends[rows] = 4.0 * twist * area / _twisted(spokes)
+    return bends
+
+
+def fold_stiffness(crease: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole folds (nf,), N m/rad, from that of the creases alone.
+
+    Each fold acts in series with the two panels that its moment bends.
+    """
+    free = set(map(tuple, pattern.boundary.tolist()))
+    share = np.array([_compliance(face, free) for face in pattern.faces])
+    length = lengths(pattern.vertices, pattern.creases)
+    panels = (share * pattern.face_areas)[pattern.crease_faces].sum(axis=1)
+    return crease / (1.0 + crease * panels / (sheet.bending_modulus * length**2))
+
+
+def _compliance(face: tuple[int, ...], free: set[tuple[int, ...]]) -> float:
+    """Return c of a panel."""
+    if len(face) > 3:
+        return COMPLIANCE
+    return TRIANGLE[min(sum(edge_of(a, b) in free for a, b in around(face)), 2)]
+
+
+def _skew(x: NDArray, area: NDArray | float) -> NDArray | float:
+    """Return s of a quadrilateral with the corners x (4, 3): 1 of a rectangle."""
+    edge = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
+    means = 0.25 * (edge[0] + edge[2]) * (edge[1] + edge[3])
+    return np.sqrt(area / means)
+
+
+def _wings(x: NDArray, bends: NDArray) -> NDArray:
+    """Area (nh,) of the two triangles of each bend (axis j, k, wings i, l)."""
+    left, right = double_areas(x, bends[:, [0, 1, 2]]), double_areas(x, bends[:, [1, 0, 3]])
+    return 0.5 * (np.linalg.norm(left, axis=1) + np.linalg.norm(right, axis=1))
+
+
+def _twisted(spokes: NDArray) -> float:
+    """Sum of the squared turns (m^2) of spokes (m, 3) in the curvatures diag(1, -1) and off it."""
+    _, _, axes = np.linalg.svd(spokes - spokes.mean(axis=0))
+    x, y = (spokes @ axes[:2].T).T
+    total = 0.0
+    for height in (0.5 * (x**2 - y**2), x * y):
+        tilt = _slopes(x, y, height)
+        turn = tilt - np.roll(tilt, 1, axis=0)
+        total += float((turn**2).sum())
+    return total
+
+
+def _slopes(x: NDArray, y: NDArray, height: NDArray) -> NDArray:
+    """Gradient (m, 2) of the heights (m,) over each triangle (center, corner, next corner)."""
+    after = [np.roll(value, -1) for value in (x, y, height)]
+    cross = x * after[1] - y * after[0]
+    along = (height * after[1] - after[2] * y) / cross
+    across = (after[2] * x - height * after[0]) / cross
+    return np.column_stack([along, across])
