@@ -7,7 +7,7 @@ import pytest
 from mass_samples import HEXAGON, PANELS, PENTAGON
 
 import foldyn as fd
-from foldyn.structures.plate import COMPLIANCE, TRIANGLE
+from foldyn.structures.plate import COMPLIANCE, POLYGON, TRIANGLE
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus
@@ -69,13 +69,19 @@ def test_spokes_of_a_square():
 @pytest.mark.parametrize("m", [5, 6, 8])
 @pytest.mark.parametrize("turn", [0.0, 0.3])
 def test_regular_polygons_bend_as_plates_in_curvatures_without_mean(m, turn):
-    """W = (A/2) G (1 - nu) kappa : kappa, which is (1 - nu) G A for diag(1, -1)."""
+    """W = (A/2) G (1 - nu) kappa : kappa, which is (1 - nu) G A for diag(1, -1).
+
+    Corners alone bend a plate to less: 0.768, 0.871, 0.925 of it with 5, 6, 8 corners, found with
+    the shell (nu = 0.25, 8 and 16 divisions extrapolated).
+    """
     angle = 2.0 * np.pi * np.arange(m) / m
     s = panel(1.7 * np.c_[np.cos(angle), np.sin(angle)])
     x, y = s.nodes[:, 0] - s.nodes[-1, 0], s.nodes[:, 1] - s.nodes[-1, 1]
     heights = 0.5 * np.cos(2 * turn) * (x**2 - y**2) + np.sin(2 * turn) * x * y
-    plate = 0.7 * G * s.pattern.face_areas[0]
-    assert bending(s, heights) == pytest.approx(plate, rel=1e-6)
+    plate = {5: 0.768, 6: 0.871, 8: 0.925}[m] * 0.7 * G * s.pattern.face_areas[0]
+    assert bending(s, heights) == pytest.approx(plate, rel=6e-3)
+    turned = bending(s, 0.5 * (x**2 - y**2))
+    assert bending(s, heights) == pytest.approx(turned, rel=1e-6)
 
 
 @pytest.mark.parametrize("vertices", [HEXAGON, PENTAGON], ids=["hexagon", "pentagon"])
@@ -83,7 +89,8 @@ def test_polygons_have_the_plates_energy_in_the_mean_of_two_curvatures(vertices)
     s = panel(np.array(vertices) * [1.0, 0.8])
     x, y = s.nodes[:, 0] - s.nodes[-1, 0], s.nodes[:, 1] - s.nodes[-1, 1]
     found = bending(s, 0.5 * (x**2 - y**2)) + bending(s, x * y)
-    assert found == pytest.approx(2.0 * 0.7 * G * s.pattern.face_areas[0], rel=1e-6)
+    plate = 2.0 * 0.7 * G * s.pattern.face_areas[0]
+    assert found == pytest.approx(POLYGON[len(vertices) - 5] * plate, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", sorted(PANELS))
@@ -107,7 +114,7 @@ def test_folds_are_in_series_with_the_panels_they_bend():
     )
     areas = pattern.face_areas
     for k, crease in enumerate(pattern.creases.tolist()):
-        free = TRIANGLE[2] * areas[2] if crease == [2, 3] else COMPLIANCE * areas[0]
+        free = TRIANGLE[1] * areas[2] if crease == [2, 3] else COMPLIANCE * areas[0]
         panels = (free + COMPLIANCE * areas[1]) / (G * 1.5**2)
         assert 1.0 / plate[k] == pytest.approx(1.0 / plain[k] + panels, rel=1e-12)
 

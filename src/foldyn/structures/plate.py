@@ -4,8 +4,9 @@ With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
 
 spoke of a quad (N5B8)      (1 - nu) G A (1/Dp^2 + 1/Dq^2) s, whole spoke; Dp, Dq the diagonals,
                             s = sqrt(A/(W H)), W and H the means of opposite edges;
-spoke of a larger polygon   4 (1 - nu) G A / sum (h1^2 + h2^2), h1 and h2 the angles by which its
-                            spokes turn in the two curvatures without mean, of size 1;
+spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the angles by which its
+                            spokes turn in the two curvatures without mean, of size 1; p of
+                            `POLYGON`, because a plate that only its corners bend is softer;
 diagonal (N4B5)             2 (1 - nu) G A s / D^2, A the area of its two triangles;
 fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2).
 
@@ -27,7 +28,9 @@ from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
 COMPLIANCE = 0.12  # c of panels of more than three corners, which give way at their centers too
-TRIANGLE = (0.22, 0.6, 1.2)  # c of triangles with no edge free, with one, with two
+TRIANGLE = (0.22, 0.6)  # c of triangles without a free edge, and with one or two
+
+POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
 
 
 def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
@@ -49,7 +52,8 @@ def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
             diagonal2 = ((x[:2] - x[2:]) ** 2).sum(axis=1)
             bends[rows] = twist * area * (1.0 / diagonal2).sum() * _skew(x, area)
         else:
-            bends[rows] = 4.0 * twist * area / _twisted(spokes)
+            soft = POLYGON[min(len(x), 8) - 5]
+            bends[rows] = 4.0 * twist * area * soft / _twisted(spokes)
     return bends
 
 
@@ -69,7 +73,7 @@ def _compliance(face: tuple[int, ...], free: set[tuple[int, ...]]) -> float:
     """Return c of a panel."""
     if len(face) > 3:
         return COMPLIANCE
-    return TRIANGLE[min(sum(edge_of(a, b) in free for a, b in around(face)), 2)]
+    return TRIANGLE[any(edge_of(a, b) in free for a, b in around(face))]
 
 
 def _skew(x: NDArray, area: NDArray | float) -> NDArray | float:
