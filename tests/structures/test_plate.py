@@ -7,7 +7,8 @@ import pytest
 from mass_samples import HEXAGON, PANELS, PENTAGON
 
 import foldyn as fd
-from foldyn.structures.plate import COMPLIANCE, POLYGON, TRIANGLE
+from foldyn.errors import InputError
+from foldyn.structures.plate import ACUTE, ALONE, COMPLIANCE, OBTUSE, POLYGON, SKEW, TRIANGLE
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus
@@ -43,14 +44,27 @@ def twist_stiffness(structure):
 def test_twist_of_parallelograms(name, scheme):
     """A plate with w = xi eta, of the constant curvature 4 w/(a b): 32 (1 - nu) G/A for rectangles.
 
-    U = (A/2) 2 (1 - nu) G (4 w/(a b))^2. Skew ones have the square root of their sine besides.
+    U = (A/2) 2 (1 - nu) G (4 w/(a b))^2. Skew ones with free edges have a power of their sine too.
     """
     s = panel(PANELS[name], scheme=scheme)
     x = np.array(PANELS[name])
     area = s.pattern.face_areas[0]
     sine = area / np.prod(np.linalg.norm(np.diff(x, axis=0)[:2], axis=1))
-    expected = 32.0 * (1.0 - SHEET.poissons_ratio) * G * np.sqrt(sine) / area
+    expected = 32.0 * (1.0 - SHEET.poissons_ratio) * G * sine ** SKEW[4] / area
     assert twist_stiffness(s) == pytest.approx(expected, rel=1e-6)
+
+
+def test_twist_depends_on_the_edges_that_are_free():
+    """The inner panels of a Miura-ori keep more of a plate's twist than those at its corners."""
+    pattern = fd.patterns.miura(cells=(2, 2), panel_angle=60, dihedral=100)
+    s = fd.discretize(pattern, SHEET, calibration="plate")
+    rectangle = 0.7 * G * pattern.face_areas[0] * (1.0 + 1.0 / 3.0)  # diagonals 1 and sqrt 3
+    power = np.log(s.bend_stiffness[::4] / rectangle) / np.log(np.sin(np.pi / 3))
+    corners, sides, inner = [0, 3, 12, 15], [1, 2, 4, 7, 8, 11, 13, 14], [5, 6, 9, 10]
+    np.testing.assert_allclose(power[inner], SKEW[0], rtol=1e-9)
+    np.testing.assert_allclose(power[sides], SKEW[1], rtol=1e-9)
+    # the creases of panels at the corners (0, 0) and (4, 0) meet at (1, 1) and (3, 1)
+    np.testing.assert_allclose(np.sort(power[corners]), [OBTUSE] * 2 + [ACUTE] * 2, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", PARALLELOGRAMS)
@@ -114,7 +128,7 @@ def test_folds_are_in_series_with_the_panels_they_bend():
     )
     areas = pattern.face_areas
     for k, crease in enumerate(pattern.creases.tolist()):
-        free = TRIANGLE[1] * areas[2] if crease == [2, 3] else COMPLIANCE * areas[0]
+        free = TRIANGLE[1] * areas[2] if crease == [2, 3] else ALONE * areas[0]
         panels = (free + COMPLIANCE * areas[1]) / (G * 1.5**2)
         assert 1.0 / plate[k] == pytest.approx(1.0 / plain[k] + panels, rel=1e-12)
 
@@ -125,7 +139,7 @@ def test_folds_of_a_given_stiffness():
     free = fd.discretize(pattern, SHEET, calibration="plate", crease_stiffness=0.0)
     np.testing.assert_array_equal(free.fold_stiffness, 0.0)
     rigid = fd.discretize(pattern, SHEET, calibration="plate", crease_stiffness=1e9 * G)
-    np.testing.assert_allclose(rigid.fold_stiffness, G / (2 * COMPLIANCE), rtol=1e-6)
+    np.testing.assert_allclose(rigid.fold_stiffness, G / (2 * ALONE), rtol=1e-6)
 
 
 def test_what_stays_as_in_the_standard_calibration():
@@ -136,3 +150,36 @@ def test_what_stays_as_in_the_standard_calibration():
     np.testing.assert_array_equal(plate.bar_area, plain.bar_area)
     np.testing.assert_array_equal(plate.fold_rest, plain.fold_rest)
     assert (plate.fold_stiffness < plain.fold_stiffness).all()
+
+
+def test_case_files_and_results_keep_it(tmp_path):
+    text = """
+[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+calibration = "plate"
+mass = "bubble"
+bend_law = "linear"
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+count = 2
+"""
+    (tmp_path / "case.toml").write_text(text, "utf-8")
+    found = fd.read_case(tmp_path / "case.toml").run()
+    fd.save(found, tmp_path / "modes.nc")
+    structure = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
+    assert (structure.options.calibration, structure.options.mass) == ("plate", "bubble")
+    direct = fd.discretize(
+        fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01, 1.0), calibration="plate", bend_law="linear"
+    )
+    np.testing.assert_array_equal(structure.fold_stiffness, direct.fold_stiffness)
+    np.testing.assert_array_equal(structure.bend_stiffness, direct.bend_stiffness)
+    with pytest.raises(InputError, match=r"calibration.*standard, merlin2, plate"):
+        fd.discretize(fd.patterns.miura(), SHEET, calibration="shell")

@@ -3,7 +3,7 @@
 With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
 
 spoke of a quad (N5B8)      (1 - nu) G A (1/Dp^2 + 1/Dq^2) s, whole spoke; Dp, Dq the diagonals,
-                            s = sqrt(A/(W H)), W and H the means of opposite edges;
+                            s = (A/(W H))^e, W and H the means of opposite edges;
 spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the angles by which its
                             spokes turn in the two curvatures without mean, of size 1; p of
                             `POLYGON`, because a plate that only its corners bend is softer;
@@ -14,7 +14,8 @@ All four spokes of a quad are alike. The twist of a parallelogram, with its corn
 turn, then has the stiffness 32 (1 - nu) G s/A, which without s is that of a plate whose edges stay
 straight, and a panel gives way at its center to the moments of its creases about as a plate does,
 which bends about its shorter diagonal. s stands for the edges of skew panels that do not stay
-straight; c for what a crease's moment bends beside it.
+straight; c for what a crease's moment bends beside it. Both depend on which edges are free.
+Derivation and errors: docs/fidelity.md.
 """
 
 from __future__ import annotations
@@ -27,10 +28,11 @@ from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.mesh import Mesh, double_areas, lengths
 from foldyn.structures.sheet import Sheet
 
-COMPLIANCE = 0.12  # c of panels of more than three corners, which give way at their centers too
+COMPLIANCE, ALONE = 0.12, 0.19  # c of panels of more than three corners; of quads with one crease
 TRIANGLE = (0.22, 0.6)  # c of triangles without a free edge, and with one or two
-
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
+SKEW = (0.18, 0.5, 0.63, 0.84, 0.84)  # e with 0, 1, 2 (opposite), 3, 4 edges free
+OBTUSE, ACUTE = 0.7, 1.2  # e with two creases that meet at an obtuse or at an acute corner
 
 
 def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
@@ -38,22 +40,24 @@ def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
     bends = np.empty(len(mesh.inner))
     twist = (1.0 - sheet.poissons_ratio) * sheet.bending_modulus
     first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
+    free = _free_edges(pattern)
     for panel, face in enumerate(pattern.faces):
         rows = slice(first[panel], first[panel + 1])
         x = pattern.vertices[list(face)]
+        skew = 1.0
+        if len(x) == 4:
+            skew = _skew(x, float(pattern.face_areas[panel]), _creased(face, free))
         if mesh.centers[panel] < 0:
             area = _wings(mesh.nodes, mesh.bends[rows])
             length = lengths(mesh.nodes, mesh.inner[rows])
-            bends[rows] = 2.0 * twist * area * (_skew(x, area) if len(x) == 4 else 1.0) / length**2
-            continue
-        spokes = x - mesh.nodes[mesh.centers[panel]]
-        area = 0.5 * np.linalg.norm(np.cross(spokes, np.roll(spokes, -1, axis=0)), axis=1).sum()
-        if len(x) == 4:
-            diagonal2 = ((x[:2] - x[2:]) ** 2).sum(axis=1)
-            bends[rows] = twist * area * (1.0 / diagonal2).sum() * _skew(x, area)
+            bends[rows] = 2.0 * twist * area * skew / length**2
+        elif len(x) == 4:
+            per_diagonal2 = 1.0 / ((x[:2] - x[2:]) ** 2).sum(axis=1)
+            bends[rows] = twist * pattern.face_areas[panel] * per_diagonal2.sum() * skew
         else:
+            turns = _twisted(x - mesh.nodes[mesh.centers[panel]])
             soft = POLYGON[min(len(x), 8) - 5]
-            bends[rows] = 4.0 * twist * area * soft / _twisted(spokes)
+            bends[rows] = 4.0 * twist * pattern.face_areas[panel] * soft / turns
     return bends
 
 
@@ -62,25 +66,41 @@ def fold_stiffness(crease: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
 
     Each fold acts in series with the two panels that its moment bends.
     """
-    free = set(map(tuple, pattern.boundary.tolist()))
-    share = np.array([_compliance(face, free) for face in pattern.faces])
+    free = _free_edges(pattern)
+    share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
     length = lengths(pattern.vertices, pattern.creases)
     panels = (share * pattern.face_areas)[pattern.crease_faces].sum(axis=1)
     return crease / (1.0 + crease * panels / (sheet.bending_modulus * length**2))
 
 
-def _compliance(face: tuple[int, ...], free: set[tuple[int, ...]]) -> float:
-    """Return c of a panel."""
-    if len(face) > 3:
-        return COMPLIANCE
-    return TRIANGLE[any(edge_of(a, b) in free for a, b in around(face))]
+def _free_edges(pattern: Pattern) -> set[tuple[int, ...]]:
+    return set(map(tuple, pattern.boundary.tolist()))
 
 
-def _skew(x: NDArray, area: NDArray | float) -> NDArray | float:
+def _creased(face: tuple[int, ...], free: set[tuple[int, ...]]) -> list[bool]:
+    """Whether each edge of a panel is a crease."""
+    return [edge_of(a, b) not in free for a, b in around(face)]
+
+
+def _compliance(creased: list[bool]) -> float:
+    """Return c of a panel whose edges are creases or free."""
+    if len(creased) == 3:
+        return TRIANGLE[not all(creased)]
+    return ALONE if len(creased) == 4 and sum(creased) == 1 else COMPLIANCE
+
+
+def _skew(x: NDArray, area: float, creased: list[bool]) -> float:
     """Return s of a quadrilateral with the corners x (4, 3): 1 of a rectangle."""
-    edge = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
-    means = 0.25 * (edge[0] + edge[2]) * (edge[1] + edge[3])
-    return np.sqrt(area / means)
+    edge = np.roll(x, -1, axis=0) - x
+    length = np.linalg.norm(edge, axis=1)
+    means = 0.25 * (length[0] + length[2]) * (length[1] + length[3])
+    between = [k for k in range(4) if creased[k] and creased[k - 1]]  # corners
+    if sum(creased) == 2 and between:
+        obtuse = edge[between[0]] @ edge[between[0] - 1] > 0.0
+        power = OBTUSE if obtuse else ACUTE
+    else:
+        power = SKEW[4 - sum(creased)]
+    return float((area / means) ** power)
 
 
 def _wings(x: NDArray, bends: NDArray) -> NDArray:
