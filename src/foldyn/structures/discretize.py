@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn import materials
 from foldyn.errors import InputError
-from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
+from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, PlateSuperlinear
+from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
@@ -50,7 +51,7 @@ def discretize(
     mass : str
         Mass rule, one of `foldyn.structures.MASS_RULES`.
     bar_law : {"ogden", "linear"} or BarLaw
-    fold_law, bend_law : {"linear", "superlinear", "enhanced"} or HingeLaw
+    fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
     calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
         `foldyn.structures.calibration`); "plate" makes panels bend and twist as thin plates do, for
@@ -87,7 +88,13 @@ def discretize(
     )
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
-    materials.hinge_law(bend_law, "bend_law")
+    bending = materials.hinge_law(bend_law, "bend_law")
+    if isinstance(bending, PlateSuperlinear) and bending.onset is None and calibration != "plate":
+        raise InputError(
+            ' = "plate_superlinear": has a plate\'s stiffness for small turns, which only '
+            'calibration = "plate" gives to bends; set it, or give PlateSuperlinear(onset=...)',
+            "bend_law",
+        )
     choice("mass", mass, MASS_RULES)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
@@ -100,11 +107,11 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
 
     folds = fold_stiffness(crease_stiffness, pattern, sheet)
+    bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
     if calibration == "plate":
         folds = plate.fold_stiffness(folds, pattern, sheet)
-        bends = plate.bend_stiffness(mesh, pattern, sheet)
-    else:
-        bends = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2)
+        bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
+        onset = plate_onset(bends, large)
 
     x = mesh.nodes
     return Structure(
@@ -120,6 +127,7 @@ def discretize(
         bends=mesh.bends,
         bend_stiffness=bends,
         bend_rest=hinge_angles(x, mesh.bends),
+        bend_onset=onset,
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,

@@ -14,7 +14,15 @@ from scipy import sparse
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
+from foldyn.materials import (
+    BarLaw,
+    EnhancedLinear,
+    HingeLaw,
+    PlateSuperlinear,
+    bar_law,
+    hinge_law,
+)
+from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.patterns import Pattern
 from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
@@ -72,6 +80,9 @@ class Structure(Discretized):
         whole crease (N m/rad); rest dihedral (rad).
     bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
         The same for the hinges inside panels.
+    bend_onset : (nh,)
+        Turn (rad) from which bends of the law `PlateSuperlinear` are no longer linear, where the
+        law leaves it to them.
     triangles, triangle_panel : (nt, 3), (nt,)
         Triangles, counter-clockwise from the front, and the panel of each.
     centers : (np,)
@@ -92,6 +103,7 @@ class Structure(Discretized):
     bends: NDArray = field(default_factory=lambda: _none(4))
     bend_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     bend_rest: NDArray = field(default_factory=lambda: _none(1, float))
+    bend_onset: NDArray = field(default_factory=lambda: _none(1, float))
     triangles: NDArray = field(default_factory=lambda: _none(3))
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
@@ -126,7 +138,16 @@ class Structure(Discretized):
             self.bars,
             self.sheet.youngs_modulus * self.bar_area / self.bar_length,
             self.bar_law,
-            tuple(mechanics.Hinges(h.nodes, h.stiffness, h.rest, h.law) for h in self.hinge_kinds),
+            tuple(
+                mechanics.Hinges(
+                    h.nodes,
+                    h.stiffness,
+                    h.rest,
+                    h.law,
+                    None if h.onset is None else onset_parameters(h.onset),
+                )
+                for h in self.hinge_kinds
+            ),
         )
 
     @cached_property
@@ -147,9 +168,14 @@ class Structure(Discretized):
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
         """Its folds and bends, with their laws."""
+        law = self.bend_law
+        own = isinstance(law, PlateSuperlinear) and law.onset is None
+        onset = self.bend_onset if own else None
         return (
             HingeKind("fold", self.fold_law, self.folds, self.fold_stiffness, self.fold_rest),
-            HingeKind("bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest),
+            HingeKind(
+                "bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest, onset
+            ),
         )
 
     @cached_property
