@@ -13,6 +13,7 @@ from foldyn.studies.fidelity import __main__ as command
 from foldyn.studies.fidelity.cases import FidelityCase, documented, polygons, supports
 from foldyn.studies.fidelity.compare import MODELS, compare
 from foldyn.studies.fidelity.drawn import drawn
+from foldyn.studies.fidelity.large import twisted, under_loads
 from foldyn.studies.fidelity.pairing import likeness, pairs
 from foldyn.studies.fidelity.reference import BELOW, plate_frequency, reference
 from foldyn.studies.fidelity.statics import displacement, study
@@ -94,6 +95,18 @@ def test_small_displacements(case):
     assert found.error["standard"] < -0.1
 
 
+def test_large_loads():
+    """Numbers of the page: case 1 under the paper's loads, and a rhombus lifted by 8 t."""
+    found = under_loads("case1", (0.1, 1.0))
+    assert found["standard, superlinear"] == pytest.approx([0.085, -0.106], abs=2e-3)
+    for law in ("plate, linear", "plate, plate_superlinear"):
+        assert abs(found[law]).max() < 5e-3
+    panel = twisted(60.0, 1.0, (1.0, 8.0))
+    assert panel["plate, linear"] == pytest.approx([0.02, 0.20], abs=0.02)
+    assert panel["standard, superlinear"] == pytest.approx([-0.13, 1.16], abs=0.02)
+    assert panel["plate, plate_superlinear"] == pytest.approx([0.07, 1.17], abs=0.02)
+
+
 def test_displacement_of_a_spring():
     """A fold k held on one panel: the tip of the other, at a, moves by P a^2/k and by its bends."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=90)
@@ -156,10 +169,12 @@ def test_polygons_meet_at_their_dihedral(sides):
 
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(command, "documented", lambda: documented()[:1])
-    monkeypatch.setattr(command, "statics_table", lambda: "statics")
+    monkeypatch.setattr(command, "statics_table", lambda: "small loads")
+    monkeypatch.setattr(command, "large_table", lambda: "large loads")
     assert command.main(["--out", str(tmp_path), "--count", "1"]) == 0
     told = capsys.readouterr().out
     assert "documented: 1 cases" in told
+    assert told.index("small loads") < told.index("large loads")
     assert all(model in told for model in MODELS)
     (first,) = read(tmp_path / "documented.csv")
     assert first.case == documented()[0].name

@@ -31,7 +31,7 @@ from foldyn.structures.sheet import Sheet
 COMPLIANCE, ALONE = 0.12, 0.19  # c of panels of more than three corners; of quads with one crease
 TRIANGLE = (0.22, 0.6)  # c of triangles without a free edge, and with one or two
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-SKEW = (0.18, 0.5, 0.63, 0.84, 0.84)  # e with 0, 1, 2 (opposite), 3, 4 edges free
+SKEW = (0.18, 0.5, 0.63, 0.84, 3.0)  # e with 0, 1, 2 (opposite), 3, 4 edges free
 OBTUSE, ACUTE = 0.7, 1.2  # e with two creases that meet at an obtuse or at an acute corner
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from foldyn.studies.fidelity.cases import documented
 from foldyn.studies.fidelity.drawn import COUNT, SEED, drawn
+from foldyn.studies.fidelity.large import large_table
 from foldyn.studies.fidelity.statics import statics_table
 from foldyn.studies.fidelity.stored import RESULTS, Modes, computed, table, write
 
@@ -31,7 +32,7 @@ def main(arguments: list[str] | None = None) -> int:
         found = computed(cases, _tell)
         write(chosen.out / f"{name}.csv", found)
         print(f"\n{name}: {len(cases)} cases\n\n{table(found)}\n")
-    print(statics_table())
+    print(statics_table(), large_table(), sep="\n\n")
     return 0
 
 
