@@ -10,6 +10,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.studies.fidelity import __main__ as command
+from foldyn.studies.fidelity import independent
 from foldyn.studies.fidelity.cases import FidelityCase, documented, polygons, supports
 from foldyn.studies.fidelity.compare import MODELS, compare
 from foldyn.studies.fidelity.drawn import drawn
@@ -59,6 +60,31 @@ def test_stored_results_are_what_the_code_gives(number):
             assert row.shell == pytest.approx(kept.shell, rel=1e-5)
             assert row.error == pytest.approx(kept.error, abs=2e-4)
             assert row.mac == pytest.approx(kept.mac, abs=2e-4)
+
+
+def test_opensees_agrees_with_the_reference():
+    found = independent.read_stored()
+    shell, plate = independent.errors(found)
+    assert len({one.case for one in found}) >= 10
+    assert np.median(np.abs(shell)) < 0.002
+    assert np.abs(shell).max() < 0.015
+    assert np.median(np.abs(plate)) < 0.03
+    assert np.percentile(np.abs(plate), 90) < 0.10
+    stored = {m.case: m.rows["plate, consistent"] for m in read(RESULTS / "documented.csv")}
+    for one in found:
+        (row,) = [row for row in stored[one.case] if row.mode == one.mode]
+        assert one.shell == pytest.approx(row.shell, rel=1e-5)
+        assert one.plate == pytest.approx(row.shell * (1 + row.error), rel=1e-4)
+
+
+def test_opensees_computes_what_is_stored(tmp_path):
+    pytest.importorskip("opensees.openseespy")
+    case, stored = documented()[0], independent.read_stored()[:2]
+    found = independent.frequencies(case, 3)
+    np.testing.assert_allclose(found[:2], [one.opensees for one in stored], rtol=1e-5)
+    assert [one.case for one in stored] == [case.name] * 2
+    independent.write(tmp_path / "again.csv", stored)
+    assert independent.read_stored(tmp_path / "again.csv") == stored
 
 
 def test_tables_of_the_page_are_those_of_the_results():
