@@ -67,6 +67,7 @@ from foldyn.materials import (
     CustomHingeLaw as CustomHingeLaw,
     EnhancedLinear as EnhancedLinear,
     HingeLaw as HingeLaw,
+    PlateSuperlinear as PlateSuperlinear,
 )
 from foldyn.patterns import Pattern as Pattern, thicken as thicken
 from foldyn.results import (

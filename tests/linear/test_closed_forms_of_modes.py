@@ -19,6 +19,7 @@ PANEL_SHARES = {  # second moment about an edge of a square over m h^2, by hand
     "circumcenter": 2 / 8 + 1 / 2 / 4,
     "consistent": 1 / 3,  # linear fields are exact
     "inertia_exact": 1 / 3,
+    "bubble": 1 / 3,
 }
 
 

@@ -95,7 +95,7 @@ def test_shapes_follow_the_argument():
 
 def test_registries():
     assert set(BAR_LAWS) == {"ogden", "linear"}
-    assert set(HINGE_LAWS) == {"linear", "superlinear", "enhanced"}
+    assert set(HINGE_LAWS) == {"linear", "superlinear", "enhanced", "plate_superlinear"}
     for name, kind in BAR_LAWS.items():
         assert isinstance(bar_law(name), kind)
     for name, kind in HINGE_LAWS.items():

@@ -57,6 +57,11 @@ def law_energy(law):
         return lambda theta, rest: (theta - rest) ** 2 / 2
     if isinstance(law, Superlinear):
         return lambda theta, rest: 3 / 7 * jnp.abs(theta - rest) ** (7 / 3)
+    if isinstance(law, fd.PlateSuperlinear):
+        square = math.radians(law.onset) ** 2
+        return lambda theta, rest: (
+            3 / 7 * square * ((1 + (theta - rest) ** 2 / square) ** (7 / 6) - 1)
+        )
     limits = math.radians(law.theta1), math.radians(law.theta2)
     if law.rest == "as_published":
         return lambda theta, rest: published(theta, rest, *limits)
@@ -213,6 +218,7 @@ def test_each_bar(name):
 HINGE_LAWS = {
     "linear": hinge_law("linear"),
     "superlinear": hinge_law("superlinear"),
+    "plate_superlinear": fd.PlateSuperlinear(onset=30.0),
     "stress-free": fd.EnhancedLinear(75, 285),
     "published": fd.EnhancedLinear(75, 285, rest="as_published"),
     "lopsided": fd.EnhancedLinear(110, 200, rest="stress_free"),

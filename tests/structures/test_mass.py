@@ -63,7 +63,9 @@ def check(s, m):
     # linear momentum of a uniform velocity, and no coupling that a shift could feel
     velocity = np.tile([0.3, -1.0, 2.0], (n, 1))
     np.testing.assert_allclose((m @ velocity).sum(axis=0), total * velocity[0], rtol=1e-13)
-    assert (m >= 0).all()
+    assert (m.diagonal() > 0).all()
+    if s.options.mass != "bubble":  # whose opposite corners move against each other in a bulge
+        assert (m >= 0).all()
 
 
 @pytest.mark.parametrize("panel", sorted(PANELS))

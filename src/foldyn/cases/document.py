@@ -191,7 +191,8 @@ class _Writer:
             )
             return {"kind": "user", "name": str(law.name)}
         names = [f.name for f in dataclasses.fields(law) if f.init and f.name != "name"]
-        return {"kind": kind, **{name: plain(getattr(law, name)) for name in names}}
+        values = {name: plain(getattr(law, name)) for name in names}
+        return {"kind": kind, **{k: value for k, value in values.items() if value is not None}}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()

@@ -13,6 +13,7 @@ from foldyn.materials.enhanced_linear import EnhancedLinear
 from foldyn.materials.law import BarLaw, HingeLaw
 from foldyn.materials.linear import LinearBar, LinearHinge
 from foldyn.materials.ogden import Ogden
+from foldyn.materials.plate_superlinear import PlateSuperlinear
 from foldyn.materials.superlinear import Superlinear
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "LinearBar",
     "LinearHinge",
     "Ogden",
+    "PlateSuperlinear",
     "Superlinear",
     "bar_law",
     "hinge_law",
@@ -36,6 +38,7 @@ HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
     "linear": LinearHinge,
     "superlinear": Superlinear,
     "enhanced": EnhancedLinear,
+    "plate_superlinear": PlateSuperlinear,
 }
 
 
@@ -45,7 +48,7 @@ def bar_law(spec: str | BarLaw) -> BarLaw:
 
 
 def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
-    """Law of a hinge from its name ("linear", "superlinear", "enhanced") or a law object."""
+    """Law of a hinge from its name, one of `HINGE_LAWS`, or a law object."""
     return _law(spec, HINGE_LAWS, HingeLaw, field)
 
 

@@ -81,6 +81,8 @@ class HingeLaw(Law):
     rest_state = (math.pi, math.pi)
     linear_between: tuple[float, float] | None = None
     """Dihedrals (rad) between which the moment is k (theta - rest), if the law is linear at all."""
+    follows_rest: bool = True
+    """Whether the parameters of its compiled form depend on the rest angle."""
     closed_at_rest: bool = True
     """Whether a hinge can be at rest closed, with a dihedral of 0 or 2 pi."""
 

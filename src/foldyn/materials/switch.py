@@ -11,7 +11,7 @@ import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import call1, call2
-from foldyn.materials import enhanced_linear, linear, ogden, superlinear
+from foldyn.materials import enhanced_linear, linear, ogden, plate_superlinear, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
 from foldyn.materials.law import BarLaw, HingeLaw
 
@@ -53,6 +53,8 @@ def hinge_energy(code, theta, rest, a, b, c, d, address):
         return linear.hinge_energy(theta, rest)
     if code == superlinear.CODE:
         return superlinear.energy(theta, rest)
+    if code == plate_superlinear.CODE:
+        return plate_superlinear.energy(theta, rest, a)
     if code == AS_PUBLISHED:
         return enhanced_linear.energy(theta, rest, a, b)
     if code == STRESS_FREE:
@@ -67,6 +69,8 @@ def hinge_moment(code, theta, rest, a, b, c, d, address):
         return linear.hinge_moment(theta, rest)
     if code == superlinear.CODE:
         return superlinear.moment(theta, rest)
+    if code == plate_superlinear.CODE:
+        return plate_superlinear.moment(theta, rest, a)
     if code == AS_PUBLISHED:
         return enhanced_linear.moment(theta, rest, a, b)
     if code == STRESS_FREE:
@@ -81,6 +85,8 @@ def hinge_slope(code, theta, rest, a, b, address):
         return 1.0
     if code == superlinear.CODE:
         return superlinear.slope(theta, rest)
+    if code == plate_superlinear.CODE:
+        return plate_superlinear.slope(theta, rest, a)
     if (code == AS_PUBLISHED) | (code == STRESS_FREE):
         return enhanced_linear.slope(theta, a, b)
     return call2(address, theta, rest) if address != 0 else np.nan
@@ -93,6 +99,8 @@ def hinge_rest_slope(code, theta, rest, a, b, address):
         return linear.hinge_rest_slope(theta, rest)
     if code == superlinear.CODE:
         return superlinear.rest_slope(theta, rest)
+    if code == plate_superlinear.CODE:
+        return plate_superlinear.rest_slope(theta, rest, a)
     if code == AS_PUBLISHED:
         return enhanced_linear.rest_slope(theta, rest)
     if code == STRESS_FREE:

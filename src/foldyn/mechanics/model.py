@@ -46,12 +46,16 @@ class BarsHinges(NamedTuple):
 
 
 class Hinges(NamedTuple):
-    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and their law."""
+    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and their law.
+
+    parameters : (nh, 4) of each hinge, where they are not those that the law gives.
+    """
 
     nodes: NDArray
     stiffness: NDArray
     rest: NDArray
     law: HingeLaw
+    parameters: NDArray | None = None
 
 
 def element_order(nodes: NDArray) -> NDArray:
@@ -112,7 +116,9 @@ def build(
         hinges=gather(lambda k, g: g.nodes, (-1, 4), np.uint32),
         hinge_stiffness=gather(lambda k, g: g.stiffness, -1),
         hinge_rest=gather(lambda k, g: g.rest, -1),
-        hinge_parameters=gather(lambda k, g: g.law.parameters(g.rest), (-1, 4)),
+        hinge_parameters=gather(
+            lambda k, g: g.law.parameters(g.rest) if g.parameters is None else g.parameters, (-1, 4)
+        ),
         hinge_group=gather(lambda k, g: np.full(len(g.rest), k), -1, np.int64),
         hinge_runs=np.array(hinge_runs, np.int64).reshape(-1, 4),
         addresses=np.array(addresses or [(0, 0, 0)], np.int64),

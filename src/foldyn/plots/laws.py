@@ -13,6 +13,7 @@ from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.shells import Shell
 from foldyn.structures import Structure
+from foldyn.structures.discretized import HingeKind
 
 MOST_CURVES = 4
 # A law may grow without bound towards 0 and 360 degrees: the height of the frame is taken from
@@ -59,26 +60,25 @@ def plot_laws(
     figure = style.new_figure(3.5 * columns, 3.9, title)
     frames = figure.subplots(1, columns, squeeze=False)[0]
     for axes, kind in zip(frames, kinds, strict=False):
-        _draw_hinges(axes, *kind)
+        _draw_hinges(axes, kind)
     if bars is not None:
         _draw_bar(frames[-1], bars, structure.sheet.youngs_modulus, low, high)
     return style.finish(figure)
 
 
-def _draw_hinges(
-    axes: Axes, kind: str, law: Any, hinges: np.ndarray, stiffness: np.ndarray, rest: np.ndarray
-) -> None:
+def _draw_hinges(axes: Axes, hinges: HingeKind) -> None:
     """Draw the moment curves of one kind of hinge."""
-    style.frame(axes, "dihedral (degrees)", "moment (N m)", f"{kind}s: {law.name}")
+    kind, stiffness, rest = hinges.name, hinges.stiffness, hinges.rest
+    style.frame(axes, "dihedral (degrees)", "moment (N m)", f"{kind}s: {hinges.law.name}")
     degrees = np.linspace(1.0, 359.0, 1433)
     framed = (degrees >= _FRAMED[0]) & (degrees <= _FRAMED[1])
     groups = _distinct(stiffness, rest)
     reach = 0.0
     for index, (first, count) in enumerate(groups[:MOST_CURVES]):
-        k, theta0 = float(stiffness[first]), float(rest[first])
+        k, theta0, law = float(stiffness[first]), float(rest[first]), hinges.law_of(first)
         moment = k * np.asarray(law.moment(np.radians(degrees), theta0))
         look = style.line_style(index)
-        j, m = hinges[first][:2]
+        j, m = hinges.nodes[first][:2]
         label = f"{kind} {j}-{m}"
         label += f" and {count - 1} more" if count > 1 else ""
         angle = float(np.degrees(theta0))

@@ -177,7 +177,8 @@ class BarsHingesBody(Body):
         angle[self._turning], start = rest, 0
         for law, count in self._laws:
             part = slice(start, start + count)
-            parameters[self._turning[part]] = law.parameters(rest[part])
+            if law.follows_rest:
+                parameters[self._turning[part]] = law.parameters(rest[part])
             start += count
         return self._with(self.model._replace(hinge_rest=angle, hinge_parameters=parameters))
 

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn import materials
 from foldyn.errors import InputError
-from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw
+from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, PlateSuperlinear
+from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
+from foldyn.structures import plate
 from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.mass import MASS_RULES
@@ -36,7 +38,7 @@ def discretize(
     bar_law: str | BarLaw = "ogden",
     fold_law: str | HingeLaw = EnhancedLinear(),
     bend_law: str | HingeLaw = "superlinear",
-    calibration: Literal["standard", "merlin2"] = "standard",
+    calibration: Literal["standard", "merlin2", "plate"] = "standard",
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
@@ -55,14 +57,16 @@ def discretize(
     mass : str
         Mass rule, one of `foldyn.structures.MASS_RULES`.
     bar_law : {"ogden", "linear"} or BarLaw
-    fold_law, bend_law : {"linear", "superlinear", "enhanced"} or HingeLaw
-    calibration : {"standard", "merlin2"}
+    fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
+    calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
-        `foldyn.structures.calibration`).
+        `foldyn.structures.calibration`); "plate" makes panels bend and twist as thin plates do, for
+        small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float, sequence or mapping, optional
         Stiffness per length (N m/rad per m) of all creases, of each in the order of
         `pattern.creases`, or by assignment, as {"mountain": 0.1, "valley": 0.2}, instead of the
-        calibration, which creases of an assignment that is not named ("flat") keep.
+        calibration, which creases of an assignment that is not named ("flat") keep. With "plate"
+        the panels beside a crease still give way to its moment.
     crease_rest : float, sequence or mapping, optional
         Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
     centers : mapping, optional
@@ -99,7 +103,13 @@ def discretize(
     )  # fmt: skip
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
-    materials.hinge_law(bend_law, "bend_law")
+    bending = materials.hinge_law(bend_law, "bend_law")
+    if isinstance(bending, PlateSuperlinear) and bending.onset is None and calibration != "plate":
+        raise InputError(
+            ' = "plate_superlinear": has a plate\'s stiffness for small turns, which only '
+            'calibration = "plate" gives to bends; set it, or give PlateSuperlinear(onset=...)',
+            "bend_law",
+        )
     choice("mass", mass, MASS_RULES)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
@@ -110,6 +120,13 @@ def discretize(
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
     outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
+
+    folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
+    bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
+    if calibration == "plate":
+        folds = plate.fold_stiffness(folds, pattern, sheet)
+        bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
+        onset = plate_onset(bends, large)
 
     x = mesh.nodes
     clamps = clamp_rows(edges, mesh.triangles)
@@ -123,11 +140,12 @@ def discretize(
         options=options,
         pattern=pattern,
         folds=mesh.folds,
-        fold_stiffness=fold_stiffness(options.crease_stiffness, pattern, sheet),
+        fold_stiffness=folds,
         fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
         bends=mesh.bends,
-        bend_stiffness=calibrate.bend_stiffness(mesh, pattern, sheet, merlin2),
+        bend_stiffness=bends,
         bend_rest=hinge_angles(x, mesh.bends),
+        bend_onset=onset,
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,
         centers=mesh.centers,

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import HingeLaw, hinge_law
+from foldyn.materials import HingeLaw, PlateSuperlinear, hinge_law
 from foldyn.mechanics.body import Body
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
@@ -23,13 +23,23 @@ from foldyn.structures.swelling import Swelling
 
 
 class HingeKind(NamedTuple):
-    """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle."""
+    """Hinges of one kind and law: rows (k, 2 or more) of their ends, stiffness and rest angle.
+
+    onset : of each hinge (k,), rad, where the law leaves it to them.
+    """
 
     name: str
     law: HingeLaw
     nodes: NDArray
     stiffness: NDArray
     rest: NDArray
+    onset: NDArray | None = None
+
+    def law_of(self, row: int) -> HingeLaw:
+        """Law of one hinge."""
+        if self.onset is None:
+            return self.law
+        return PlateSuperlinear(float(np.degrees(self.onset[row])))
 
 
 def read_only(array: NDArray) -> NDArray:

@@ -157,11 +157,59 @@ def consistent(surface: Surface) -> sparse.csr_array:
     Its rotational inertia is exact about every axis in the plane of a panel.
     """
     element = (np.ones((3, 3)) + np.eye(3)) / 12.0
-    values = surface.triangle_mass[:, None, None] * element
-    rows = np.repeat(surface.triangles, 3, axis=1).ravel()
-    columns = np.tile(surface.triangles, (1, 3)).ravel()
-    n = len(surface.nodes)
+    return _assembled(surface.triangles, surface.triangle_mass, element, surface)
+
+
+def _assembled(
+    nodes: NDArray, total: NDArray, element: NDArray, surface: Surface
+) -> sparse.csr_array:
+    """Matrix of elements with the nodes (ne, k), each its mass (ne,) times one matrix (k, k)."""
+    k, n = len(element), len(surface.nodes)
+    values = total[:, None, None] * element
+    rows, columns = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, (1, k)).ravel()
     return sparse.coo_array((values.ravel(), (rows, columns)), shape=(n, n)).tocsr()
+
+
+def bubble(surface: Surface) -> sparse.csr_array:
+    """Consistent matrix of parallelograms that also twist and bulge as plates do.
+
+    In a parallelogram with its center node in the middle the displacement is bilinear between the
+    corners, plus a bulge phi = 1 - (xi^2 + eta^2)/2 by which the center is off their mean:
+    N_i = bilinear_i - phi/4, N_0 = phi, with the mean of phi 2/3 and of its square 22/45. Exact
+    for translations, rotations, every change of shape that is linear over the panel and a twist,
+    whose inertia m w^2/9 no diagonal matrix has. Other panels have the consistent matrix of their
+    triangles.
+    """
+    triangle = np.ones(len(surface.faces), bool)
+    panels = []
+    for p, center in enumerate(surface.centers.tolist()):
+        nodes = surface.nodes_of(p)
+        if center >= 0 and len(nodes) == 5 and _is_parallelogram(surface.nodes[nodes]):
+            panels.append(nodes)
+            triangle[p] = False
+    kept = triangle[surface.triangle_panel]
+    rest = surface._replace(
+        triangles=surface.triangles[kept],
+        triangle_panel=surface.triangle_panel[kept],
+        triangle_area=surface.triangle_area[kept],
+    )
+    nodes = np.array(panels, np.int64).reshape(-1, 5)
+    return consistent(rest) + _assembled(nodes, surface.panel_mass[~triangle], BUBBLE, surface)
+
+
+def _bubble_element() -> NDArray:
+    """Mass matrix (5, 5) of a parallelogram of mass 1: its corners in order, then its center."""
+    mean, square = 2.0 / 3.0, 22.0 / 45.0  # of phi = 1 - (xi^2 + eta^2)/2
+    near = np.array([4.0, 2.0, 1.0, 2.0]) / 36.0  # of the bilinear functions
+    element = np.empty((5, 5))
+    element[:4, :4] = [np.roll(near, k) for k in range(4)]
+    element[:4, :4] += (square - 2.0 * mean) / 16.0  # phi N_i has the mean of phi over 4
+    element[:4, 4] = element[4, :4] = (mean - square) / 4.0
+    element[4, 4] = square
+    return element
+
+
+BUBBLE = _bubble_element()
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:
@@ -245,6 +293,7 @@ MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
         consistent,
         mixed_voronoi,
         inertia_exact,
+        bubble,
     )
 }
 

@@ -13,7 +13,15 @@ from scipy import sparse
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
-from foldyn.materials import BarLaw, EnhancedLinear, HingeLaw, bar_law, hinge_law
+from foldyn.materials import (
+    BarLaw,
+    EnhancedLinear,
+    HingeLaw,
+    PlateSuperlinear,
+    bar_law,
+    hinge_law,
+)
+from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.mechanics.attached_body import attached
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import joined, moments, tensions
@@ -34,7 +42,7 @@ FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of
 """Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
 SCHEMES = ("n5b8", "n4b5")
-CALIBRATIONS = ("standard", "merlin2")
+CALIBRATIONS = ("standard", "merlin2", "plate")
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,7 @@ class ModelOptions:
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
     bend_law: str | HingeLaw = "superlinear"
-    calibration: Literal["standard", "merlin2"] = "standard"
+    calibration: Literal["standard", "merlin2", "plate"] = "standard"
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
@@ -78,6 +86,9 @@ class Structure(Discretized):
         whole crease (N m/rad); rest dihedral (rad).
     bends, bend_stiffness, bend_rest : (nh, 4), (nh,), (nh,)
         The same for the hinges inside panels.
+    bend_onset : (nh,)
+        Turn (rad) from which bends of the law `PlateSuperlinear` are no longer linear, where the
+        law leaves it to them.
     triangles, triangle_panel : (nt, 3), (nt,)
         Triangles, counter-clockwise from the front, and the panel of each.
     centers : (np,)
@@ -100,6 +111,7 @@ class Structure(Discretized):
     bends: NDArray = field(default_factory=lambda: _none(4))
     bend_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
     bend_rest: NDArray = field(default_factory=lambda: _none(1, float))
+    bend_onset: NDArray = field(default_factory=lambda: _none(1, float))
     triangles: NDArray = field(default_factory=lambda: _none(3))
     triangle_panel: NDArray = field(default_factory=lambda: _none(1))
     centers: NDArray = field(default_factory=lambda: _none(1))
@@ -136,7 +148,16 @@ class Structure(Discretized):
             self.bars,
             self.sheet.youngs_modulus * self.bar_area / self.bar_length,
             self.bar_law,
-            tuple(mechanics.Hinges(h.nodes, h.stiffness, h.rest, h.law) for h in self.hinge_kinds),
+            tuple(
+                mechanics.Hinges(
+                    h.nodes,
+                    h.stiffness,
+                    h.rest,
+                    h.law,
+                    None if h.onset is None else onset_parameters(h.onset),
+                )
+                for h in self.hinge_kinds
+            ),
         )
 
     @cached_property
@@ -169,9 +190,14 @@ class Structure(Discretized):
     @property
     def hinge_kinds(self) -> tuple[HingeKind, ...]:
         """Its folds and bends, with their laws."""
+        law = self.bend_law
+        own = isinstance(law, PlateSuperlinear) and law.onset is None
+        onset = self.bend_onset if own else None
         return (
             HingeKind("fold", self.fold_law, self.folds, self.fold_stiffness, self.fold_rest),
-            HingeKind("bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest),
+            HingeKind(
+                "bend", self.bend_law, self.bends, self.bend_stiffness, self.bend_rest, onset
+            ),
         )
 
     @cached_property

@@ -1,0 +1,115 @@
+"""Moment law of panels: linear for small turns, as a plate, then with the exponent 4/3.
+
+M = k d (1 + (d/d0)^2)^(1/6), d = theta - theta0. Well below the onset d0 this is the linear law,
+well above it k d0^(-1/3) |d|^(4/3), the law of the superlinear bends: a panel that has buckled
+into the shape that large turns have. It is the blend (M_1^6 + M_4/3^6)^(1/6) of the two, smooth
+everywhere; the sixth power has an energy in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.jit.compiled import scalar
+from foldyn.materials.law import PARAMETERS, HingeLaw
+from foldyn.values import number
+
+CODE = 4
+FEW = 1e-4  # of (d/d0)^2: below, the energy is its series
+
+
+@scalar
+def energy(theta, rest, per_onset2):
+    """Energy / k = 3/7 d0^2 ((1 + (d/d0)^2)^(7/6) - 1)."""
+    d = theta - rest
+    z = d * d * per_onset2
+    if z < FEW:
+        return 0.5 * d * d * (1.0 + z / 12.0 * (1.0 - 5.0 / 18.0 * z * (1.0 - 11.0 / 24.0 * z)))
+    return 3.0 / 7.0 * math.expm1(7.0 / 6.0 * math.log1p(z)) / per_onset2
+
+
+@scalar
+def moment(theta, rest, per_onset2):
+    """Moment / k."""
+    d = theta - rest
+    return d * (1.0 + d * d * per_onset2) ** (1.0 / 6.0)
+
+
+@scalar
+def slope(theta, rest, per_onset2):
+    """Slope / k = (1 + 4/3 z)/(1 + z)^(5/6), z = (d/d0)^2."""
+    d = theta - rest
+    z = d * d * per_onset2
+    return (1.0 + 4.0 / 3.0 * z) / (1.0 + z) ** (5.0 / 6.0)
+
+
+@scalar
+def rest_slope(theta, rest, per_onset2):
+    """Derivative of energy / k with respect to rest."""
+    return -moment(theta, rest, per_onset2)
+
+
+def onset_parameters(onset: ArrayLike) -> NDArray:
+    """Parameters (n, 4) of hinges with onsets (n,), rad."""
+    onset = np.asarray(onset, float)
+    table = np.zeros((len(onset), PARAMETERS))
+    table[:, 0] = onset**-2.0
+    return table
+
+
+@dataclass(frozen=True)
+class PlateSuperlinear(HingeLaw):
+    """Bend law that is linear for small turns and has the exponent 4/3 for large ones.
+
+    Parameters
+    ----------
+    onset : float, optional
+        Turn d0 (degrees) at which the two parts are equal. Without it each bend has its own: that
+        at which the bends of the standard calibration are as stiff as those of the plate, which
+        needs `calibration="plate"`. (Outside a structure it is then that of a square panel with
+        t/L = 0.01 and nu = 0.25: 1.37 degrees.)
+
+    Examples
+    --------
+    >>> law = PlateSuperlinear(onset=2.0)
+    >>> float(law.slope(3.0, rest=3.0))
+    1.0
+    """
+
+    onset: float | None = None
+    name: str = "plate_superlinear"
+
+    code = CODE
+    follows_rest = False
+
+    def __post_init__(self) -> None:
+        if self.onset is not None:
+            number("PlateSuperlinear: onset", self.onset, above=0.0, most=360.0, unit="degrees")
+
+    def check(self, field: str) -> None:
+        """Refuse it for creases without an onset: only bends have one of their own."""
+        super().check(field)
+        if field == "fold_law" and self.onset is None:
+            raise InputError(
+                ' = "plate_superlinear": creases have no onset of their own; give '
+                "PlateSuperlinear(onset=...) in degrees, or use it as bend_law",
+                field,
+            )
+
+    def parameters(self, rest: NDArray) -> NDArray:
+        """1/d0^2 (1/rad^2) of each hinge."""
+        onset = SQUARE if self.onset is None else math.radians(self.onset)
+        return onset_parameters(np.full(len(rest), onset))
+
+
+def plate_onset(plate: ArrayLike, superlinear: ArrayLike) -> NDArray:
+    """Turns (rad) at which k d of a plate and k' d^(4/3) are equal, of stiffnesses k and k'."""
+    return (np.asarray(plate) / np.asarray(superlinear)) ** 3.0
+
+
+SQUARE = float(plate_onset(1.0 - 0.25, 0.5 * (100.0 * math.sqrt(2.0)) ** (1.0 / 3.0)))

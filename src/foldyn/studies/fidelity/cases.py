@@ -1,0 +1,157 @@
+"""The cases of the fidelity study: what they are, and how both models hold them.
+
+Both models get the same pattern, sheet and supports. Supports hold vertices; an edge that is held
+is held along its whole length in the shell, and by its two vertices with bars and hinges, which
+have no other nodes there.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foldyn.cases import Case, Fix
+from foldyn.patterns import GENERATORS, Pattern
+from foldyn.shells import Shell
+from foldyn.structures import Sheet
+from foldyn.structures.discretized import Discretized
+
+DOCUMENTED = Path(__file__).with_name("documented.toml")
+
+
+@dataclass(frozen=True)
+class Held:
+    """Supports by vertices.
+
+    Attributes
+    ----------
+    points : mapping of str to tuple of int
+        Vertices held, by the axes along which they are.
+    edges : tuple of (int, int)
+        Edges of which every point is held along all axes.
+    """
+
+    points: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    edges: tuple[tuple[int, int], ...] = ()
+
+    def of(self, structure: Discretized) -> list[Fix]:
+        """Supports of a structure."""
+        fixed = [Fix(list(nodes), axes) for axes, nodes in self.points.items()]
+        if not self.edges:
+            return fixed
+        nodes: Any = self.edges
+        if isinstance(structure, Shell):
+            along = {(int(row[0]), int(row[-1])): row for row in structure.edge_nodes}
+            nodes = [along[min(edge), max(edge)] for edge in self.edges]
+        return [*fixed, Fix(np.unique(np.concatenate(nodes)).tolist(), "xyz")]
+
+
+@dataclass(frozen=True)
+class FidelityCase:
+    """A pattern, a sheet and supports.
+
+    Attributes
+    ----------
+    kind : str
+        Generator of the pattern, one of `GENERATORS`, or "polygons".
+    shape : mapping
+        Its arguments.
+    support : str
+        Name of the supports.
+    sheet : Sheet
+    """
+
+    kind: str
+    shape: Mapping[str, Any]
+    support: str
+    sheet: Sheet
+
+    @property
+    def name(self) -> str:
+        """What it is, in a line."""
+        shape = ", ".join(f"{key} {_short(value)}" for key, value in self.shape.items())
+        return f"{self.kind}, {shape}, {self.support}, L* {self.sheet.length_scale_ratio:.3g}"
+
+    def pattern(self) -> Pattern:
+        """The pattern."""
+        make = polygons if self.kind == "polygons" else GENERATORS[self.kind]
+        return make(**self.shape)
+
+    def case(self, structure: Discretized) -> Case:
+        """A structure with the supports."""
+        return Case(structure, supports(self.kind, self.shape)[self.support].of(structure))
+
+
+def _short(value: Any) -> str:
+    return "x".join(map(str, value)) if isinstance(value, list | tuple) else f"{value:.3g}"
+
+
+def documented(path: Path = DOCUMENTED) -> list[FidelityCase]:
+    """The documented set: simple folds, sheets of parallelograms, towers and pairs of polygons."""
+    told = tomllib.loads(path.read_text("utf-8"))
+    cases = []
+    for case in told["cases"]:
+        shape = dict(case["pattern"])
+        sheet = Sheet(**told["sheet"], length_scale_ratio=case["length_scale_ratio"])
+        cases.append(FidelityCase(shape.pop("kind"), shape, case["support"], sheet))
+    return cases
+
+
+def polygons(sides: int = 6, dihedral: float = 90.0, edge: float = 1.0) -> Pattern:
+    """Two regular polygons with edges of length `edge` (m) that meet at a dihedral (degrees).
+
+    Vertices 0 and 1 end the crease; those of the first polygon follow, then the others.
+    """
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    steps = edge * np.column_stack([np.cos(turn), np.sin(turn)])
+    outline = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)[:-1]])
+    angle = np.radians(dihedral)
+    halves = [
+        np.column_stack([outline[:, 0], outline[:, 1] * c, outline[:, 1] * s])
+        for c, s in ((1.0, 0.0), (np.cos(angle), np.sin(angle)))
+    ]
+    first = tuple(range(sides))
+    second = (1, 0, *range(2 * sides - 3, sides - 1, -1))
+    return Pattern(np.concatenate([halves[0], halves[1][2:]]), [first, second], name="polygons")
+
+
+def supports(kind: str, shape: Mapping[str, Any]) -> dict[str, Held]:
+    """Supports of a kind of pattern, by name."""
+    if kind == "simple_fold":
+        return {
+            "case 1": Held({"xyz": (4, 5), "z": (0, 1)}),
+            "panel": Held({"xyz": (0, 1, 2, 3)}),
+            "free": Held(),
+        }
+    if kind == "kresling":
+        sides = int(shape.get("sides", 6))
+        ring = tuple(range(sides))
+        return {
+            "base": Held(edges=tuple((k, (k + 1) % sides) for k in ring)),
+            "base corners": Held({"xyz": ring}),
+            "free": Held(),
+        }
+    if kind == "polygons":
+        return {"panel": Held({"xyz": tuple(range(int(shape["sides"])))}), "free": Held()}
+    return _sheet_supports(*shape["cells"])
+
+
+def _sheet_supports(columns: int, rows: int) -> dict[str, Held]:
+    """Supports of a sheet of 2 columns x 2 rows parallelograms, numbered along y first."""
+    step = 2 * rows + 1
+    corners = (0, step - 1, 2 * columns * step, (2 * columns + 1) * step - 1)
+    side = tuple(range(step))
+    return {
+        # as in case study 2: a side against a wall, the corners on the ground
+        "folding": Held({"x": side, "y": (rows,), "z": corners}),
+        "edge": Held(edges=tuple(pairwise(side))),
+        "corners": Held({"xyz": corners}),
+        "panel": Held({"xyz": (0, 1, step, step + 1)}),
+        "free": Held(),
+    }

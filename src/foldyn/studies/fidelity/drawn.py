@@ -1,0 +1,58 @@
+"""Random cases, from a stored seed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from foldyn.structures import Sheet
+from foldyn.studies.fidelity.cases import FidelityCase, documented, supports
+
+SEED, COUNT = 20261123, 30  # drawn after the constants of the calibration were fixed
+
+
+def drawn(count: int = COUNT, seed: int = SEED) -> list[FidelityCase]:
+    """Random patterns, sizes, sheets and supports.
+
+    Sizes of 0.02 to 2 m and up to 1.6 times that across, panel angles of 45 to 85 degrees, sheets
+    of 1/50 to 1/400 of the smaller size, Poisson's ratios of 0.1 to 0.45, length-scale ratios of
+    0.5 to 10.
+    """
+    rng = np.random.default_rng(seed)
+    kinds = sorted({case.kind for case in documented()})
+    return [_one(rng, kinds) for _ in range(count)]
+
+
+def _one(rng: np.random.Generator, kinds: list[str]) -> FidelityCase:
+    a = _spread(rng, 0.02, 2.0)
+    b = a * _spread(rng, 1.0 / 1.6, 1.6)
+    kind = str(rng.choice(kinds))
+    shape = _shape(rng, kind, a, b)
+    sheet = Sheet(
+        youngs_modulus=_spread(rng, 1e6, 2e11),
+        poissons_ratio=float(rng.uniform(0.1, 0.45)),
+        thickness=min(a, b) / _spread(rng, 50.0, 400.0),
+        density=_spread(rng, 100.0, 8000.0),
+        length_scale_ratio=_spread(rng, 0.5, 10.0),
+    )
+    support = str(rng.choice(sorted(supports(kind, shape))))
+    return FidelityCase(kind, shape, support, sheet)
+
+
+def _shape(rng: np.random.Generator, kind: str, a: float, b: float) -> dict[str, Any]:
+    angle, dihedral = float(rng.uniform(45.0, 85.0)), float(rng.uniform(40.0, 150.0))
+    if kind == "simple_fold":
+        return {"a": a, "b": b, "dihedral": dihedral}
+    if kind == "polygons":
+        return {"sides": int(rng.choice([3, 5, 6])), "dihedral": dihedral, "edge": a}
+    if kind == "kresling":
+        sides = int(rng.integers(4, 9))
+        return {"sides": sides, "radius": a, "height": b, "twist": float(rng.uniform(10.0, 40.0))}
+    cells = [int(rng.integers(1, 3)), int(rng.integers(1, 3))]
+    return {"cells": cells, "a": a, "b": b, "panel_angle": angle, "dihedral": dihedral}
+
+
+def _spread(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number whose logarithm is uniform."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

@@ -1,0 +1,101 @@
+"""Results of the study as CSV tables, one row a mode, and what they say in a line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from foldyn.studies.fidelity.cases import FidelityCase
+from foldyn.studies.fidelity.compare import MODELS, Row, compare
+from foldyn.studies.fidelity.reference import reference
+
+RESULTS = Path(__file__).parent / "results"
+NEAR, ALIKE = 0.05, 0.95  # error and MAC of a good mode
+
+
+class Modes(NamedTuple):
+    """Modes of a case, by model; models have the same ones, in the same order."""
+
+    case: str
+    rows: Mapping[str, list[Row]]
+
+
+class Summary(NamedTuple):
+    """Errors of a model over a set, fractions. A mode without a partner has an infinite error."""
+
+    modes: int
+    median: float
+    ninetieth: float
+    near: float  # share of modes within 5 %
+    alike: float  # share of modes with a MAC above 0.95
+    lost: int  # modes without a partner
+
+
+def computed(
+    cases: Iterable[FidelityCase], tell: Callable[[Modes], None] = lambda modes: None
+) -> list[Modes]:
+    """Modes of cases by the shell and by every model."""
+    found = []
+    for case in cases:
+        true = reference(case)
+        modes = Modes(case.name, {model: compare(case, true, model) for model in MODELS})
+        tell(modes)
+        found.append(modes)
+    return found
+
+
+def write(path: Path, results: Iterable[Modes]) -> None:
+    """Write a table: case, mode, frequency (Hz), the same over the plate's, errors and MAC."""
+    heads = [f"{what}: {model}" for model in MODELS for what in ("error", "mac")]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(["case", "mode", "shell [Hz]", "over plate", *heads])
+        for modes in results:
+            for every in zip(*modes.rows.values(), strict=True):
+                own = [f"{value:.4f}" for row in every for value in (row.error, row.mac)]
+                first = every[0]
+                frequency = [f"{first.shell:.6g}", f"{first.over_plate:.4f}"]
+                out.writerow([modes.case, first.mode, *frequency, *own])
+
+
+def read(path: Path) -> list[Modes]:
+    """A table that `write` wrote; cases without modes below the limit are not in it."""
+    found: dict[str, Modes] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        for line in csv.DictReader(file):
+            modes = found.setdefault(line["case"], Modes(line["case"], {m: [] for m in MODELS}))
+            for model in MODELS:
+                error, mac = float(line[f"error: {model}"]), float(line[f"mac: {model}"])
+                shell, over_plate = float(line["shell [Hz]"]), float(line["over plate"])
+                modes.rows[model].append(Row(int(line["mode"]), shell, over_plate, error, mac))
+    return list(found.values())
+
+
+def summary(results: Iterable[Modes], model: str) -> Summary:
+    """Errors of a model over a set."""
+    rows = [row for modes in results for row in modes.rows[model]]
+    error = np.array([np.inf if np.isnan(row.error) else abs(row.error) for row in rows])
+    alike = np.array([row.mac > ALIKE for row in rows])
+    median, ninetieth = np.percentile(error, [50, 90], method="higher")
+    return Summary(
+        len(rows), float(median), float(ninetieth), float((error < NEAR).mean()),
+        float(alike.mean()), int(np.isinf(error).sum()),
+    )  # fmt: skip
+
+
+def table(results: list[Modes]) -> str:
+    """The summaries of all models in Markdown."""
+    lines = [
+        "| calibration, mass | median | 90th percentile | within 5 % | MAC above 0.95 | lost |",
+        "|---|---|---|---|---|---|",
+    ]
+    for model in MODELS:
+        s = summary(results, model)
+        errors = f"{100 * s.median:.1f} % | {100 * s.ninetieth:.1f} %"
+        shares = f"{100 * s.near:.0f} % | {100 * s.alike:.0f} %"
+        lines.append(f"| {model} | {errors} | {shares} | {s.lost} |")
+    return "\n".join(lines)

@@ -1,0 +1,159 @@
+"""The bend law that is a plate's for small turns and superlinear for large ones."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.materials import PlateSuperlinear, Superlinear
+from foldyn.materials.plate_superlinear import SQUARE
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+
+
+def structure(**options):
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.3)
+    options = {"calibration": "plate", "bend_law": "plate_superlinear", **options}
+    return fd.discretize(pattern, SHEET, **options)
+
+
+def test_limits_of_the_law():
+    """Linear far below the onset; k d0^(-1/3) d^(4/3) far above; 2^(1/6) of both at the onset."""
+    law, d0 = PlateSuperlinear(onset=2.0), np.radians(2.0)
+    small, large = 1e-4 * d0, 30.0 * d0
+    assert law.moment(1.0 + small, 1.0) == pytest.approx(small, rel=1e-7)
+    wanted = d0 ** (-1.0 / 3.0) * Superlinear().moment(1.0 + large, 1.0)
+    assert law.moment(1.0 + large, 1.0) == pytest.approx(wanted, rel=3e-4)
+    assert law.moment(1.0 - d0, 1.0) == pytest.approx(-(2.0 ** (1.0 / 6.0)) * d0)
+    assert law.slope(1.0, 1.0) == 1.0
+
+
+@pytest.mark.parametrize("turns", [1e-9, 1e-3, 0.0099, 0.0101, 0.3, 1.0, 7.0, 300.0])
+def test_energy_is_the_integral_of_the_moment(turns):
+    """To rounding, on both sides of where the energy changes to its series."""
+    law, d = PlateSuperlinear(onset=0.5), turns * np.radians(0.5)
+    ends = [0.0, min(0.5, 2.0 / turns), 1.0]
+    integral = sum(
+        quad(lambda s: float(law.moment(s * d, 0.0)) * d, a, b, epsrel=1e-13)[0]
+        for a, b in pairwise(ends)
+    )
+    assert law.energy(d, 0.0) == pytest.approx(integral, rel=1e-13)
+    assert law.energy(d, 0.0) == law.energy(-d, 0.0)
+
+
+def test_onsets_of_the_bends():
+    """A bend has the plate's stiffness at rest, the standard calibration's moment far from it."""
+    s, plain = structure(), structure(calibration="standard", bend_law="superlinear")
+    (_, bends), (_, old) = s.hinge_kinds, plain.hinge_kinds
+    for row in (0, 5):
+        law = bends.law_of(row)
+        assert law.onset == pytest.approx(np.degrees(s.bend_onset[row]))
+        far = bends.rest[row] + 1.2
+        found = s.bend_stiffness[row] * law.moment(far, bends.rest[row])
+        wanted = plain.bend_stiffness[row] * old.law.moment(far, old.rest[row])
+        assert found == pytest.approx(wanted, rel=1e-3)
+    table = s.model.hinge_parameters[s.model.hinge_group == 1]
+    np.testing.assert_allclose(np.sort(table[:, 0]), np.sort(s.bend_onset**-2.0))
+
+
+def test_onset_of_a_square_panel():
+    """(D/t)^(1/3)/2 against 1 - nu: 8 (1 - nu)^3 t/D."""
+    square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
+    s = fd.discretize(square, SHEET, calibration="plate", bend_law="plate_superlinear")
+    np.testing.assert_allclose(s.bend_onset, 8 * 0.75**3 * 0.01 / np.sqrt(2.0), rtol=1e-12)
+    np.testing.assert_allclose(s.bend_onset, SQUARE, rtol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-4, 0.3])
+def test_force_and_tangent_are_derivatives(scale):
+    """Small and large motions, bends with onsets of their own: central differences."""
+    s = structure(scheme="n5b8")
+    rng = np.random.default_rng(1)
+    u, v = scale * 0.1 * rng.standard_normal((2, *s.nodes.shape))
+    h = 1e-4
+    force = (s.energy(u + h * v) - s.energy(u - h * v)) / (2 * h)
+    assert float((s.internal_force(u) * v).sum()) == pytest.approx(force, rel=1e-6)
+    stiffness = (s.internal_force(u + h * v) - s.internal_force(u - h * v)).ravel() / (2 * h)
+    found = s.tangent(u) @ v.ravel()
+    assert np.linalg.norm(found - stiffness) < 1e-5 * np.linalg.norm(stiffness)
+
+
+def test_modes_at_rest_are_those_of_linear_bends():
+    supports = [fd.Fix("xmin", "xyz")]
+    found, linear = (
+        fd.modes(fd.Case(structure(bend_law=law), supports), 6).frequency.values
+        for law in ("plate_superlinear", "linear")
+    )
+    np.testing.assert_allclose(found, linear, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["rk4", "generalized_alpha", "energy_momentum"])
+def test_motions_keep_their_energy(method):
+    case = fd.Case(
+        structure(),
+        [fd.Fix("xmin", "xyz")],
+        [fd.Force([7], (0.0, 0.0, 2e-3), fd.HalfSine(0.2))],
+    )
+    motion = fd.simulate(case, duration=0.5, method=method)
+    assert abs(motion.attrs["energy_error"]) < 5e-3
+
+
+def test_in_case_files_and_results(tmp_path):
+    text = """
+[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+calibration = "plate"
+bend_law = LAW
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+count = 2
+"""
+    for law in ('"plate_superlinear"', '{ kind = "plate_superlinear", onset = 3.0 }'):
+        (tmp_path / "case.toml").write_text(text.replace("LAW", law), "utf-8")
+        found = fd.read_case(tmp_path / "case.toml").run()
+        fd.save(found, tmp_path / "modes.nc")
+        again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
+        kept = again.model.hinge_parameters[again.model.hinge_group == 1, 0]
+        own = again.bend_onset**-2.0 if "kind" not in law else np.radians(3.0) ** -2.0
+        np.testing.assert_allclose(np.sort(kept), np.sort(np.broadcast_to(own, kept.shape)))
+
+
+@pytest.mark.parametrize("law", [PlateSuperlinear(), PlateSuperlinear(onset=3.0)])
+def test_results_keep_a_law_object(tmp_path, law):
+    found = fd.modes(fd.Case(structure(bend_law=law), [fd.Fix("xmin", "xyz")]), 1)
+    fd.save(found, tmp_path / "modes.nc")
+    again = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
+    assert again.options.bend_law == law
+    assert again.as_made
+
+
+def test_pictures_draw_each_bend_with_its_onset():
+    figure = fd.plots.plot_laws(structure())
+    assert any("plate_superlinear" in axes.get_title() for axes in figure.axes)
+
+
+def test_refused():
+    with pytest.raises(InputError, match=r'bend_law.*calibration = "plate"'):
+        structure(calibration="standard")
+    with pytest.raises(InputError, match=r"fold_law.*onset"):
+        structure(fold_law="plate_superlinear")
+    with pytest.raises(InputError, match=r"fold_law.*onset"):
+        fd.shell(fd.patterns.miura(), SHEET, 2, fold_law=PlateSuperlinear())
+    for onset in (0.0, -1.0, 400.0, float("nan"), "2"):
+        with pytest.raises(InputError, match="onset"):
+            PlateSuperlinear(onset=onset)
+    given = structure(calibration="standard", bend_law=PlateSuperlinear(onset=5.0))
+    assert given.hinge_kinds[1].onset is None

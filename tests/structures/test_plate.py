@@ -1,0 +1,185 @@
+"""The calibration "plate": bends and folds with the stiffness of thin plates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mass_samples import HEXAGON, PANELS, PENTAGON
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.structures.plate import ACUTE, ALONE, COMPLIANCE, OBTUSE, POLYGON, SKEW, TRIANGLE
+
+SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
+G = SHEET.bending_modulus
+PARALLELOGRAMS = ["square", "rectangle", "rhombus", "parallelogram", "oblique"]
+
+
+def panel(vertices, sheet=SHEET, **options):
+    vertices = np.asarray(vertices, float)
+    pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
+    return fd.discretize(pattern, sheet, bend_law="linear", calibration="plate", **options)
+
+
+def bending(structure, heights):
+    """Energy of the bends for small heights (n,) of the nodes of a flat panel."""
+    u = np.zeros((len(structure.nodes), 3))
+    u[:, 2] = 1e-5 * np.asarray(heights)
+    return structure.energies(u)["strain_bends"] / 1e-10
+
+
+def twist_stiffness(structure):
+    """Second derivative of the energy by w for corners at +w, -w, +w, -w, the center at ease."""
+    corners = [1.0, -1.0, 1.0, -1.0]
+    if len(structure.nodes) == 4:
+        return 2.0 * bending(structure, corners)
+    middle = bending(structure, [*corners, 0.0])
+    up, down = (bending(structure, [*corners, h]) for h in (0.5, -0.5))
+    slope, curvature = up - down, 4.0 * (up + down - 2.0 * middle)
+    return 2.0 * (middle - 0.5 * slope**2 / curvature)
+
+
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+@pytest.mark.parametrize("name", PARALLELOGRAMS)
+def test_twist_of_parallelograms(name, scheme):
+    """A plate with w = xi eta, of the constant curvature 4 w/(a b): 32 (1 - nu) G/A for rectangles.
+
+    U = (A/2) 2 (1 - nu) G (4 w/(a b))^2. Skew ones with free edges have a power of their sine too.
+    """
+    s = panel(PANELS[name], scheme=scheme)
+    x = np.array(PANELS[name])
+    area = s.pattern.face_areas[0]
+    sine = area / np.prod(np.linalg.norm(np.diff(x, axis=0)[:2], axis=1))
+    expected = 32.0 * (1.0 - SHEET.poissons_ratio) * G * sine ** SKEW[4] / area
+    assert twist_stiffness(s) == pytest.approx(expected, rel=1e-6)
+
+
+def test_twist_depends_on_the_edges_that_are_free():
+    """The inner panels of a Miura-ori keep more of a plate's twist than those at its corners."""
+    pattern = fd.patterns.miura(cells=(2, 2), panel_angle=60, dihedral=100)
+    s = fd.discretize(pattern, SHEET, calibration="plate")
+    rectangle = 0.7 * G * pattern.face_areas[0] * (1.0 + 1.0 / 3.0)  # diagonals 1 and sqrt 3
+    power = np.log(s.bend_stiffness[::4] / rectangle) / np.log(np.sin(np.pi / 3))
+    corners, sides, inner = [0, 3, 12, 15], [1, 2, 4, 7, 8, 11, 13, 14], [5, 6, 9, 10]
+    np.testing.assert_allclose(power[inner], SKEW[0], rtol=1e-9)
+    np.testing.assert_allclose(power[sides], SKEW[1], rtol=1e-9)
+    # the creases of panels at the corners (0, 0) and (4, 0) meet at (1, 1) and (3, 1)
+    np.testing.assert_allclose(np.sort(power[corners]), [OBTUSE] * 2 + [ACUTE] * 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", PARALLELOGRAMS)
+def test_spokes_of_a_panel_are_alike(name):
+    stiffness = panel(PANELS[name]).bend_stiffness
+    np.testing.assert_allclose(stiffness, stiffness[0], rtol=1e-12)
+
+
+def test_spokes_of_a_square():
+    """(1 - nu) G, whatever its size."""
+    for size in (0.1, 1.0, 7.0):
+        found = panel(size * np.array(PANELS["square"])).bend_stiffness
+        np.testing.assert_allclose(found, 0.7 * G, rtol=1e-12)
+
+
+@pytest.mark.parametrize("m", [5, 6, 8])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_regular_polygons_bend_as_plates_in_curvatures_without_mean(m, turn):
+    """W = (A/2) G (1 - nu) kappa : kappa, which is (1 - nu) G A for diag(1, -1).
+
+    Corners alone bend a plate to less: 0.768, 0.871, 0.925 of it with 5, 6, 8 corners, found with
+    the shell (nu = 0.25, 8 and 16 divisions extrapolated).
+    """
+    angle = 2.0 * np.pi * np.arange(m) / m
+    s = panel(1.7 * np.c_[np.cos(angle), np.sin(angle)])
+    x, y = s.nodes[:, 0] - s.nodes[-1, 0], s.nodes[:, 1] - s.nodes[-1, 1]
+    heights = 0.5 * np.cos(2 * turn) * (x**2 - y**2) + np.sin(2 * turn) * x * y
+    plate = {5: 0.768, 6: 0.871, 8: 0.925}[m] * 0.7 * G * s.pattern.face_areas[0]
+    assert bending(s, heights) == pytest.approx(plate, rel=6e-3)
+    turned = bending(s, 0.5 * (x**2 - y**2))
+    assert bending(s, heights) == pytest.approx(turned, rel=1e-6)
+
+
+@pytest.mark.parametrize("vertices", [HEXAGON, PENTAGON], ids=["hexagon", "pentagon"])
+def test_polygons_have_the_plates_energy_in_the_mean_of_two_curvatures(vertices):
+    s = panel(np.array(vertices) * [1.0, 0.8])
+    x, y = s.nodes[:, 0] - s.nodes[-1, 0], s.nodes[:, 1] - s.nodes[-1, 1]
+    found = bending(s, 0.5 * (x**2 - y**2)) + bending(s, x * y)
+    plate = 2.0 * 0.7 * G * s.pattern.face_areas[0]
+    assert found == pytest.approx(POLYGON[len(vertices) - 5] * plate, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(PANELS))
+@pytest.mark.parametrize("scheme", ["n5b8", "n4b5"])
+def test_bends_do_not_depend_on_place_or_first_corner(name, scheme):
+    x = np.array(PANELS[name], float)
+    before = panel(x, scheme=scheme).bend_stiffness
+    q = np.linalg.qr(np.random.default_rng(7).standard_normal((3, 3)))[0]
+    moved = np.c_[x, np.zeros(len(x))] @ (q * np.linalg.det(q)).T + [0.2, 0.1, -0.3]
+    np.testing.assert_allclose(panel(moved, scheme=scheme).bend_stiffness, before, rtol=1e-9)
+    turned = panel(np.roll(x, 1, axis=0), scheme=scheme).bend_stiffness
+    np.testing.assert_allclose(np.sort(turned), np.sort(before), rtol=1e-9)
+
+
+def test_folds_are_in_series_with_the_panels_they_bend():
+    """Rectangles 2 and 1 wide on a crease of 1.5, and a triangle on another of length 1.5."""
+    x = [[-2, 0, 1], [0, 0, 0], [1, 0, 1], [1, 1.5, 1], [0, 1.5, 0], [-2, 1.5, 1], [2, 0.7, 0]]
+    pattern = fd.Pattern(x, [[0, 1, 4, 5], [1, 2, 3, 4], [2, 6, 3]])
+    plain, plate = (
+        fd.discretize(pattern, SHEET, calibration=c).fold_stiffness for c in ("standard", "plate")
+    )
+    areas = pattern.face_areas
+    for k, crease in enumerate(pattern.creases.tolist()):
+        free = TRIANGLE[1] * areas[2] if crease == [2, 3] else ALONE * areas[0]
+        panels = (free + COMPLIANCE * areas[1]) / (G * 1.5**2)
+        assert 1.0 / plate[k] == pytest.approx(1.0 / plain[k] + panels, rel=1e-12)
+
+
+def test_folds_of_a_given_stiffness():
+    """Creases without stiffness have none, and rigid ones that of their panels."""
+    pattern = fd.patterns.simple_fold(dihedral=90)
+    free = fd.discretize(pattern, SHEET, calibration="plate", crease_stiffness=0.0)
+    np.testing.assert_array_equal(free.fold_stiffness, 0.0)
+    rigid = fd.discretize(pattern, SHEET, calibration="plate", crease_stiffness=1e9 * G)
+    np.testing.assert_allclose(rigid.fold_stiffness, G / (2 * ALONE), rtol=1e-6)
+
+
+def test_what_stays_as_in_the_standard_calibration():
+    pattern = fd.patterns.miura(cells=(1, 1))
+    plain, plate = (
+        fd.discretize(pattern, SHEET, calibration=c) for c in ("standard", "plate")
+    )  # fmt: skip
+    np.testing.assert_array_equal(plate.bar_area, plain.bar_area)
+    np.testing.assert_array_equal(plate.fold_rest, plain.fold_rest)
+    assert (plate.fold_stiffness < plain.fold_stiffness).all()
+
+
+def test_case_files_and_results_keep_it(tmp_path):
+    text = """
+[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+calibration = "plate"
+mass = "bubble"
+bend_law = "linear"
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+count = 2
+"""
+    (tmp_path / "case.toml").write_text(text, "utf-8")
+    found = fd.read_case(tmp_path / "case.toml").run()
+    fd.save(found, tmp_path / "modes.nc")
+    structure = fd.case_of(fd.load(tmp_path / "modes.nc")).structure
+    assert (structure.options.calibration, structure.options.mass) == ("plate", "bubble")
+    direct = fd.discretize(
+        fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01, 1.0), calibration="plate", bend_law="linear"
+    )
+    np.testing.assert_array_equal(structure.fold_stiffness, direct.fold_stiffness)
+    np.testing.assert_array_equal(structure.bend_stiffness, direct.bend_stiffness)
+    with pytest.raises(InputError, match=r"calibration.*standard, merlin2, plate"):
+        fd.discretize(fd.patterns.miura(), SHEET, calibration="shell")
