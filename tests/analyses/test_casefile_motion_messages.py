@@ -64,7 +64,7 @@ BAD = {
     ),
     "empty support": (
         [('nodes = [0, 1, 2]\naxes = "xyz"', "")],
-        "supports[0]: give nodes and axes (held), nodes, axis and displacement (moved), or base",
+        "supports[0]: give nodes and axes or direction (held), nodes, axis and displacement (moved)",
     ),
     "base axis": (
         [("[[loads]]", '[[supports]]\nbase = "xy"\nhistory = { kind = "step" }\n[[loads]]')],

@@ -56,11 +56,12 @@ def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
     listed = value if isinstance(value, list | tuple | np.ndarray) else ()
     several = len(listed) > 0 and all(isinstance(one, list | tuple | np.ndarray) for one in listed)
     pairs = []
-    for pair in listed if several else [value]:
-        numbers = () if isinstance(pair, str) else indices(name, pair, "node", "as in [0, 5]")
+    for k, pair in enumerate(listed if several else [value]):
+        place = f"{name}[{k}]" if several else name
+        numbers = () if isinstance(pair, str) else indices(place, pair, "node", "as in [0, 5]")
         if len(numbers) != 2 or min(numbers) < 0:
             raise InputError(
-                f" = {show(value)}: must be two nodes, as in [0, 5], or pairs of them", name
+                f" = {show(pair)}: must be two nodes, as in [0, 5], or pairs of them", place
             )
         pairs.append((numbers[0], numbers[1]))
     return tuple(pairs)
