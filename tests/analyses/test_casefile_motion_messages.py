@@ -64,7 +64,7 @@ BAD = {
     ),
     "empty support": (
         [('nodes = [0, 1, 2]\naxes = "xyz"', "")],
-        "supports[0]: give nodes and axes or direction (held), nodes, axis and displacement (moved)",
+        "supports[0]: give nodes and axes or direction (held), nodes, axis and displacement",
     ),
     "base axis": (
         [("[[loads]]", '[[supports]]\nbase = "xy"\nhistory = { kind = "step" }\n[[loads]]')],
