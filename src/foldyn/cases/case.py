@@ -173,7 +173,7 @@ class Case(Supported, Loaded, Damped):
 
     @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
-        """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
+        """Mass (n,) that moves with each node, kg: the sums of the rows of the mass matrix."""
         return self.structure.nodal_mass if not self.masses else read_only(row_sums(self.mass))
 
     @property

@@ -26,7 +26,7 @@ def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float
         Modes from `foldyn.modes`, or shapes of any other origin, also complex ones (measured, or of
         a damped structure). Arrays (k, n) are shapes with one component per node.
     mass : array_like or sparse matrix, optional
-        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `structure.mass`, of the
+        Weights: nodal masses (n,) or the nodal mass matrix (n, n), as `Case.mass`, of the
         nodes that are compared. With it the modes of one structure are orthogonal:
         the matrix of a set with itself is the identity. Without it all nodes count alike.
     nodes : array_like of int, or a pair of them, optional

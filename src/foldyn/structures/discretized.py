@@ -130,7 +130,7 @@ class Discretized:
 
     @cached_property
     def nodal_mass(self) -> NDArray:
-        """Mass (n,) that moves with each node: the sums of the rows of `mass`, kg."""
+        """Mass (n,) that moves with each node, kg: the sums of the rows of the mass matrix."""
         return read_only(row_sums(self.mass))
 
     @cached_property
