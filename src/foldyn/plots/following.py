@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn import mechanics
-from foldyn.cases import Case, CreaseMoment, Pressure
+from foldyn.cases import Case, CreaseMoment, Pressure, Temperature
 from foldyn.cases.regions import resolve_panels
 from foldyn.plots.scene import Points
 
@@ -17,7 +17,7 @@ NEAR, FAR = 0.15, 1.0  # rad, from a panel to the ends of an arc, at most
 
 
 class Share(NamedTuple):
-    """What acts on some panels (Pa) or creases (N m), with its history."""
+    """What acts on some panels (Pa, K) or creases (N m), with its history."""
 
     numbers: NDArray[np.int64]
     value: NDArray[np.float64]
@@ -41,6 +41,22 @@ def moments(case: Case) -> list[Share]:
         creases, moment = load.of_creases(case.structure, place)
         found.append(Share(creases, moment, load.history))
     return found
+
+
+def temperatures(case: Case) -> list[Share]:
+    """Changes of temperature (K) of panels, one for each load."""
+    structure, found = case.structure, []
+    for place, load in case.placed(Temperature):
+        triangles = resolve_panels(structure, load.panels, f"{place}.panels")
+        panels = np.unique(structure.triangle_panel[triangles])
+        found.append(Share(panels, np.full(len(panels), load.change), load.history))
+    return found
+
+
+def panel_middles(structure: Any, points: Points, share: Share) -> Points:
+    """Middles (k, 3) of panels, by their corners."""
+    faces = structure.pattern.faces
+    return np.array([points[list(faces[panel])].mean(axis=0) for panel in share.numbers])
 
 
 def panel_arrows(case: Case, points: Points, share: Share) -> tuple[Points, Points]:

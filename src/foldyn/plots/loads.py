@@ -13,7 +13,7 @@ from foldyn.cases import Actuate, Case, Impose, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases
 from foldyn.plots import style
-from foldyn.plots.following import Share, moments, pressures
+from foldyn.plots.following import Share, moments, pressures, temperatures
 from foldyn.plots.ties import base_vectors
 from foldyn.values import number
 
@@ -39,8 +39,8 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
 
     - one curve per history of forces: the force at the most heavily loaded of its nodes, that is
       the largest magnitude among the nodes times the factor of the history;
-    - pressure and moments of creases: one curve per load, the largest in magnitude of its panels
-      or creases times the factor;
+    - pressure, changes of temperature and moments of creases: one curve per load, the largest in
+      magnitude of its panels or creases times the factor;
     - gravity: the magnitude of its acceleration times the factor;
     - imposed displacements and displacements of the base, one curve per value and axis;
     - rest angles of actuated creases, one curve per pair of first and last angle.
@@ -73,10 +73,14 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     gravity = [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
     pressure = [_Curve(_most(s.value), describe_pressure(s), s.history) for s in pressures(case)]
     moment = [_Curve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
+    warmth = [
+        _Curve(_most(s.value), describe_temperature(s), s.history) for s in temperatures(case)
+    ]
     panels = [
         ("force at a node (N)", forces),
         ("pressure (Pa)", pressure),
         ("moment of a crease (N m)", moment),
+        ("temperature (K)", warmth),
         ("gravity (m/s2)", gravity),
         ("imposed displacement (m)", _imposed_curves(case)),
         ("base displacement (m)", _base_curves(case)),
@@ -195,6 +199,13 @@ def describe_load(vectors: np.ndarray) -> str:
 def describe_pressure(share: Share) -> str:
     """Say in words how large a pressure is, and on which panels it acts."""
     return f"pressure {_most(share.value):.4g} Pa on {_listed('panel', share.numbers.tolist())}"
+
+
+def describe_temperature(share: Share) -> str:
+    """Say in words how much warmer panels are, and which."""
+    value = _most(share.value)
+    way = "colder" if value < 0.0 else "warmer"
+    return f"{abs(value):.4g} K {way} on {_listed('panel', share.numbers.tolist())}"
 
 
 def describe_moment(share: Share) -> str:

@@ -56,7 +56,7 @@ def draw_structure(
         Draw an arrow from each loaded node along its force, at the largest load's full length,
         one from each panel under pressure, two about each crease with a moment, towards the panels
         where it opens them, and one from the center of mass along gravity. Actuated creases are
-        highlighted, and point masses are dots.
+        highlighted, point masses are dots, and panels that are warmed have stars.
     elements : bool
         Draw the bars inside the panels too, or the sides of a shell's triangles.
     scale : float
@@ -111,6 +111,10 @@ def draw_structure(
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += attached.keys
     keys += [key for group in arrows for key in group.keys]
+    warm = following.temperatures(sheet.case) if loads and sheet.case else []
+    for share in warm:
+        look = {"color": style.WARM, "marker": "*", "linestyle": "none", "markersize": 8.0}
+        keys.append(style.key(histories.describe_temperature(share), **look))
     linked = ties.links(sheet.case, points) if supports and sheet.case else None
     if linked is not None and len(linked.nodes):
         keys.append(linked.key)
@@ -122,6 +126,10 @@ def draw_structure(
         add_undeformed(axes, sheet)
     DrawnSheet(axes, sheet, points, sight, elements, loads)
     attached.draw(axes)
+    for share in warm:
+        middles = following.panel_middles(sheet.structure, points, share)
+        look = {"color": style.WARM, "markersize": 9.0, "markeredgecolor": "white", "zorder": 6.4}
+        axes.plot(*middles.T, "*", **look)
     for group in groups:
         marks.add_triangles(axes, group.triangles, group.color, 6.0)
     for group in arrows:
