@@ -45,7 +45,7 @@ def scalars(case: fd.Case, q: np.ndarray) -> np.ndarray:
     hinges = case.body.fold_hinges()
     angles = work.fold_angle
     if len(angles) != len(hinges.fold):  # bars and hinges: all hinges stand there
-        angles = case.body.angles(q)[case.structure.hinge_of_fold]
+        angles = case.structure.dihedrals(q[: case.structure.nodes.size])[0]
     return np.concatenate([lengths, angles])
 
 

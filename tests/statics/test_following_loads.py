@@ -102,7 +102,7 @@ def test_newtons_method_converges_quadratically(make) -> None:
         path = fd.trace(case, load_factors=[0, 0.5, 1])
     assert path.iterations.values.max() <= 8
     problem = OrigamiProblem(case)
-    u = problem.dofs(path.displacement.values[-1], 1.0)
+    u = problem.state(path.displacement.values[-1], 1.0)
     free, norms = problem.free, []
     u[free] += 1e-4 * np.random.default_rng(2).standard_normal(free.size)
     for _ in range(4):

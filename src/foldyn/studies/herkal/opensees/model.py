@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case, Fix, Force
+from foldyn.cases import Case, Fix, Force, Rayleigh
 from foldyn.errors import ComputationError, InputError
 from foldyn.patterns import Pattern
 
@@ -189,8 +189,10 @@ class PanelShells:
             raise InputError("loads: this model takes `Force` alone")
         if case.masses or options.clamped or options.rigid is not None:
             raise InputError("masses, clamped, rigid: this model takes none of them")
-        if case.rayleigh.beta or len(case.dampings) > 1:
-            raise InputError("damping: this model takes alpha of Rayleigh alone")
+        if case.rayleigh.beta:
+            raise InputError(f"damping: beta = {case.rayleigh.beta}: this model takes alpha alone")
+        if not all(isinstance(part, Rayleigh) for part in case.dampings):
+            raise InputError("damping: this model takes Rayleigh's alone")
         if options.crease_stiffness is not None or options.crease_rest is not None:
             raise InputError("crease_stiffness, crease_rest: this model has those of the sheet")
         if case.structure.sheet.panels or case.structure.pattern.boards is not None:
