@@ -100,7 +100,9 @@ def _brief(value: Any) -> str:
         items = [_brief(item) for item in value[:SOME]]
         more = [f"... {len(value)} in all"] if len(value) > SOME else []
         inside = ", ".join([*items, *more])
-        return f"({inside})" if isinstance(value, tuple) else f"[{inside}]"
+        if isinstance(value, list):
+            return f"[{inside}]"
+        return f"({inside},)" if len(value) == 1 else f"({inside})"
     return " ".join(repr(plain(value)).split())
 
 

@@ -83,7 +83,7 @@ class TotalForce(Spread):
     --------
     >>> import foldyn as fd
     >>> fd.TotalForce((0, 0, -2.0), edges="xmax")
-    TotalForce(total=(0.0, 0.0, -2.0), edges='xmax')
+    TotalForce(total=(0.0, 0.0, -2.0), edges='xmax', history=Constant())
     """
 
     total: Sequence[float]
@@ -161,7 +161,7 @@ class LineLoad(Spread):
     --------
     >>> import foldyn as fd
     >>> fd.LineLoad([[0, 1]], (0, 0, -5.0))
-    LineLoad(edges=((0, 1),), force_per_length=(0.0, 0.0, -5.0))
+    LineLoad(edges=((0, 1),), force_per_length=(0.0, 0.0, -5.0), history=Constant())
     """
 
     edges: str | Sequence[Sequence[int]]

@@ -74,7 +74,7 @@ def thicken(
     >>> import foldyn as fd
     >>> strip = fd.Pattern([(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)],
     ...                    [(0, 1, 4, 3), (1, 2, 5, 4)], {(1, 4): "V"})
-    >>> fd.thicken(strip, 0.1).vertices[[1, 2], 2].tolist()
+    >>> fd.thicken(strip, 0.1).vertices[[1, 2], 2].round(12).tolist()
     [0.05, -0.05]
     """
     if pattern.boards is not None:
