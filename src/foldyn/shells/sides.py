@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.mechanics.triangle import triangle_stiffness
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.shells.mesh import ShellMesh
@@ -144,36 +145,11 @@ def stiffness(corners: NDArray, panel: NDArray, sheet: Sheet) -> tuple[NDArray, 
     kinds, kind = sheet.kinds(int(panel.max()) + 1)
     membrane, bending = np.empty((2, len(corners), 3, 3))
     for number, own in enumerate(kinds):
-        rows = kind[panel] == number
-        membrane[rows], bending[rows] = _of_one_kind(corners[rows], own)
-    return membrane, bending
-
-
-def _of_one_kind(corners: NDArray, sheet: Sheet) -> tuple[NDArray, NDArray]:
-    """Membrane and bending stiffness (nt, 3, 3) of triangles with corners (nt, 3, 3).
-
-    Side k runs from corner k to corner k + 1. Units: J (per strain squared), N m (per rad squared).
-    """
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(first, second)
-    twice = np.linalg.norm(normal, axis=1)
-    area = 0.5 * twice
-    e1 = first / np.linalg.norm(first, axis=1)[:, None]
-    e2 = np.cross(normal / twice[:, None], e1)
-    side = np.roll(corners, -1, axis=1) - corners
-    length = np.linalg.norm(side, axis=2)
-    tx = np.einsum("tki,ti->tk", side, e1) / length
-    ty = np.einsum("tki,ti->tk", side, e2) / length
-    along = np.stack([tx * tx, ty * ty, tx * ty], axis=2)  # e = along eps
-    across = np.stack([ty * ty, tx * tx, -2.0 * tx * ty], axis=1)  # kappa = across beta
-    across = across * (length / area[:, None])[:, None, :]
-    nu = sheet.poissons_ratio
-    # plane stress on (xx, yy, gamma xy), without E t / (1 - nu^2)
-    elastic = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - nu)]])
-    stretch = sheet.youngs_modulus * sheet.thickness / (1.0 - nu**2)
-    strain = np.linalg.inv(along)
-    membrane = np.einsum("tak,ab,tbl,t->tkl", strain, elastic, strain, area * stretch)
-    bending = np.einsum("tak,ab,tbl,t->tkl", across, elastic, across, area * sheet.bending_modulus)
+        rows, nu = kind[panel] == number, own.poissons_ratio
+        stretching = own.youngs_modulus * own.thickness / (1.0 - nu**2)
+        membrane[rows], bending[rows] = triangle_stiffness(
+            corners[rows], nu, stretching, own.bending_modulus
+        )
     return membrane, bending
 
 

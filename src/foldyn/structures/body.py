@@ -214,17 +214,21 @@ class BarsHingesBody(Body):
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Body`."""
+        body = self._with(self.unstrained_model(q))
+        rest = np.zeros(self.size)
+        return Unstrained(
+            body.tangent(rest), body._hinges_alone().tangent(rest), partial(stretch, body.model)
+        )
+
+    def unstrained_model(self, q: NDArray) -> BarsHinges:
+        """Arrays of the same with linear laws and its rest state at q."""
         linear = self.nominal(q).model
         x, runs = linear.rest + self._nodal(q), linear.bar_runs.copy()
         vector = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
         per_length2 = 1.0 / np.einsum("ij,ij->i", vector, vector)
         runs[:, 2] = 0
-        body = self._with(
-            linear._replace(rest=x, bar_vector=vector, bar_per_length2=per_length2, bar_runs=runs)
-        )
-        rest = np.zeros(self.size)
-        return Unstrained(
-            body.tangent(rest), body._hinges_alone().tangent(rest), partial(stretch, body.model)
+        return linear._replace(
+            rest=x, bar_vector=vector, bar_per_length2=per_length2, bar_runs=runs
         )
 
 

@@ -18,13 +18,14 @@ from foldyn.structures import calibration as calibrate
 from foldyn.structures import plate
 from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
+from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure
 from foldyn.structures.swelling import panel_of_triangle
-from foldyn.values import choice, vector
+from foldyn.values import choice, show, vector
 
 PER_NODE = 5000.0
 """Bytes a node with its tangent: 5200 and 4900 measured with 20,000 and 80,000 nodes."""
@@ -33,7 +34,7 @@ PER_NODE = 5000.0
 def discretize(
     pattern: Pattern,
     sheet: Sheet,
-    scheme: Literal["n5b8", "n4b5"] = "n5b8",
+    scheme: Literal["n5b8", "n4b5", "n5b8e"] = "n5b8",
     mass: str = "mixed_voronoi",
     bar_law: str | BarLaw = "ogden",
     fold_law: str | HingeLaw = EnhancedLinear(),
@@ -51,9 +52,11 @@ def discretize(
     ----------
     pattern : Pattern
     sheet : Sheet
-    scheme : {"n5b8", "n4b5"}
+    scheme : {"n5b8", "n4b5", "n5b8e"}
         A center node and spokes in each panel of more than three corners, or cuts along the
-        shortest diagonals.
+        shortest diagonals. "n5b8e" is "n5b8" whose panels bend as condensed plates that also give
+        way at their edges (see `foldyn.structures.edge_angles`); it takes calibration = "plate",
+        linear bends and implicit methods of motion.
     mass : str
         Mass rule, one of `foldyn.structures.MASS_RULES`.
     bar_law : {"ogden", "linear"} or BarLaw
@@ -101,6 +104,8 @@ def discretize(
         scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest,
         edges, checked_panels(rigid, len(pattern.faces)),
     )  # fmt: skip
+    if scheme == "n5b8e":
+        _check_edge_angles(options)
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
     bending = materials.hinge_law(bend_law, "bend_law")
@@ -115,7 +120,7 @@ def discretize(
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     calibrate.check_sheet(sheet, pattern)
     points = _given_centers(centers or {}, pattern, scheme)
-    mesh = n5b8(pattern, points) if scheme == "n5b8" else n4b5(pattern)
+    mesh = n4b5(pattern) if scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
     outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
@@ -123,7 +128,12 @@ def discretize(
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
-    if calibration == "plate":
+    if scheme == "n5b8e":
+        bends = spoke_stiffness(
+            edge_plates(mesh.nodes, mesh.centers, mesh.folds, pattern, sheet),
+            len(mesh.folds), len(mesh.bends),
+        )  # fmt: skip
+    elif calibration == "plate":
         folds = plate.fold_stiffness(folds, pattern, sheet)
         bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
         onset = plate_onset(bends, large)
@@ -156,6 +166,23 @@ def discretize(
     return structure.marked()
 
 
+def _check_edge_angles(options: ModelOptions) -> None:
+    """Refuse what the scheme n5b8e does not go with."""
+    remedy = 'scheme = "n5b8e" needs'
+    if options.calibration != "plate":
+        raise InputError(
+            f' = "{options.calibration}": {remedy} "plate", whose panels are plates', "calibration"
+        )
+    if materials.hinge_law(options.bend_law, "bend_law") != materials.hinge_law("linear"):
+        raise InputError(
+            f" = {show(options.bend_law)}: {remedy} \"linear\", as its panels bend", "bend_law"
+        )
+    if options.clamped:
+        raise InputError(
+            f": {remedy} edges without clamps; take scheme = \"n5b8\", or a shell", "clamped"
+        )
+
+
 def check_kinds(pattern: Any, sheet: Any) -> None:
     """Refuse what is not a pattern and a sheet."""
     for name, value, kind in (("pattern", pattern, Pattern), ("sheet", sheet, Sheet)):
@@ -170,7 +197,7 @@ def _given_centers(
     points = {}
     for panel, point in centers.items():
         known = isinstance(panel, int | np.integer) and 0 <= panel < len(pattern.faces)
-        if not known or len(pattern.faces[panel]) < 4 or scheme != "n5b8":
+        if not known or len(pattern.faces[panel]) < 4 or scheme == "n4b5":
             raise InputError(
                 f"centers: panel {panel!r} has no center node; only N5B8 panels of more than "
                 f"three corners have one ({len(pattern.faces)} panels, scheme {scheme})"

@@ -10,9 +10,11 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
+from foldyn.errors import InputError
 from foldyn.materials import (
     BarLaw,
     EnhancedLinear,
@@ -31,8 +33,10 @@ from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.clamps import clamps
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.edge_angles import edge_plates, plates_model
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.plates_body import BarsPlatesBody
 from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
@@ -41,7 +45,7 @@ from foldyn.values import choice
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
 """Measured with SuperLU as the largest memory of `modes` and `trace` on flat lattices: 13, 20 and
 26 kB a dof with 9,843, 60,603 and 241,203 dofs."""
-SCHEMES = ("n5b8", "n4b5")
+SCHEMES = ("n5b8", "n4b5", "n5b8e")
 CALIBRATIONS = ("standard", "merlin2", "plate")
 
 
@@ -49,7 +53,7 @@ CALIBRATIONS = ("standard", "merlin2", "plate")
 class ModelOptions:
     """Arguments of `discretize` besides pattern and sheet; see there."""
 
-    scheme: Literal["n5b8", "n4b5"] = "n5b8"
+    scheme: Literal["n5b8", "n4b5", "n5b8e"] = "n5b8"
     mass: str = "mixed_voronoi"
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
@@ -163,6 +167,8 @@ class Structure(Discretized):
     @cached_property
     def body(self) -> Body:
         """What solvers take."""
+        if self.has_edge_angles:
+            return self._plates_body()
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
         laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
         body = BarsHingesBody(self.model, np.concatenate(rows), laws)
@@ -170,6 +176,30 @@ class Structure(Discretized):
             return body
         bends = tuple(GROUPS).index("strain_bends")
         return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
+
+    @property
+    def has_edge_angles(self) -> bool:
+        """Whether the edges of its panels turn against the facets: scheme n5b8e."""
+        return self.options.scheme == "n5b8e"
+
+    @property
+    def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Its dofs without mass, in words."""
+        return "the edge angles of the scheme n5b8e" if self.has_edge_angles else ""
+
+    def _plates_body(self) -> BarsPlatesBody:
+        assert self.pattern is not None
+        rigid = self.options.rigid or ()
+        plates = edge_plates(
+            self.nodes, self.centers, self.folds, self.pattern, self.sheet,
+            range(len(self.pattern.faces)) if isinstance(rigid, str) else rigid,
+        )  # fmt: skip
+        model = plates_model(
+            self.nodes, self.bars, self.sheet.youngs_modulus * self.bar_area / self.bar_length,
+            self.bar_law, self.folds, self.fold_stiffness, self.fold_rest, self.fold_law, self.bends,
+            self.bend_rest, plates,
+        )  # fmt: skip
+        return BarsPlatesBody(model, (self.fold_law, self.bend_law))
 
     @cached_property
     def plates(self) -> tuple[Plate, ...]:
@@ -219,6 +249,12 @@ class Structure(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
+        if self.has_edge_angles and np.any(curvature):
+            raise InputError(
+                ' = "n5b8e": panels that curl need edge angles at rest, which it does not have; '
+                'take "n5b8"',
+                "scheme",
+            )
         turns = np.zeros(0)
         for kind in self.hinge_kinds:
             change = np.zeros(len(kind.nodes))
@@ -241,7 +277,7 @@ class Structure(Discretized):
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
-        energies = self.body.energies(self._displacement(u))
+        energies = self.body.energies(self.body.dofs(self._displacement(u)))
         return dict(zip(GROUPS, energies.tolist(), strict=True))
 
     def energy(self, u: ArrayLike) -> float:
@@ -250,10 +286,13 @@ class Structure(Discretized):
 
     def internal_force(self, u: ArrayLike) -> NDArray:
         """Internal force (n, 3), N, at displacement u (n, 3), m: the gradient of the energy."""
-        return self.body.internal(self._displacement(u)).reshape(-1, 3)
+        nodal = self.body.internal(self.body.dofs(self._displacement(u)))[: self.nodes.size]
+        return nodal.reshape(-1, 3)
 
     def tangent(self, u: ArrayLike, floor: float = -np.inf) -> sparse.csr_array:
         """Tangent stiffness (3n, 3n), N/m, at displacement u (n, 3), m; dof = 3 node + axis.
+
+        Edge angles of the scheme n5b8e stay in balance.
 
         Parameters
         ----------
@@ -264,12 +303,22 @@ class Structure(Discretized):
             the tangent is the exact second derivative of the energy: singular at rest where
             superlinear bends have no slope.
         """
-        return self.body.tangent(self._displacement(u), floor)
+        return condensed(self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden)
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
+
+
+def condensed(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
+    """The tangent (3n, 3n) of displacements where the `hidden` last dofs give way."""
+    if not len(hidden):
+        return matrix
+    first = hidden[0]
+    across = sparse.csc_array(matrix[first:, :first])
+    given = sparse.csc_array(splu(sparse.csc_array(matrix[first:, first:])).solve(across.toarray()))
+    return sparse.csr_array(matrix[:first, :first] - across.T @ given)
 
 
 def _mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:

@@ -1,0 +1,211 @@
+"""Bars, folds and plates: panels whose bends resist together, and give way at their edges.
+
+A plate has angles phi: the turns of its hinges from rest, and rotations beta of its edges against
+the facets there. Its energy is 1/2 phi^T K phi. A fold is a hinge between two plates whose angle is
+the dihedral of the facets less the two rotations beside it.
+
+Rotations are dofs without mass, beside the displacements u (n, 3). Their dofs x (r,) are lengths as
+well, m, so that norms over all dofs do not depend on the unit of length: beta is x times
+`per_reach`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import flat
+from foldyn.materials.switch import hinge_energy, hinge_moment
+from foldyn.mechanics.dihedral import dihedral_gradient
+from foldyn.mechanics.energy import strain_energies
+from foldyn.mechanics.force import Workspace, internal_force, workspace
+from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
+from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.threads import Team, team
+
+
+class BarsPlates(NamedTuple):
+    """Arrays of n nodes with bars, nf folds, nb bends and p plates of nq angles in all."""
+
+    bars: BarsHinges  # without hinges
+    rotations: int  # r
+    per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
+    hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
+    fold_rotations: NDArray  # (nf, 2) -1 where there is none
+    fold_stiffness: NDArray  # (nf,) N m/rad
+    fold_rest: NDArray  # (nf,) rad
+    fold_parameters: NDArray  # (nf, 4)
+    code: int  # of the folds' law
+    addresses: NDArray  # (3,) of a user's law
+    bend_rest: NDArray  # (nb,) rad
+    start: NDArray  # (p + 1,) first angle of each plate
+    angle: NDArray  # (nq,) row in `hinges`, or -1 - number of a rotation
+    entry: NDArray  # (p + 1,) first entry of each plate's matrix
+    stiffness: NDArray  # entries of the matrices, N m/rad
+
+    @property
+    def nodes(self) -> int:
+        """Number of the nodes."""
+        return len(self.bars.rest)
+
+    @property
+    def rows(self) -> int:
+        """Rows of three that hold displacements and then rotations, the last one filled up."""
+        return self.nodes + -(-self.rotations // 3)
+
+
+class PlatesWork(NamedTuple):
+    """Memory of one evaluation; nh = nf + nb."""
+
+    bars: Workspace
+    angle: NDArray  # (nh,) dihedrals, rad
+    gradient: NDArray  # (nh, 12)
+    moment: NDArray  # (nh,) N m
+    fold_angle: NDArray  # (nf,) rad
+    turn: NDArray  # (the most angles of a plate,) rad
+    strips: Whole
+    team: Team
+
+
+def plates_work(model: BarsPlates) -> PlatesWork:
+    """Memory for `model`."""
+    nh, most = len(model.hinges), int(np.diff(model.start).max(initial=0))
+    return PlatesWork(
+        workspace(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
+        np.zeros(len(model.fold_rest)), np.zeros(most), Whole(np.array([0, model.rows])),
+        team(1)[0],
+    )  # fmt: skip
+
+
+@kernel
+def turn_hinges(model, u, x, work):
+    """Dihedrals and their gradients at a state, and the angles of the folds."""
+    rest, p = model.bars.rest, np.empty(12)
+    for e in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[e, v]
+            for c in range(3):
+                p[3 * v + c] = rest[node, c] + u[node, c]
+        found = dihedral_gradient(
+            p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+        )
+        work.angle[e] = found[0]
+        for c in range(12):
+            work.gradient[e, c] = found[1 + c]
+    for f in range(model.fold_rest.size):
+        one, other = model.fold_rotations[f]
+        both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
+        work.fold_angle[f] = work.angle[f] - model.per_reach * both
+
+
+@kernel
+def turn_plate(model, x, work, p):
+    """Angles phi of plate p, to work.turn."""
+    folds = model.fold_rest.size
+    for k in range(model.start[p + 1] - model.start[p]):
+        h = model.angle[model.start[p] + k]
+        if h >= 0:
+            work.turn[k] = work.angle[h] - model.bend_rest[h - folds]
+        else:
+            work.turn[k] = model.per_reach * x[-1 - h]
+
+
+@kernel
+def fold_moment(model, work, f):
+    """Moment (N m) of a fold."""
+    p = model.fold_parameters
+    return model.fold_stiffness[f] * hinge_moment(
+        model.code, work.fold_angle[f], model.fold_rest[f],
+        p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
+    )  # fmt: skip
+
+
+@kernel
+def plates_energy(model, u, x, work, out):
+    """Energies (J) of bars, folds and bends, to out (3,)."""
+    strain_energies(model.bars, u, out)
+    turn_hinges(model, u, x, work)
+    p = model.fold_parameters
+    for f in range(model.fold_rest.size):
+        w = hinge_energy(
+            model.code, work.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[0],
+        )  # fmt: skip
+        out[1] += model.fold_stiffness[f] * w
+    for plate in range(model.start.size - 1):
+        turn_plate(model, x, work, plate)
+        count = model.start[plate + 1] - model.start[plate]
+        for k in range(count):
+            for m in range(count):
+                stiff = model.stiffness[model.entry[plate] + k * count + m]
+                out[2] += 0.5 * work.turn[k] * stiff * work.turn[m]
+
+
+@kernel
+def plates_force(model, u, x, force, couple, work):
+    """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
+    internal_force(model.bars, u, force, work.bars, False)
+    turn_hinges(model, u, x, work)
+    couple[:] = 0.0
+    for f in range(model.fold_rest.size):
+        moment = fold_moment(model, work, f)
+        work.moment[f] = moment
+        for side in range(2):
+            rotation = model.fold_rotations[f, side]
+            if rotation >= 0:
+                couple[rotation] -= model.per_reach * moment
+    for p in range(model.start.size - 1):
+        turn_plate(model, x, work, p)
+        count = model.start[p + 1] - model.start[p]
+        for k in range(count):
+            moment = 0.0
+            for m in range(count):
+                moment += model.stiffness[model.entry[p] + k * count + m] * work.turn[m]
+            h = model.angle[model.start[p] + k]
+            if h >= 0:
+                work.moment[h] = moment
+            else:
+                couple[-1 - h] += model.per_reach * moment
+    for h in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[h, v]
+            for c in range(3):
+                force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+
+
+@overload(force_of, inline="always")
+def _force(model, u, force, work):
+    if model.instance_class is not BarsPlates:
+        return None
+
+    def plates(model, u, force, work):
+        n, r = model.bars.rest.shape[0], model.rotations
+        moved, out = flat(u), flat(force)
+        out[3 * n + r :] = 0.0
+        x, couple = moved[3 * n : 3 * n + r], out[3 * n : 3 * n + r]
+        plates_force(model, u[:n], x, force[:n], couple, work)
+
+    return plates
+
+
+@overload(energies_of, inline="always")
+def _energies(model, u, work, out):
+    if model.instance_class is not BarsPlates:
+        return None
+
+    def plates(model, u, work, out):
+        n, r = model.bars.rest.shape[0], model.rotations
+        plates_energy(model, u[:n], flat(u)[3 * n : 3 * n + r], work, out)
+
+    return plates
+
+
+@overload(folds_of, inline="always")
+def _folds(model):
+    if model.instance_class is not BarsPlates:
+        return None
+    return lambda model: (model.fold_rest, model.fold_parameters, model.fold_stiffness)

@@ -1,0 +1,255 @@
+"""Bars, folds and plates as solvers see them: the scheme n5b8e."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn import mechanics
+from foldyn.errors import ComputationError, InputError
+from foldyn.materials import HingeLaw, LinearHinge, Superlinear
+from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Unstrained, largest_turn
+from foldyn.mechanics.plates import (
+    BarsPlates,
+    PlatesWork,
+    plates_energy,
+    plates_force,
+    plates_work,
+    turn_hinges,
+)
+from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
+from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
+from foldyn.mechanics.step_tangent import SparseBlocks
+from foldyn.structures.body import GROUPS, BarsHingesBody, stretch
+
+ITERATIONS = 50
+BALANCED = 1e-13  # rad, of the last step of Newton's method
+FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
+
+
+class BarsPlatesBody(Body):
+    """A model of bars, folds and plates; see `mechanics.body.Body`.
+
+    Parameters
+    ----------
+    model : BarsPlates
+    laws : tuple of HingeLaw
+        Laws of the folds and of the bends.
+    like : BarsPlatesBody, optional
+        One whose elements have the same dofs.
+    """
+
+    energy_groups = tuple(GROUPS)
+
+    def __init__(
+        self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesBody | None = None
+    ) -> None:
+        self.model, self._laws, self._like = model, laws, like
+        self._nodal = 3 * model.nodes
+        self.size, self.rows = self._nodal + model.rotations, model.rows
+        self.hidden = np.arange(self._nodal, self.size)
+        self._bars = BarsHingesBody(
+            model.bars, np.zeros(0, np.int64), (), like._bars if like else None
+        )
+
+    def _with(self, model: BarsPlates) -> BarsPlatesBody:
+        """Another body whose elements have the same dofs."""
+        return BarsPlatesBody(model, self._laws, self)
+
+    def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
+        """Displacements (n, 3) and rotations (r,)."""
+        flat = np.ascontiguousarray(q, float).reshape(-1)
+        return flat[: self._nodal].reshape(-1, 3), flat[self._nodal : self.size]
+
+    @cached_property
+    def sparsity(self) -> PlatesPattern:
+        """Pattern of the tangent."""
+        if self._like:
+            return self._like.sparsity
+        bars = self._bars.tangent(np.zeros(self._nodal))
+        return plates_pattern(self.model, bars.indptr, bars.indices)
+
+    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
+        """See `Body`: rotations by Newton's method.
+
+        Raises
+        ------
+        ComputationError
+            There are none near zero.
+        """
+        q = np.append(np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden)))
+        if not len(self.hidden):
+            return q
+        work, push = plates_work(self.model), np.zeros(self.size) if push is None else push
+        for _ in range(ITERATIONS):
+            couple = (self.internal(q, work) - push)[self.hidden]
+            if not couple.any():
+                return q
+            stiffness = self.tangent(q, FLOOR)[self._nodal :][:, self._nodal :]
+            step = splu(sparse.csc_array(stiffness)).solve(-couple)
+            q[self.hidden] += step
+            if self.model.per_reach * np.abs(step).max() <= BALANCED:
+                return q
+        raise ComputationError("the edges of the panels do not balance at this displacement")
+
+    def energies(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        out = np.empty(len(GROUPS))
+        plates_energy(self.model, *self._split(q), plates_work(self.model), out)
+        return out
+
+    def internal(self, q: NDArray, work: PlatesWork | None = None) -> NDArray:
+        """See `Body`."""
+        out = np.empty(self.size)
+        work = plates_work(self.model) if work is None else work
+        plates_force(self.model, *self._split(q), *self._split(out), work)
+        return out
+
+    def hinge_forces(self, q: NDArray, work: PlatesWork | None = None) -> NDArray:
+        """See `Body`."""
+        return self._hinges_alone().internal(q, work)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Body`."""
+        return self._assembled(q, self._bars.tangent(q[: self._nodal]), floor)
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `Body`."""
+        q = np.ascontiguousarray(q, float).reshape(-1)
+        old = None if before is None else np.reshape(before, -1)[: self._nodal]
+        bars = self._bars.step_tangent(q[: self._nodal], old)
+        own = self.model.code < 0  # slopes of a user's law may fall on purpose
+        return self._assembled(q, bars, -np.inf if own else STEP_FLOOR)
+
+    def _assembled(self, q: NDArray, bars: sparse.csr_array, floor: float) -> sparse.csr_array:
+        pattern = self.sparsity
+        data = np.zeros(len(pattern.indices))
+        data[pattern.bars] = bars.data
+        work = plates_work(self.model)
+        add_plates_tangent(self.model, pattern, *self._split(q), work, floor, data)
+        entries = (data, pattern.indices, pattern.indptr)
+        return sparse.csr_array(entries, (self.size, self.size))
+
+    def blocks(self) -> SparseBlocks:
+        """See `Body`."""
+        pattern = self.sparsity
+        entries = (np.zeros(len(pattern.indices)), pattern.indices, pattern.indptr)
+        matrix = sparse.csr_array(entries, (self.size, self.size))
+        return SparseBlocks(matrix, self.rows, positions(self.model))
+
+    def workspaces(self, threads: int) -> list[PlatesWork]:
+        """See `Body`."""
+        return [plates_work(self.model)]
+
+    # ------------------------------------------------------------------ measures
+    def angles(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        x = self.model.bars.rest + self._split(q)[0]
+        return mechanics.angles(x, self.model.hinges.astype(np.uint32))
+
+    def turn(self, q: NDArray, other: NDArray) -> float:
+        """Largest turn of a hinge, or of a bar with the rest of it; inf on penetration."""
+        bars = self._bars.turn(q[: self._nodal], other[: self._nodal])
+        return largest_turn(bars, self.angles(q), self.angles(other))
+
+    def scale(self) -> NDArray:
+        """EA of the bars, summed at the nodes; for rotations the largest stiffness of a plate."""
+        turning = self.model.per_reach * np.abs(self.model.stiffness).max(initial=0.0)
+        return np.concatenate([self._bars.scale(), np.full(len(self.hidden), turning)])
+
+    def turning_moments(self) -> float:
+        """See `Body`."""
+        return float(self.model.fold_stiffness.sum() + np.abs(self.model.stiffness).sum())
+
+    def longest(self) -> float:
+        """See `Body`."""
+        return self._bars.longest()
+
+    def soft_hinges(self, q: NDArray) -> SoftHinges:
+        """See `Body`: none."""
+        if self.model.code == Superlinear.code:
+            raise InputError(
+                ' = "superlinear": such folds have no slope at rest; with the scheme n5b8e modes '
+                'and frequency responses take "linear" or "enhanced"',
+                "fold_law",
+            )
+        return super().soft_hinges(q)
+
+    # ------------------------------------------------------------------ rest angles
+    @property
+    def rest_angles(self) -> NDArray:
+        """See `Body`: of the folds, then of the bends."""
+        return np.concatenate([self.model.fold_rest, self.model.bend_rest])
+
+    def rest_law(self, number: int) -> HingeLaw:
+        """See `Body`."""
+        return self._laws[number >= len(self.model.fold_rest)]
+
+    def fold_hinges(self) -> FoldHinges:
+        """See `Body`: one of each."""
+        nodes = self.model.hinges[: len(self.model.fold_rest)]
+        hidden = np.where(
+            self.model.fold_rotations >= 0, self._nodal + self.model.fold_rotations, -1
+        )
+        corners = self.model.bars.rest[nodes]
+        return FoldHinges(np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach)
+
+    def folded(self, rest: NDArray) -> BarsPlatesBody:
+        """See `Body`."""
+        folds = np.array(rest[: len(self.model.fold_rest)], float)
+        parameters, law = self.model.fold_parameters, self._laws[0]
+        if law.follows_rest:
+            parameters = law.parameters(folds).reshape(-1, 4)
+        bends = np.array(rest[len(folds) :], float)
+        model = self.model._replace(fold_rest=folds, fold_parameters=parameters, bend_rest=bends)
+        return self._with(model)
+
+    def actuated(self, numbers: NDArray) -> tuple[BarsPlatesBody, NDArray, NDArray]:
+        """See `Body`."""
+        model = self.model
+        own = model._replace(
+            fold_rest=model.fold_rest.copy(), fold_parameters=model.fold_parameters.copy()
+        )
+        return self._with(own), np.asarray(numbers), np.arange(len(numbers))
+
+    def turned(self) -> tuple[NDArray, NDArray]:
+        """See `Body`."""
+        return self.model.fold_rest, np.arange(len(self.model.fold_rest))
+
+    # ------------------------------------------------------------------ other bodies
+    def _hinges_alone(self) -> BarsPlatesBody:
+        """The body without its bars."""
+        bars = self.model.bars._replace(bar_runs=self.model.bars.bar_runs[:0])
+        return self._with(self.model._replace(bars=bars))
+
+    def unstrained(self, q: NDArray) -> Unstrained:
+        """See `Body`."""
+        model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
+        angle, folds = self.angles(q), len(model.fold_rest)
+        body = self._with(
+            model._replace(
+                bars=bars, fold_rest=angle[:folds], bend_rest=angle[folds:], code=LinearHinge.code
+            )
+        )
+        rest = np.zeros(self.size)
+        return Unstrained(
+            body.tangent(rest),
+            body._hinges_alone().tangent(rest),
+            lambda motion: stretch(bars, motion[: self._nodal]),
+        )
+
+
+def positions(model: BarsPlates) -> NDArray:
+    """Where the dofs are (3 rows, 3), m: rotations in the middle of their folds."""
+    points = np.zeros((3 * model.rows, 3))
+    n = model.nodes
+    points[: 3 * n] = np.repeat(model.bars.rest, 3, axis=0)
+    middle = model.bars.rest[model.hinges[: len(model.fold_rest), :2]].mean(axis=1)
+    for side in range(2):
+        has = model.fold_rotations[:, side] >= 0
+        points[3 * n + model.fold_rotations[has, side]] = middle[has]
+    return points
