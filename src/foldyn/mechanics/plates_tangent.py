@@ -54,7 +54,11 @@ def plates_pattern(model: BarsPlates, bars_indptr: NDArray, bars_indices: NDArra
     n = model.nodes
     size = 3 * n + model.rotations
     folds = _dofs(model.hinges[: len(model.fold_rest)], model.fold_rotations, n)
-    elements, corner, rotation = [], np.full((len(model.angle), 4), -1), np.full(len(model.angle), -1)
+    elements, corner, rotation = (
+        [],
+        np.full((len(model.angle), 4), -1),
+        np.full(len(model.angle), -1),
+    )
     for p in range(len(model.start) - 1):
         own = np.arange(model.start[p], model.start[p + 1])
         hinges, turned = own[model.angle[own] >= 0], own[model.angle[own] < 0]

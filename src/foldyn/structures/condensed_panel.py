@@ -11,6 +11,7 @@ other edges are free. The plate is made of triangles of constant curvature (Morl
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,9 @@ class Outline(NamedTuple):
     straight: tuple[bool, ...]
 
 
-def outline(x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool]) -> Outline:
+def outline(
+    x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool]
+) -> Outline:
     """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis."""
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
@@ -121,36 +124,71 @@ def _spoke_turns(points: NDArray, corners: int) -> NDArray:
 
 def _condensed(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
     """Stiffness of the heights of corners and center and the mean outward slopes of creases."""
-    x = np.array(panel.corners)
-    corners = len(x)
-    points, triangles, at, edges = _meshed(x, panel.center, n)
-    side, sign, ends = _sides(triangles)
-    stiffness = _plate(points, triangles, side, sign, poissons_ratio)
-    size, count = len(stiffness.indptr) - 1, len(points)
-    number = {pair: k for k, pair in enumerate(map(tuple, ends.tolist()))}
-    rows: list[dict[int, float]] = [{int(node): 1.0} for node in at]
-    lines: list[dict[int, float]] = []
-    for k in range(corners):
-        nodes = edges[k]
-        if panel.creased[k]:
-            mean = {}
-            for a, b in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True):
-                low, high = min(a, b), max(a, b)
-                mean[count + number[low, high]] = (1.0 if a < b else -1.0) / n
-            rows.append(mean)
-        if panel.straight[k]:
-            for step in range(1, n):
-                part = step / n
-                line = {int(nodes[step]): 1.0, int(nodes[0]): part - 1.0, int(nodes[-1]): -part}
-                lines.append(line)
-    held = sparse.lil_array((len(rows) + len(lines), size))
-    for row, entries in enumerate([*rows, *lines]):
-        for column, value in entries.items():
-            held[row, column] = value
-    whole = sparse.csc_array(sparse.block_array([[stiffness, held.T], [held, None]]))
-    wanted = np.zeros((whole.shape[0], len(rows)))
-    wanted[size + np.arange(len(rows)), np.arange(len(rows))] = 1.0
-    return -splu(whole).solve(wanted)[size : size + len(rows)]
+    plate = _Plate(panel, poissons_ratio, n)
+    return plate.solved([*plate.heights, *plate.slopes])[1]
+
+
+class _Plate:
+    """A panel as a plate of small triangles; n pieces of each edge, G = 1.
+
+    Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
+    center), `slopes` (mean, outward, of creased edges) and `lines` (of points on straight edges off
+    the line between its ends) are linear functions of them: coefficients by number.
+    """
+
+    def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
+        x = np.array(panel.corners)
+        self.points, self.triangles, at, edges = _meshed(x, panel.center, n)
+        side, sign, ends = _sides(self.triangles)
+        self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
+        number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
+        self.heights = [{node: 1.0} for node in at.tolist()]
+        self.slopes, self.lines = [], []
+        for k, nodes in enumerate(edge.tolist() for edge in edges):
+            if panel.creased[k]:
+                mean = {
+                    number[min(a, b), max(a, b)]: (1.0 if a < b else -1.0) / n
+                    for a, b in pairwise(nodes)
+                }
+                self.slopes.append(mean)
+            if panel.straight[k]:
+                for step in range(1, n):
+                    part = step / n
+                    self.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+
+    def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
+        """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k)."""
+        size, rows = len(self.stiffness.indptr) - 1, [*held, *self.lines]
+        row = np.repeat(np.arange(len(rows)), [len(entries) for entries in rows])
+        column = [place for entries in rows for place in entries]
+        value = [factor for entries in rows for factor in entries.values()]
+        fixed = sparse.csr_array((value, (row, column)), shape=(len(rows), size))
+        whole = sparse.csc_array(sparse.block_array([[self.stiffness, fixed.T], [fixed, None]]))
+        wanted = np.zeros((whole.shape[0], len(held)))
+        wanted[size + np.arange(len(held)), np.arange(len(held))] = 1.0
+        found = splu(whole).solve(wanted)
+        return found[:size], -found[size : size + len(held)]
+
+
+@lru_cache(maxsize=4096)
+def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
+    """Mass matrix (points, points) of a panel of mass 1 that follows its corners and center.
+
+    As a plate at rest does, without moments at its edges; exact for what is linear over the panel.
+    """
+    coarse, fine = (_followed(_Plate(panel, poissons_ratio, n)) for n in (COARSE, FINE))
+    ratio = (FINE / COARSE) ** 2
+    out = fine + (fine - coarse) / (ratio - 1.0)
+    out.setflags(write=False)
+    return out
+
+
+def _followed(plate: _Plate) -> NDArray:
+    shape = plate.solved(plate.heights)[0][plate.triangles]  # (nt, 3, k)
+    corners = plate.points[plate.triangles]
+    area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    element = (np.ones((3, 3)) + np.eye(3)) / 12.0
+    return np.einsum("tak,ab,tbl,t->kl", shape, element, shape, area / area.sum())
 
 
 def _meshed(
@@ -215,6 +253,4 @@ def _plate(
     dofs = np.concatenate([triangles, len(points) + side], axis=1)
     rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
     size = len(points) + int(side.max()) + 1
-    return sparse.csr_array(
-        sparse.coo_array((block.ravel(), (rows, columns)), shape=(size, size))
-    )
+    return sparse.csr_array(sparse.coo_array((block.ravel(), (rows, columns)), shape=(size, size)))

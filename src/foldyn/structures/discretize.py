@@ -175,11 +175,11 @@ def _check_edge_angles(options: ModelOptions) -> None:
         )
     if materials.hinge_law(options.bend_law, "bend_law") != materials.hinge_law("linear"):
         raise InputError(
-            f" = {show(options.bend_law)}: {remedy} \"linear\", as its panels bend", "bend_law"
+            f' = {show(options.bend_law)}: {remedy} "linear", as its panels bend', "bend_law"
         )
     if options.clamped:
         raise InputError(
-            f": {remedy} edges without clamps; take scheme = \"n5b8\", or a shell", "clamped"
+            f': {remedy} edges without clamps; take scheme = "n5b8", or a shell', "clamped"
         )
 
 

@@ -6,6 +6,7 @@ axes. `MASS_RULES` is the registry.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -14,6 +15,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
+from foldyn.patterns.topology import around, edge_of
+from foldyn.structures.condensed_panel import outline, panel_mass
 
 LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
 
@@ -187,12 +190,7 @@ def bubble(surface: Surface) -> sparse.csr_array:
         if center >= 0 and len(nodes) == 5 and _is_parallelogram(surface.nodes[nodes]):
             panels.append(nodes)
             triangle[p] = False
-    kept = triangle[surface.triangle_panel]
-    rest = surface._replace(
-        triangles=surface.triangles[kept],
-        triangle_panel=surface.triangle_panel[kept],
-        triangle_area=surface.triangle_area[kept],
-    )
+    rest = _without(surface, ~triangle)
     nodes = np.array(panels, np.int64).reshape(-1, 5)
     return consistent(rest) + _assembled(nodes, surface.panel_mass[~triangle], BUBBLE, surface)
 
@@ -210,6 +208,46 @@ def _bubble_element() -> NDArray:
 
 
 BUBBLE = _bubble_element()
+
+
+def condensed(surface: Surface) -> sparse.csr_array:
+    """Mass of panels that follow their corners and center as thin plates do.
+
+    Between these a panel takes the shape of a plate with no moments at its edges and straight
+    creases; see `foldyn.structures.condensed_panel`. Panels without a center node have the
+    consistent matrix of their triangles. The shape hardly depends on Poisson's ratio, for which 0.3
+    is taken.
+    """
+    edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
+    creases = {edge for edge, count in Counter(edges).items() if count == 2}
+    plated = surface.centers >= 0
+    rows, columns, values = [], [], []
+    for p in np.flatnonzero(plated).tolist():
+        nodes, face = surface.nodes_of(p), surface.faces[p]
+        straight = [edge_of(a, b) in creases for a, b in around(face)]
+        x = surface.nodes[nodes]
+        panel = outline(x[:-1], x[-1], [False] * len(face), straight)
+        rows.append(np.repeat(nodes, len(nodes)))
+        columns.append(np.tile(nodes, len(nodes)))
+        values.append(surface.panel_mass[p] * panel_mass(panel, 0.3).ravel())
+    n = len(surface.nodes)
+    entries = (_flat(values), (_flat(rows).astype(int), _flat(columns).astype(int)))
+    rest = _without(surface, plated)
+    return sparse.csr_array(sparse.coo_array(entries, shape=(n, n))) + consistent(rest)
+
+
+def _flat(parts: list[NDArray]) -> NDArray:
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _without(surface: Surface, panels: NDArray) -> Surface:
+    """The triangles of all but some panels (np,)."""
+    kept = ~panels[surface.triangle_panel]
+    return surface._replace(
+        triangles=surface.triangles[kept],
+        triangle_panel=surface.triangle_panel[kept],
+        triangle_area=surface.triangle_area[kept],
+    )
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:
@@ -294,6 +332,7 @@ MASS_RULES: Mapping[str, Callable[[Surface], sparse.csr_array]] = {
         mixed_voronoi,
         inertia_exact,
         bubble,
+        condensed,
     )
 }
 

@@ -19,7 +19,6 @@ from foldyn.mechanics.plates import (
     plates_energy,
     plates_force,
     plates_work,
-    turn_hinges,
 )
 from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, plates_pattern
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR

@@ -194,10 +194,10 @@ class Structure(Discretized):
             self.nodes, self.centers, self.folds, self.pattern, self.sheet,
             range(len(self.pattern.faces)) if isinstance(rigid, str) else rigid,
         )  # fmt: skip
+        stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         model = plates_model(
-            self.nodes, self.bars, self.sheet.youngs_modulus * self.bar_area / self.bar_length,
-            self.bar_law, self.folds, self.fold_stiffness, self.fold_rest, self.fold_law, self.bends,
-            self.bend_rest, plates,
+            self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
+            self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
         )  # fmt: skip
         return BarsPlatesBody(model, (self.fold_law, self.bend_law))
 
@@ -303,7 +303,9 @@ class Structure(Discretized):
             the tangent is the exact second derivative of the energy: singular at rest where
             superlinear bends have no slope.
         """
-        return condensed(self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden)
+        return balanced(
+            self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden
+        )
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
@@ -311,7 +313,7 @@ class Structure(Discretized):
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
 
 
-def condensed(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
+def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
     """The tangent (3n, 3n) of displacements where the `hidden` last dofs give way."""
     if not len(hidden):
         return matrix
