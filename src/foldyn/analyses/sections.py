@@ -244,6 +244,7 @@ class ModelSection(Section):
     crease_rest: PerCrease = None
     clamped: Pairs = None
     rigid: Rigid = None
+    straight: Pairs = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:

@@ -25,7 +25,7 @@ from foldyn.shells.mesh import shell_mesh
 from foldyn.shells.sides import Sides, sides, stiffness, without_free_sides
 from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_sheet
-from foldyn.structures.clamps import clamped_edges
+from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
 from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
@@ -362,7 +362,7 @@ def shell(
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")
-    edges = clamped_edges(clamped, pattern)
+    edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
     options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)

@@ -27,8 +27,10 @@ from foldyn.patterns.topology import Edge, edge_lookup, edge_of
 from foldyn.values import show
 
 
-def clamped_edges(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edge, ...]:
-    """Boundary edges (low, high) from pairs of vertices.
+def boundary_edges(
+    given: Sequence[Sequence[int]], pattern: Pattern, field: str
+) -> tuple[Edge, ...]:
+    """Boundary edges (low, high) from pairs of vertices, given as `field`.
 
     Raises
     ------
@@ -39,13 +41,13 @@ def clamped_edges(given: Sequence[Sequence[int]], pattern: Pattern) -> tuple[Edg
     try:
         pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
     except TypeError:
-        why = f" = {show(given)}: give pairs of vertices, as in clamped=[(0, 1), (1, 2)]"
-        raise InputError(why, "clamped") from None
+        why = f" = {show(given)}: give pairs of vertices, as in {field}=[(0, 1), (1, 2)]"
+        raise InputError(why, field) from None
     if inner := [pair for pair in pairs if pair not in boundary]:
-        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", "clamped")
+        raise InputError(f": {inner[0]} is not a boundary edge of the pattern", field)
     if len(set(pairs)) < len(pairs):
         twice = next(pair for pair in pairs if pairs.count(pair) > 1)
-        raise InputError(f": {twice} is listed twice", "clamped")
+        raise InputError(f": {twice} is listed twice", field)
     return tuple((pair[0], pair[1]) for pair in pairs)
 
 

@@ -16,7 +16,7 @@ from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
 from foldyn.structures import plate
-from foldyn.structures.clamps import clamp_rows, clamp_stiffness, clamped_edges
+from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mass import MASS_RULES
@@ -45,6 +45,7 @@ def discretize(
     centers: Mapping[int, ArrayLike] | None = None,
     clamped: Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
+    straight: Sequence[Sequence[int]] = (),
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
 
@@ -80,6 +81,9 @@ def discretize(
     rigid : "all" or sequence of int, optional
         Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
         be flat. Their bars still stretch.
+    straight : sequence of (vertex, vertex)
+        Boundary edges that stay straight, as along a support or a stiff rim (n5b8e); others may
+        bow between their ends.
 
     Returns
     -------
@@ -99,13 +103,16 @@ def discretize(
     [0.0639]
     """
     check_kinds(pattern, sheet)
-    edges = clamped_edges(clamped, pattern)
+    edges = boundary_edges(clamped, pattern, "clamped")
     options = ModelOptions(
         scheme, mass, bar_law, fold_law, bend_law, calibration, crease_stiffness, crease_rest,
         edges, checked_panels(rigid, len(pattern.faces)),
+        boundary_edges(straight, pattern, "straight"),
     )  # fmt: skip
     if scheme == "n5b8e":
         _check_edge_angles(options)
+    elif options.straight:
+        raise InputError(': edges bow with scheme = "n5b8e" only: leave it out', "straight")
     materials.bar_law(bar_law)
     materials.hinge_law(fold_law, "fold_law")
     bending = materials.hinge_law(bend_law, "bend_law")
@@ -130,7 +137,7 @@ def discretize(
     bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
     if scheme == "n5b8e":
         bends = spoke_stiffness(
-            edge_plates(mesh.nodes, mesh.centers, mesh.folds, pattern, sheet),
+            edge_plates(mesh.nodes, mesh.centers, mesh.folds, pattern, sheet, options.straight),
             len(mesh.folds), len(mesh.bends),
         )  # fmt: skip
     elif calibration == "plate":

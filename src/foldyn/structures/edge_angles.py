@@ -20,7 +20,7 @@ from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.condensed_panel import outline, panel_stiffness
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
@@ -30,11 +30,12 @@ STRAIGHT = 3.0
 
 def edge_plates(
     nodes: NDArray, centers: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet,
-    rigid: Collection[int] = (),
+    straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
 ) -> dict[str, NDArray]:  # fmt: skip
     """Arrays `fold_rotations`, `start`, `angle`, `entry` and `stiffness` of `BarsPlates`.
 
-    Rigid panels have no angles.
+    straight_edges : boundary edges (low, high) that stay straight.
+    rigid : numbers of rigid panels, which have no angles.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     crease = edge_lookup(pattern.creases)
@@ -57,7 +58,10 @@ def edge_plates(
             count += 1
         own = kinds[kind[p]]
         center = nodes[centers[p]] if centers[p] >= 0 else None
-        held = [k >= 0 and bool(straight[k]) for k in edges]
+        held = [
+            bool(straight[k]) if k >= 0 else edge_of(a, b) in straight_edges
+            for k, (a, b) in zip(edges, around(face), strict=True)
+        ]
         panel = outline(pattern.vertices[list(face)], center, [k >= 0 for k in edges], held)
         matrices.append(own.bending_modulus * panel_stiffness(panel, own.poissons_ratio))
         angles.append(turned)

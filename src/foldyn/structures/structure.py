@@ -63,6 +63,7 @@ class ModelOptions:
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
     rigid: str | tuple[int, ...] | None = None
+    straight: tuple[Edge, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("crease_stiffness", "crease_rest"):
@@ -191,7 +192,7 @@ class Structure(Discretized):
         assert self.pattern is not None
         rigid = self.options.rigid or ()
         plates = edge_plates(
-            self.nodes, self.centers, self.folds, self.pattern, self.sheet,
+            self.nodes, self.centers, self.folds, self.pattern, self.sheet, self.options.straight,
             range(len(self.pattern.faces)) if isinstance(rigid, str) else rigid,
         )  # fmt: skip
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
