@@ -58,13 +58,15 @@ def check(s, m):
     assert m.sum() == pytest.approx(total, rel=1e-14)
     np.testing.assert_array_equal(m, m.T)
     assert np.linalg.eigvalsh(m).min() >= -1e-16 * total
-    # every node that a panel uses has a mass of its own
-    assert (m.sum(axis=1) > 1e-3 * total / n).all()
+    if s.options.mass == "condensed":  # corners may tip against the load that lifts the center
+        assert np.linalg.eigvalsh(m).min() > 1e-3 * total / n
+    else:  # every node that a panel uses has a mass of its own
+        assert (m.sum(axis=1) > 1e-3 * total / n).all()
     # linear momentum of a uniform velocity, and no coupling that a shift could feel
     velocity = np.tile([0.3, -1.0, 2.0], (n, 1))
     np.testing.assert_allclose((m @ velocity).sum(axis=0), total * velocity[0], rtol=1e-13)
     assert (m.diagonal() > 0).all()
-    if s.options.mass != "bubble":  # whose opposite corners move against each other in a bulge
+    if s.options.mass not in ("bubble", "condensed"):  # whose corners move apart in a bulge
         assert (m >= 0).all()
 
 

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 
 from foldyn.mechanics.triangle import triangle_stiffness
 
-COARSE, FINE = 6, 12  # pieces of each edge in the two meshes
+COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
 DIGITS = 9  # to which panels have the same shape
 Rows = tuple[tuple[float, float], ...]
 
@@ -157,17 +157,38 @@ class _Plate:
                     self.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
 
     def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
-        """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k)."""
-        size, rows = len(self.stiffness.indptr) - 1, [*held, *self.lines]
-        row = np.repeat(np.arange(len(rows)), [len(entries) for entries in rows])
-        column = [place for entries in rows for place in entries]
-        value = [factor for entries in rows for factor in entries.values()]
-        fixed = sparse.csr_array((value, (row, column)), shape=(len(rows), size))
-        whole = sparse.csc_array(sparse.block_array([[self.stiffness, fixed.T], [fixed, None]]))
-        wanted = np.zeros((whole.shape[0], len(held)))
-        wanted[size + np.arange(len(held)), np.arange(len(held))] = 1.0
-        found = splu(whole).solve(wanted)
-        return found[:size], -found[size : size + len(held)]
+        """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k).
+
+        The heights come first among the held functions: with them the rest is positive definite.
+        """
+        size, count = len(self.stiffness.indptr) - 1, len(self.heights)
+        first = np.array([next(iter(entries)) for entries in self.heights])
+        others = np.setdiff1d(np.arange(size), first)
+        inner = sparse.csc_array(self.stiffness[others][:, others])
+        factor = splu(inner, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+        rows = _rows([*held[count:], *self.lines], size)
+        both = self.stiffness[others][:, first].toarray()
+        given, multipliers = rows[:, first].toarray(), rows[:, others]
+        loose = factor.solve(np.column_stack([both, multipliers.T.toarray()]))
+        # unknowns x = -loose_h h + loose_c m, where C x + C_h h = g
+        moved, pulled = loose[:, :count], loose[:, count:]
+        wanted = np.zeros((len(given), len(held)))
+        wanted[:, :count] = multipliers @ moved - given
+        wanted[: len(held) - count, count:] = np.eye(len(held) - count)
+        force = np.linalg.solve(multipliers @ pulled, wanted)
+        found = np.zeros((size, len(held)))
+        found[first, :count] = np.eye(count)
+        found[others] = pulled @ force
+        found[others, :count] -= moved
+        return found, found.T @ (self.stiffness @ found)
+
+
+def _rows(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
+    """Rows (k, size) of linear functions, given by their coefficients."""
+    row = np.repeat(np.arange(len(functions)), [len(entries) for entries in functions])
+    column = [place for entries in functions for place in entries]
+    value = [factor for entries in functions for factor in entries.values()]
+    return sparse.csr_array((value, (row, column)), shape=(len(functions), size))
 
 
 @lru_cache(maxsize=4096)
@@ -176,16 +197,26 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
 
     As a plate at rest does, without moments at its edges; exact for what is linear over the panel.
     """
-    coarse, fine = (_followed(_Plate(panel, poissons_ratio, n)) for n in (COARSE, FINE))
-    ratio = (FINE / COARSE) ** 2
-    out = fine + (fine - coarse) / (ratio - 1.0)
+    coarse, fine = (_Plate(panel, poissons_ratio, n) for n in (COARSE, FINE))
+    less, more = (
+        _mass(plate.points, plate.triangles, plate.solved(plate.heights)[0])
+        for plate in (coarse, fine)
+    )
+    out = more + (more - less) / ((FINE / COARSE) ** 2 - 1.0)
+    # what is linear over the panel to the last digit, as its facets have it
+    x = np.array([*panel.corners, panel.center] if panel.center else panel.corners)
+    linear = np.column_stack([np.ones(len(x)), x])
+    along = linear @ np.linalg.pinv(linear)
+    facets = np.array(_facets(x, len(panel.corners)))[: None if panel.center else 1]
+    out = out + along.T @ (_mass(x, facets, np.eye(len(x))) - out) @ along
+    out = 0.5 * (out + out.T)
     out.setflags(write=False)
     return out
 
 
-def _followed(plate: _Plate) -> NDArray:
-    shape = plate.solved(plate.heights)[0][plate.triangles]  # (nt, 3, k)
-    corners = plate.points[plate.triangles]
+def _mass(points: NDArray, triangles: NDArray, heights: NDArray) -> NDArray:
+    """Mass matrix (k, k) of shapes with heights (points or more, k) that triangles join."""
+    shape, corners = heights[triangles], points[triangles]
     area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     element = (np.ones((3, 3)) + np.eye(3)) / 12.0
     return np.einsum("tak,ab,tbl,t->kl", shape, element, shape, area / area.sum())

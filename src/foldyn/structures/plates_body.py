@@ -83,9 +83,9 @@ class BarsPlatesBody(Body):
         q = np.append(np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden)))
         if not len(self.hidden):
             return q
-        work, push = plates_work(self.model), np.zeros(self.size) if push is None else push
+        work, pushed = plates_work(self.model), 0.0 if push is None else push[self.hidden]
         for _ in range(ITERATIONS):
-            couple = (self.internal(q, work) - push)[self.hidden]
+            couple = self.internal(q, work)[self.hidden] - pushed
             if not couple.any():
                 return q
             stiffness = self.tangent(q, FLOOR)[self._nodal :][:, self._nodal :]

@@ -85,7 +85,12 @@ class FidelityCase:
 
     def case(self, structure: Discretized) -> Case:
         """A structure with the supports."""
-        return Case(structure, supports(self.kind, self.shape)[self.support].of(structure))
+        return Case(structure, self.held.of(structure))
+
+    @property
+    def held(self) -> Held:
+        """Its supports."""
+        return supports(self.kind, self.shape)[self.support]
 
 
 def _short(value: Any) -> str:

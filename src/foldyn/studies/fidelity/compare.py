@@ -24,6 +24,9 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
     "plate, mixed_voronoi": {"calibration": "plate", "mass": "mixed_voronoi"},
     "plate, inertia_exact": {"calibration": "plate", "mass": "inertia_exact"},
     "plate, consistent, n4b5": {"calibration": "plate", "mass": "consistent", "scheme": "n4b5"},
+    "n5b8e, condensed": {"calibration": "plate", "mass": "condensed", "scheme": "n5b8e"},
+    "n5b8e, bubble": {"calibration": "plate", "mass": "bubble", "scheme": "n5b8e"},
+    "n5b8e, consistent": {"calibration": "plate", "mass": "consistent", "scheme": "n5b8e"},
 }
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
@@ -56,10 +59,13 @@ class Row(NamedTuple):
 
 
 def structure_of(case: FidelityCase, model: str) -> Structure:
-    """Bars and hinges of a case."""
+    """Bars and hinges of a case; edges that are held stay straight in the scheme n5b8e."""
+    options = dict(MODELS[model])
+    if options.get("scheme") == "n5b8e":
+        options["straight"] = case.held.edges
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        return discretize(case.pattern(), case.sheet, bend_law="linear", **MODELS[model])
+        return discretize(case.pattern(), case.sheet, bend_law="linear", **options)
 
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:

@@ -24,6 +24,7 @@ from foldyn.studies.fidelity.statics import STUDIES
 LAWS: Mapping[str, Mapping[str, Any]] = {
     "standard, superlinear": {},
     "plate, linear": {"calibration": "plate", "bend_law": "linear"},
+    "n5b8e, linear": {"calibration": "plate", "bend_law": "linear", "scheme": "n5b8e"},
     "plate, plate_superlinear": {"calibration": "plate", "bend_law": "plate_superlinear"},
 }
 """Options of `discretize`."""

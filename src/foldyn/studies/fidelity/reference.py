@@ -47,9 +47,14 @@ class Reference:
 
 
 def plate_frequency(pattern: Pattern, sheet: Sheet) -> float:
-    """First frequency (Hz) of a free square plate whose side is the longest edge."""
+    """First frequency (Hz) of a free square plate, as large as the largest panel.
+
+    Its side is the longest edge, or the root of the largest area where that is longer: in panels
+    of five corners and more.
+    """
     ends = pattern.vertices[pattern.edges]
-    longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+    longest = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max()
+    longest = float(max(longest, np.sqrt(pattern.face_areas.max())))
     assert sheet.density is not None
     speed = (sheet.bending_modulus / (sheet.density * sheet.thickness)) ** 0.5
     return FIRST_OF_A_SQUARE / (2.0 * np.pi) * speed / longest**2

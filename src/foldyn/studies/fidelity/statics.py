@@ -24,6 +24,7 @@ from foldyn.studies import find_case
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {"calibration": "standard", "mass": "mixed_voronoi"},
     "plate": {"calibration": "plate", "mass": "consistent"},
+    "n5b8e": {"calibration": "plate", "mass": "condensed", "scheme": "n5b8e"},
 }
 STUDIES = ("case1", "case2", "case3", "case4")
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
