@@ -1,0 +1,24 @@
+"""The frequency above which panels vibrate as plates, whatever their creases do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import around
+from foldyn.structures.sheet import Sheet
+
+FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
+BELOW = 0.6  # of the plate frequency: where bars and hinges have the modes of a sheet
+
+
+def plate_frequency(pattern: Pattern, sheet: Sheet) -> float:
+    """First frequency (Hz) of a free square plate whose side is the longest edge.
+
+    Of panels with sheets of their own the lowest one; nan of a sheet without density.
+    """
+    count, x = len(pattern.faces), pattern.vertices
+    speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
+    edges = [np.array(around(face)) for face in pattern.faces]
+    longest = [np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1).max() for ends in edges]
+    return float((FIRST_OF_A_SQUARE / (2.0 * np.pi) * speed / np.square(longest)).min())
