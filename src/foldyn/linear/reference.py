@@ -51,7 +51,7 @@ class Reference:
         return self.fine / self.frequency - 1.0
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
-        """Which of some points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
         structure = self.case.structure
         apart, place = cKDTree(structure.nodes).query(nodes)
         seen = np.flatnonzero(apart < SAME_PLACE * structure.pattern.size)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around
 from foldyn.structures.sheet import Sheet
 
 FIRST_OF_A_SQUARE = 13.47  # omega L^2 sqrt(rho t/G) of a free square plate, nu = 0.3 (Leissa 1973)
@@ -19,6 +18,6 @@ def plate_frequency(pattern: Pattern, sheet: Sheet) -> float:
     """
     count, x = len(pattern.faces), pattern.vertices
     speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
-    edges = [np.array(around(face)) for face in pattern.faces]
-    longest = [np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1).max() for ends in edges]
+    sides = (x[list(face)] - np.roll(x[list(face)], 1, axis=0) for face in pattern.faces)
+    longest = [np.linalg.norm(side, axis=1).max() for side in sides]
     return float((FIRST_OF_A_SQUARE / (2.0 * np.pi) * speed / np.square(longest)).min())
