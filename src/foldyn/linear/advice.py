@@ -113,7 +113,7 @@ def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
         parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
     if lost:
         parts.append(f"has no partner of {lost} of {below} modes")
-    yield f"The case's own model {' and '.join(parts)} there."
+    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
     soft = int(result["soft_hinges"].sel(model=OWN))
     if soft:
         yield (
@@ -147,6 +147,5 @@ def _missed(result: xarray.Dataset, best: Reach) -> str:
 
 
 def _called(result: xarray.Dataset, model: str) -> str:
-    if model == OWN:
-        return "The case's own model"
-    return f'The model "{model}" ({result["options"].sel(model=model).item()})'
+    name = "case's own model" if model == OWN else f'model "{model}"'
+    return f"The {name} ({result['options'].sel(model=model).item()})"

@@ -49,8 +49,8 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
     figure, (upper, lower) = style.rows(
         (8.0, 5.6), title, "frequency of the shell (Hz)", labels, heights=[1.6, 1.0]
     )
-    shown = np.abs(error[np.isfinite(error)])
-    reach = min(1.15 * max(float(shown.max(initial=0.0)), 2.0 * NEAR), 1.05 * MOST)
+    shown = np.append(error[np.isfinite(error)], [-2.0 * NEAR, 2.0 * NEAR]).clip(-MOST, MOST)
+    bottom, top = 115.0 * shown.min(), 115.0 * shown.max()
     upper.axhspan(-100.0 * NEAR, 100.0 * NEAR, color="#EAF3EA", zorder=0.5)
     upper.axhline(0.0, color=style.GRAY, linewidth=0.8)
     lower.axhspan(-0.05, LEAST, color="#F3EDED", zorder=0.5)
@@ -64,10 +64,10 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
         upper.plot(frequency[inside], 100.0 * error[inside, k], **look, **line)
         beyond = found & ~inside
         arrow = look | {"marker": "$\\uparrow$", "markersize": 9.0, "linestyle": "none"}
-        upper.plot(frequency[beyond], np.full(beyond.sum(), 96.0 * reach), **arrow)
+        upper.plot(frequency[beyond], np.full(beyond.sum(), 107.0 * MOST), **arrow)
         lower.plot(frequency, result["mac"].values[:, k], **look, **line)
         keys.append(style.key(_named(model), **look, **line))
-    upper.set_ylim(-100.0 * reach, 100.0 * reach)
+    upper.set_ylim(bottom, top)
     lower.set_ylim(-0.05, 1.05)
     _note(lower, "lost")
     _along(upper, lower, frequency, fidelity.limit)
