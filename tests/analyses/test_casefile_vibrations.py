@@ -334,7 +334,7 @@ BAD_RESPONSE = {
     ),
     "animation": (
         [(DRIVE, DRIVE + '\n[output]\nanimation = "gif"')],
-        'output.animation: only for analysis.kind = "dynamics" or "statics" or "modes"; leave it',
+        'output.animation: only for analysis.kind = "dynamics", "statics" or "modes"; leave it',
     ),
     "no density": (
         [("density = 1.0\n", "")],

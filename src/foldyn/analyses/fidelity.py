@@ -89,7 +89,9 @@ class FidelityAnalysis(Analysis):
         case, given = case_file.case(mass), {**self.arguments, **changes}
         others = {f"own ({rule})": {"mass": rule} for rule in self.masses}
         known = vars(case.structure.options)
-        checked = comparison(case, **{**given, "models": others | named(given["models"], known)})
+        checked = comparison(
+            case, **{**given, "models": {**others, **named(given["models"], known)}}
+        )
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             begun()

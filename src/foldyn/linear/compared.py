@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from textwrap import fill
 from typing import NamedTuple
 
 import xarray
@@ -12,7 +13,7 @@ from foldyn.errors import InputError
 from foldyn.linear.advice import OWN, advice, percent
 from foldyn.values import choice
 
-ABREAST = 4  # models beside each other in plain text
+ABREAST, WIDE = 4, 100  # models beside each other in plain text, and letters of a line
 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 
@@ -83,7 +84,7 @@ class Fidelity:
 
     def __str__(self) -> str:
         """A table in plain text, and the advice."""
-        return f"{_text(self)}\n\n{self.advice}"
+        return f"{_text(self)}\n\n{fill(self.advice, WIDE)}"
 
     @property
     def models(self) -> tuple[str, ...]:
