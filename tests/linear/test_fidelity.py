@@ -93,6 +93,22 @@ def test_the_models_of_case_study_2(miura):
     assert fd.case_of(found.result).loads == case.loads
 
 
+def test_warnings_of_the_case_are_not_repeated(recwarn):
+    partly = [fd.Fix([0, 1, 2, 3]), fd.Impose([4], "z", 0.1)]
+    case = fd.Case(fold(**PLATE), partly, [fd.Force([4, 5], (0, 0, 1e-4))])
+    assert len(recwarn) == 1  # the force acts in part where a node is moved
+    found = fd.fidelity(case, 2, (2, 4))
+    assert len(recwarn) == 1
+    assert "small loads" in str(found)
+
+
+def test_numbers_stand_beside_their_units(quick):
+    text = str(quick[1])
+    assert max(map(len, text.splitlines())) <= 100
+    assert quick[1].advice == " ".join(text.split("\n\n")[-1].splitlines())
+    assert not any(line.startswith(("%", "Hz")) for line in text.splitlines())
+
+
 def test_a_case_with_the_right_model_keeps_it():
     found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, (4, 8))
     assert found.models == ("own", "standard")
@@ -355,6 +371,20 @@ def test_patterns_that_are_too_large_are_refused():
     structure = fd.discretize(strip(500), SHEET, bend_law="linear")
     with pytest.raises(InputError, match=r"divisions: the shell of 500 panels would have 16000"):
         fd.fidelity(fd.Case(structure))
+
+
+def test_a_model_that_cannot_move_is_refused():
+    square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
+    corners = [fd.Fix([0, 1, 2, 3])]
+    still = fd.Case(fd.discretize(square, SHEET, scheme="n4b5", bend_law="linear"), corners)
+    with pytest.raises(InputError, match=r"^supports: hold every node along x, y and z"):
+        fd.fidelity(still)
+    moving = fd.Case(fd.discretize(square, SHEET, bend_law="linear"), corners)
+    with pytest.raises(InputError, match=r"^models: cut: supports: hold every node"):
+        fd.fidelity(moving, models={"cut": {"scheme": "n4b5"}})
+    rows = fd.fidelity(moving, 6, (3, 6), models=[]).table()
+    assert [row.shell for row in rows] == sorted(row.shell for row in rows)  # extrapolated, too
+    assert rows[0].mac == 0.0  # nothing moves where both have nodes
 
 
 def test_only_comparisons_are_shown(quick):

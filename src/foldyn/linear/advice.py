@@ -143,7 +143,7 @@ def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
 
 def _missed(result: xarray.Dataset, best: Reach) -> str:
     error = float(result["error"].sel(model=best.model).values[best.count])
-    return "has no partner in it" if np.isinf(error) else f"is off by {percent(error)} in it"
+    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
 
 
 def _called(result: xarray.Dataset, model: str) -> str:

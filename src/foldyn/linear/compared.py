@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from textwrap import fill
 from typing import NamedTuple
@@ -84,7 +85,7 @@ class Fidelity:
 
     def __str__(self) -> str:
         """A table in plain text, and the advice."""
-        return f"{_text(self)}\n\n{fill(self.advice, WIDE)}"
+        return f"{_text(self)}\n\n{_wrapped(self.advice)}"
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -110,6 +111,12 @@ class Fidelity:
             ComparedMode(mode, shell, mesh, shell < self.limit, error, mac)
             for mode, shell, mesh, error, mac in zip(*columns, strict=True)
         )
+
+
+def _wrapped(text: str) -> str:
+    """Lines of a text, numbers beside their units."""
+    held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", text)
+    return fill(held, WIDE).replace("\u00a0", " ")
 
 
 def _text(found: Fidelity) -> str:

@@ -24,6 +24,7 @@ from foldyn.linear.shell_of import check_reduced, meshes, shell_of, with_structu
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.materials.law import Law
 from foldyn.results import fidelity_dataset
+from foldyn.statics.tracing import check_movable
 from foldyn.structures import discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.values import brief, choice, number, show, whole
@@ -217,6 +218,9 @@ def comparison(
     check_reduced(case)
     forces, others = forces_alone(case)
     compared = _compared(forces, models)
+    for name, held in compared.items():
+        with within("" if name == OWN else f"models: {name}: "):
+            check_movable(held)
     coarse, fine = meshes(case.structure.pattern, divisions)
     shells = shell_of(forces, coarse), shell_of(forces, fine)
     return Comparison(case, count, shells, compared, tuple(others), secant)

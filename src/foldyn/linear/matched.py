@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.linear.pairing import pairs
 from foldyn.linear.reference import Reference, elastic
+from foldyn.linear.shell_of import with_structure
 
 LEAST = 0.5  # MAC of a partner
 SPARE = 10  # modes of a model, beyond those that are compared, among which partners are sought
@@ -64,4 +65,4 @@ def _weights(case: Case) -> NDArray:
     """Weights (n,) of the nodes in the MAC, the same for all mass rules."""
     structure = case.structure
     even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))
-    return replace(case, structure=even).nodal_mass
+    return with_structure(case, even).nodal_mass

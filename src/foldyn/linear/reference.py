@@ -96,4 +96,5 @@ def reference_modes(coarse: Case, fine: Case, count: int) -> Reference:
     k = min(len(low), len(high))
     ratio = fine.structure.options.divisions / coarse.structure.options.divisions
     limit = extrapolated(low[:k], high[:k], ratio)
-    return Reference(limit, low[:k], high[:k], shape[:k], fine, found)
+    rank = np.argsort(limit, kind="stable")  # which close modes of a coarse mesh may change
+    return Reference(limit[rank], low[rank], high[rank], shape[rank], fine, found)
