@@ -104,7 +104,7 @@ def test_warnings_of_the_case_are_not_repeated(recwarn):
 
 def test_numbers_stand_beside_their_units(quick):
     text = str(quick[1])
-    assert max(map(len, text.splitlines())) <= 100
+    assert max(map(len, text.splitlines())) <= 79
     assert quick[1].advice == " ".join(text.split("\n\n")[-1].splitlines())
     assert not any(line.startswith(("%", "Hz")) for line in text.splitlines())
 

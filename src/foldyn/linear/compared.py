@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 from foldyn.linear.advice import OWN, advice, percent
 from foldyn.values import choice
 
-ABREAST, WIDE = 4, 100  # models beside each other in plain text, and letters of a line
+ABREAST, WIDE = 4, 79  # models beside each other in plain text, and letters of a line
 
 __all__ = ["OWN", "ComparedMode", "Fidelity"]
 
