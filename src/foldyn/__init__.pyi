@@ -60,7 +60,13 @@ from foldyn.dynamics import (
 )
 from foldyn.experiment import fit as fit
 from foldyn.formats import read_pattern as read_pattern, write_pattern as write_pattern
-from foldyn.linear import frf as frf, mac as mac, modes as modes
+from foldyn.linear import (
+    Fidelity as Fidelity,
+    fidelity as fidelity,
+    frf as frf,
+    mac as mac,
+    modes as modes,
+)
 from foldyn.materials import (
     BarLaw as BarLaw,
     CustomBarLaw as CustomBarLaw,

@@ -334,7 +334,7 @@ BAD_RESPONSE = {
     ),
     "animation": (
         [(DRIVE, DRIVE + '\n[output]\nanimation = "gif"')],
-        'output.animation: only for analysis.kind = "dynamics" or "statics" or "modes"; leave it',
+        'output.animation: only for analysis.kind = "dynamics", "statics" or "modes"; leave it',
     ),
     "no density": (
         [("density = 1.0\n", "")],
@@ -363,7 +363,7 @@ def test_keys_of_vibrations_in_a_motion_are_told_as_such(read, short) -> None:
     check(
         read,
         short.replace("duration = 10", "duration = 10\ncount = 5"),
-        'analysis.count: only for analysis.kind = "modes" or "frf"; leave it out',
+        'analysis.count: only for analysis.kind = "modes", "frf" or "fidelity"; leave it out',
     )
     drive = "[[drive]]\nnodes = 7\nforce = [1, 0, 0]\n"
     check(read, short + drive, 'drive: only for analysis.kind = "frf"; leave it out')

@@ -13,7 +13,7 @@ class _Hidden:
     def nothing(self, *_: Any, **__: Any) -> None:
         """Do nothing."""
 
-    clear = close = update = set_postfix_str = nothing
+    clear = close = update = set_postfix_str = set_description_str = nothing
 
 
 def bar(shown: bool, **options: Any) -> Any:

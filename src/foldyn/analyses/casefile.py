@@ -84,6 +84,8 @@ class Analysis(ABC):
         Beginning of a message, "a motion needs"; "" where it does without.
     takes : sequence of str
         Names of the arguments that may take the place of the file's.
+    by_mass : bool
+        Whether each mass rule of a file has a result of its own; otherwise its first has the one.
     arguments : dict
         Keyword arguments of its function: of `simulate`, `trace`, `modes` or `frf`.
     """
@@ -93,6 +95,7 @@ class Analysis(ABC):
     files: ClassVar[tuple[str, ...]]
     needs_density: ClassVar[str]
     takes: ClassVar[Sequence[str]]
+    by_mass: ClassVar[bool] = True
 
     def __init__(self, arguments: dict[str, Any]) -> None:
         self.arguments = arguments

@@ -29,8 +29,27 @@ def flagged(document: Document, flags: Mapping[str, Any]) -> Document:
     return {**others, "analysis": analysis, "initial": start}
 
 
+def compared(path: Path, document: Document) -> Document:
+    """The document as a comparison with the shell, in which loads act in full.
+
+    A start and a drive have no place there, and are left out with a warning.
+    """
+    left = [f"[{name}]" for name in ("initial", "drive") if name in document]
+    if left:
+        warnings.warn(
+            f"{path}: foldyn fidelity leaves out {', '.join(left)}: small vibrations about rest "
+            "are compared, and displacements under the loads",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    kept = _without(document, "initial", "drive", "output")
+    return {**kept, "analysis": {"kind": "fidelity"}}
+
+
 def converted(path: Path, document: Document, kind: str, state: str) -> Document:
     """The document as one of another kind; what has no place there is left out, with a warning."""
+    if kind == "fidelity":
+        return compared(path, document)
     left: list[str] = []
     atrest = state == "rest"
     supports, bases = _supports(document.get("supports", []), atrest, left)

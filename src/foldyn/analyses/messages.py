@@ -80,7 +80,8 @@ def _line(
         at, key = location[:-1], str(location[-1])
         owners = [name for name, other in kinds.items() if key in _keys(other, at)]
         if owners:
-            kinds_of_it = " or ".join(show(owner) for owner in owners)
+            *others, last = (show(owner) for owner in owners)
+            kinds_of_it = f"{', '.join(others)} or {last}" if others else last
             return f"{place}: only for analysis.kind = {kinds_of_it}; leave it out"
         return f"{place}: {unknown_key(key, _keys(schema, at))}"
     if kind == "missing":

@@ -74,12 +74,12 @@ def read_as(
     model: str | None = None,
     divisions: int | None = None,
 ) -> CaseFile:
-    """Read a case file of any kind as one of modes or of a frequency response.
+    """Read a case file of any kind as one of small vibrations.
 
     Parameters
     ----------
     path : Path
-    kind : {"modes", "frf"}
+    kind : {"modes", "frf", "fidelity"}
     flags : mapping
         Keys of [analysis] that the command line gives instead of the file; `state` may be a
         result's file, too.
@@ -125,6 +125,8 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     model = MODELS[schema.model.kind]
     masses = list(schema.model.mass or [model.mass])
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
+    if not kind.by_mass:
+        masses = masses[:1]
     pattern: Any = None
     sheet: Any = None
     with faults.collected():
@@ -159,7 +161,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         cases |= {mass: make(mass) for mass in masses[1:]}
     with within("", path):
         analysis = kind.of(schema, case)
-        chosen = schema.output.nodes
+        chosen = getattr(schema.output, "nodes", None)
         nodes = (
             analysis.shown(case)
             if chosen is None

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from foldyn.analyses.casefile import Analysis
+from foldyn.analyses.fidelity import FidelityAnalysis
 from foldyn.analyses.frf import FrfAnalysis
 from foldyn.analyses.modes import ModesAnalysis
 from foldyn.analyses.motion import MotionAnalysis
@@ -18,7 +19,7 @@ from foldyn.values import choice
 
 ANALYSES: Mapping[str, type[Analysis]] = {
     analysis.kind: analysis
-    for analysis in (MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis)
+    for analysis in (MotionAnalysis, PathAnalysis, ModesAnalysis, FrfAnalysis, FidelityAnalysis)
 }
 """By the name that `analysis.kind` has for them."""
 

@@ -80,6 +80,31 @@ def parser() -> argparse.ArgumentParser:
     frf.add_argument("--method", help="direct (default), modal, impulse, ...: see the case file")
     _add_state(frf)
 
+    fidelity = commands.add_parser(
+        "fidelity",
+        help="models of bars and hinges beside the shell, for a case file of any kind",
+        description="Frequencies, shapes and small displacements of bars and hinges beside the "
+        "shell of the same pattern, sheet and supports, for a case file of any kind; what its "
+        "[analysis] says, if it is of kind fidelity, holds unless given here.",
+    )
+    _add_case(fidelity, "fidelity")
+    fidelity.set_defaults(model=None)
+    fidelity.add_argument("--count", type=int, help="how many modes of the shell (default: 6)")
+    fidelity.add_argument(
+        "--divisions",
+        type=int,
+        nargs=2,
+        metavar=("COARSE", "FINE"),
+        help="pieces of every edge of the two shells (default: 6 12, less for large patterns)",
+    )
+    fidelity.add_argument(
+        "--models",
+        nargs="+",
+        metavar="NAME",
+        help="what stands beside the model of the file (default: standard plate)",
+    )
+    _add_secant(fidelity)
+
     add_study(commands)
     add_fit(commands)
     add_track(commands)
@@ -91,12 +116,17 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def _add_common(command: argparse.ArgumentParser, results: str) -> None:
+def _add_case(command: argparse.ArgumentParser, results: str) -> None:
     """Add what all commands on case files take."""
     command.add_argument(
         "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
     )
     add_results(command, f"NAME-{results}")
+
+
+def _add_common(command: argparse.ArgumentParser, results: str) -> None:
+    """Add what commands on case files of either model take."""
+    _add_case(command, results)
     command.add_argument(
         "--model",
         metavar="bars_and_hinges|shell",
@@ -115,6 +145,11 @@ def _add_state(command: argparse.ArgumentParser) -> None:
         help="about which state: rest (default), the equilibrium under the loads, or the last "
         "state of a result (NetCDF)",
     )
+    _add_secant(command)
+
+
+def _add_secant(command: argparse.ArgumentParser) -> None:
+    """Add the amplitude of superlinear hinges."""
     command.add_argument(
         "--secant",
         type=float,

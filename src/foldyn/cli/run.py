@@ -70,7 +70,10 @@ def run(given: Namespace) -> Path:
 
 
 def _read(path: Path, given: Namespace) -> CaseFile:
-    """Read a case file, for `foldyn modes` and `foldyn frf` as one of that kind."""
+    """Read a case file, for commands that are no `run` as one of their kind."""
+    if given.command == "fidelity":
+        keys = {key: getattr(given, key) for key in ("count", "divisions", "models", "secant")}
+        return read_as(path, given.command, keys)
     model = given.model, given.divisions
     if given.command == "run":
         return read_case(path, *model)

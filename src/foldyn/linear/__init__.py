@@ -1,6 +1,8 @@
 """Small vibrations about an equilibrium: modes and frequency response."""
 
 from foldyn.linear.character import character
+from foldyn.linear.compared import ComparedMode, Fidelity
+from foldyn.linear.fidelity import fidelity
 from foldyn.linear.frequency_domain import Modal
 from foldyn.linear.frf import METHODS, convert, frf
 from foldyn.linear.harmonic import HarmonicBalance
@@ -15,6 +17,8 @@ from foldyn.linear.transients import BurstRandom, Impulse
 __all__ = [
     "METHODS",
     "BurstRandom",
+    "ComparedMode",
+    "Fidelity",
     "HarmonicBalance",
     "Impulse",
     "Linearized",
@@ -26,6 +30,7 @@ __all__ = [
     "character",
     "convert",
     "equivalent_slope",
+    "fidelity",
     "frf",
     "linearize",
     "mac",

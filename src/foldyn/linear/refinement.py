@@ -71,7 +71,12 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
     if len(fine) != len(coarse) or not len(fine):
         return None
     ratio = structure.options.divisions / coarser.options.divisions
-    return Refinement(structure.options.divisions, fine, fine + (fine - coarse) / (ratio**2 - 1.0))
+    return Refinement(structure.options.divisions, fine, extrapolated(coarse, fine, ratio))
+
+
+def extrapolated(coarse: Any, fine: Any, ratio: float) -> Any:
+    """What values tend to that two meshes have, the fine one with `ratio` times the divisions."""
+    return fine + (fine - coarse) / (ratio**2 - 1.0)
 
 
 def _frequencies(case: Case, structure: Any, count: int) -> NDArray[np.float64]:

@@ -1,7 +1,13 @@
 """Results: datasets that carry their own case, in memory and in files."""
 
 from foldyn.results.contents import case_of, check_result
-from foldyn.results.dataset import frf_dataset, modes_dataset, path_dataset, trajectory_dataset
+from foldyn.results.dataset import (
+    fidelity_dataset,
+    frf_dataset,
+    modes_dataset,
+    path_dataset,
+    trajectory_dataset,
+)
 from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
 
@@ -9,6 +15,7 @@ __all__ = [
     "Quantity",
     "case_of",
     "check_result",
+    "fidelity_dataset",
     "frf_dataset",
     "load",
     "modes_dataset",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -16,6 +16,7 @@ from foldyn.cases import HISTORIES, Case
 from foldyn.cases.document import Document, to_document
 from foldyn.results.quantities import (
     ESTIMATES,
+    FIDELITY,
     MODES,
     MOTION,
     PATH,
@@ -212,6 +213,37 @@ def frf_dataset(
     data["drive"] = variable(PLACE, drive, driven, "amplitude of the drive")
     along = {"frequency": ("frequency", np.array(frequency, float), {"units": "Hz"})}
     return result_dataset("frf", case, data, along, statistics)
+
+
+def fidelity_dataset(
+    case: Case,
+    models: Sequence[str],
+    values: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any],
+) -> xr.Dataset:
+    """Dataset of a comparison of models with the shell, which carries its own case.
+
+    Parameters
+    ----------
+    case : Case
+        What was compared, with its own model.
+    models : sequence of str
+        Names of the models.
+    values : mapping of str to array_like
+        Variables of `quantities.FIDELITY`.
+    statistics : mapping
+        Facts about the comparison, each stored as an attribute.
+    """
+    data = {
+        name: variable(FIDELITY[name].dims, array, FIDELITY[name].units, FIDELITY[name].text)
+        for name, array in values.items()
+    }
+    numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
+    along = {
+        "mode": ("mode", numbers, {"long_name": "elastic mode of the shell"}),
+        "model": ("model", np.array(list(models)), {"long_name": "model"}),
+    }
+    return result_dataset("fidelity", case, data, along, statistics)
 
 
 def result_dataset(

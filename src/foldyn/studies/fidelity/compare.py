@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from foldyn.errors import FoldynWarning
+from foldyn.linear.matched import SPARE, matched
+from foldyn.linear.reference import Reference, modes_at_rest
 from foldyn.structures import Structure, discretize
+from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.studies.fidelity.cases import FidelityCase
-from foldyn.studies.fidelity.pairing import pairs
-from foldyn.studies.fidelity.reference import BELOW, Reference, elastic, plate_frequency
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard, mixed_voronoi": {"calibration": "standard", "mass": "mixed_voronoi"},
@@ -31,8 +28,6 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
 COMPARED = 8  # modes of the shell, at most
-SOUGHT = 18  # modes among which partners are sought
-LEAST = 0.5  # MAC of a partner
 
 
 class Row(NamedTuple):
@@ -70,28 +65,12 @@ def structure_of(case: FidelityCase, model: str) -> Structure:
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
     """Modes of a case below the limit, by a model beside the shell."""
-    structure = structure_of(case, model)
-    frequency, shape = elastic(case, structure, SOUGHT)
-    nodes = np.flatnonzero(true.seen[: len(structure.nodes)])
-    mass = _weights(structure)[nodes]
-    wanted = true.frequency[:COMPARED]
-    found = pairs(wanted, true.shape[:COMPARED][:, nodes], frequency, shape[:, nodes], mass)
+    held = case.case(structure_of(case, model))
+    found = matched(true, COMPARED, held, modes_at_rest(held, COMPARED + SPARE))
     limit = plate_frequency(case.pattern(), case.sheet)
+    rows = zip(true.frequency, found.error, found.mac, strict=False)
     return [
-        Row(
-            pair.first + 1,
-            float(wanted[pair.first]),
-            float(wanted[pair.first] / limit),
-            float(frequency[pair.second] / wanted[pair.first] - 1.0)
-            if pair.mac >= LEAST
-            else float("nan"),
-            pair.mac,
-        )
-        for pair in found
-        if wanted[pair.first] < BELOW * limit
+        Row(k, float(shell), float(shell / limit), float(error), float(mac))
+        for k, (shell, error, mac) in enumerate(rows, 1)
+        if shell < BELOW * limit
     ]
-
-
-def _weights(structure: Structure) -> NDArray:
-    """Weights (n,) of the nodes in the MAC, the same for all mass rules."""
-    return replace(structure, options=replace(structure.options, mass="mixed_voronoi")).nodal_mass

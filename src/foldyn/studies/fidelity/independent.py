@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.linear.refinement import extrapolated
 from foldyn.materials import EnhancedLinear
 from foldyn.structures import discretize
 from foldyn.studies.fidelity.cases import FidelityCase, documented
@@ -42,7 +43,7 @@ def frequencies(case: FidelityCase, count: int) -> NDArray:
     """Lowest frequencies (count,), Hz, of a case by OpenSees."""
     held = case.case(discretize(case.pattern(), case.sheet, fold_law=LINEAR))
     coarse, fine = (PanelShells(held, n).frequencies(count) for n in MESHES)
-    return fine + (fine - coarse) / ((MESHES[1] / MESHES[0]) ** 2 - 1.0)
+    return extrapolated(coarse, fine, MESHES[1] / MESHES[0])
 
 
 def taken(case: FidelityCase) -> bool:

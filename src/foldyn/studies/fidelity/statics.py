@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
 
 from foldyn.analyses import read_case
 from foldyn.cases import Case, Fix, Force
-from foldyn.errors import FoldynWarning
-from foldyn.linear import linearize, modes
+from foldyn.linear import modes
+from foldyn.linear.refinement import extrapolated
+from foldyn.linear.small_loads import small_loads
 from foldyn.patterns.generators import miura
 from foldyn.shells import shell
 from foldyn.structures import Sheet, discretize
@@ -47,20 +46,9 @@ class Softness(NamedTuple):
     error: Mapping[str, float]
 
 
-def displacement(case: Case) -> float:
-    """Work of the loads in full over their sum, in a linear equilibrium about rest, m."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
-        linear = linearize(case)
-    force = np.zeros(case.body.size)
-    force[: case.structure.nodes.size] = sum(p.ravel() for p, _ in case.load_terms)
-    free = force[linear.free]
-    return float(free @ spsolve(linear.stiffness, free) / np.abs(force).sum())
-
-
 def _extrapolated(values: Callable[[int], Any], meshes: tuple[int, int]) -> Any:
     coarse, fine = (np.asarray(values(n)) for n in meshes)
-    return fine + (fine - coarse) / ((meshes[1] / meshes[0]) ** 2 - 1.0)
+    return extrapolated(coarse, fine, meshes[1] / meshes[0])
 
 
 def study(name: str) -> Softness:
@@ -69,7 +57,7 @@ def study(name: str) -> Softness:
     pattern, sheet = given.structure.pattern, given.structure.sheet
 
     def of(structure: Discretized) -> float:
-        return displacement(replace(given, structure=structure))
+        return small_loads(replace(given, structure=structure)).displacement
 
     true = float(_extrapolated(lambda n: of(shell(pattern, sheet, n)), MESHES["studies"]))
     bars = {m: of(discretize(pattern, sheet, bend_law="linear", **o)) for m, o in MODELS.items()}
@@ -96,7 +84,9 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
 
     def of(structure: Discretized) -> NDArray:
         case = steel_case(structure)
-        return np.append(displacement(case), modes(replace(case, loads=()), 3)["frequency"])
+        return np.append(
+            small_loads(case).displacement, modes(replace(case, loads=()), 3)["frequency"]
+        )
 
     fine = _extrapolated(lambda n: of(shell(pattern, STEEL, n, mass="consistent")), MESHES["steel"])
     bars = {m: of(discretize(pattern, STEEL, bend_law="linear", **o)) for m, o in MODELS.items()}

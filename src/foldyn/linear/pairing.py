@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from foldyn.linear import mac
+from foldyn.linear.mac import mac
 
 NEAR = 3e-3  # relative distance of frequencies in a cluster
 FREQUENCY_WEIGHT = 0.05  # of |log(f_b / f_a)| beside 1 - MAC: decides between like shapes
@@ -35,7 +35,7 @@ def clusters(frequency: NDArray) -> NDArray:
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:
     """MAC (ka, kb) of shapes (ka, n, 3) and (kb, n, 3), of whole clusters where there are any."""
-    values = mac(a, b, mass)
+    values = np.nan_to_num(mac(a, b, mass))  # shapes that do not move these nodes are like none
     found = values.copy()
     left, right = clusters(fa), clusters(fb)
     for i in np.unique(left):

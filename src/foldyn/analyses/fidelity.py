@@ -1,0 +1,219 @@
+"""Models beside the shell: [analysis] of kind "fidelity", arguments of `fidelity`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Self
+
+import numpy as np
+import xarray
+from pydantic import Field, PlainValidator, model_validator
+
+from foldyn import plots
+from foldyn.analyses.bars import bar
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of
+from foldyn.analyses.sections import CaseSchema, Count, Section
+from foldyn.analyses.vibration import Secant
+from foldyn.cases import Case
+from foldyn.cases.models import SHELL
+from foldyn.errors import InputError
+from foldyn.linear import Fidelity, fidelity
+from foldyn.linear.advice import percent
+from foldyn.linear.fidelity import MODELS, comparison, named
+from foldyn.linear.shell_of import checked_divisions
+from foldyn.report.album import Album, ByRule
+from foldyn.report.sections import Heading, Table, Text
+from foldyn.report.sections import Section as PageSection
+from foldyn.values import choice, show
+
+
+def _names(value: Any) -> list[str]:
+    if not isinstance(value, list):
+        raise InputError(f' = {show(value)}: must be a list of names, as in ["plate"]')
+    return [choice(f"[{i}]", name, MODELS) for i, name in enumerate(value)]
+
+
+class FidelitySection(Section):
+    """[analysis] of kind "fidelity"."""
+
+    kind: str
+    count: Count = 6
+    divisions: Annotated[Any, PlainValidator(lambda value: checked_divisions(value, ""))] = None
+    models: Annotated[list[str] | None, PlainValidator(_names)] = None
+    secant: Secant = None
+
+
+class FidelityOutput(Section):
+    """[output] of kind "fidelity", which has no keys."""
+
+
+class FidelitySchema(CaseSchema):
+    """A case file of kind "fidelity"."""
+
+    analysis: FidelitySection
+    output: FidelityOutput = Field(default_factory=FidelityOutput)
+
+    @model_validator(mode="after")
+    def _is_no_shell(self) -> Self:
+        if self.model.kind == SHELL:
+            raise InputError(
+                f" = {show(SHELL)}: bars and hinges are compared with the shell, which is made "
+                "from them; leave out kind and what only a shell has",
+                "model.kind",
+            )
+        return self
+
+
+class FidelityAnalysis(Analysis):
+    """Models of bars and hinges beside the shell."""
+
+    kind = "fidelity"
+    schema = FidelitySchema
+    needs_density = "a comparison with the shell needs"
+    takes = arguments_of(fidelity)
+    files = ("fidelity.png",)
+    by_mass = False
+
+    masses: tuple[str, ...] = ()
+    """Further mass rules of the file: models of their own."""
+
+    @classmethod
+    def of(cls, schema: Any, case: Case) -> Self:
+        """See `Analysis`."""
+        own = super().of(schema, case)
+        own.masses = tuple(schema.model.mass or ())[1:]
+        return own
+
+    def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
+        """See `Analysis`."""
+        case, given = case_file.case(mass), {**self.arguments, **changes}
+        others = {f"own ({rule})": {"mass": rule} for rule in self.masses}
+        known = vars(case.structure.options)
+        checked = comparison(
+            case, **{**given, "models": {**others, **named(given["models"], known)}}
+        )
+
+        def compute(progress: bool, begun: Begun) -> xarray.Dataset:
+            begun()
+            with _Steps(progress) as steps:
+                return checked.run(steps).result
+
+        return compute
+
+    def line(self, name: str, result: xarray.Dataset) -> str:
+        """All modes in a table, and the advice."""
+        return str(Fidelity(result))
+
+    @staticmethod
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+        """See `Analysis`."""
+        (first, result), *_ = results.items()
+        found = Fidelity(result)
+        yield Heading("Which model")
+        yield Text(found.advice)
+        yield album.figure(
+            "fidelity",
+            "Above: errors of the models' frequencies over the frequency of the shell, 5 % shaded. "
+            "Below: likeness of the shapes (MAC); modes below 0.5 are lost, and have no error. "
+            "Dashed: 0.6 of the plate frequency, above which panels vibrate as plates.",
+            lambda: plots.plot_fidelity(found),
+        )
+        yield Heading("The numbers")
+        yield _models(found)
+        yield _modes(found)
+        yield Text(_notes(found))
+        yield from album.structure(case_file.case(first))
+
+
+class _Steps:
+    """A bar of so many steps as it is told."""
+
+    def __init__(self, shown: bool) -> None:
+        self.bar = bar(shown, bar_format="{desc} ({elapsed})")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __call__(self, step: str) -> None:
+        self.bar.set_description_str(f"fidelity: {step}")
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.close()
+
+
+def _models(found: Fidelity) -> Table:
+    """A row for each model: its options, its errors, its cost."""
+    result, below = found.result, found.result["frequency"].values < found.limit
+    forces = "deflection" in result
+    header = ["model", "options", "median (%)", "largest (%)", "lost"]
+    header += ["small loads (%)"] if forces else []
+    rows = []
+    for model in found.models:
+        one = result.sel(model=model)
+        error = np.abs(one["error"].values[below])
+        kept = 100.0 * error[np.isfinite(error)]
+        row = [model, one["options"].item()]
+        row += [float(np.median(kept)), float(kept.max())] if len(kept) else [None, None]
+        row.append(int(np.isinf(error).sum()))
+        if forces:
+            row.append(_told(float(one["deflection_error"]), "soft"))
+        rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
+    return Table(
+        [*header, "time (ms)", "of the shell's"],
+        rows,
+        f"Errors against the shell of the {int(below.sum())} modes below 0.6 of the plate "
+        f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest.",
+        digits=3,
+    )
+
+
+def _modes(found: Fidelity) -> Table:
+    """A row for each mode of the shell."""
+    tables = [found.table(model) for model in found.models]
+    rows: list[list[Any]] = []
+    for every in zip(*tables, strict=True):
+        first = every[0]
+        row = [f"{first.mode}{'' if first.below else ' *'}", first.shell, 100.0 * first.mesh_error]
+        rows.append([*row, *(f"{_told(mode.error, 'lost')} ({mode.mac:.2f})" for mode in every)])
+    return Table(
+        ["mode", "shell (Hz)", "mesh (%)", *found.models],
+        rows,
+        "Elastic modes of the shell: frequency extrapolated in the size of its mesh, and how far "
+        "the finer mesh is off; errors of the models in % and, in parentheses, their MAC. * above "
+        "0.6 of the plate frequency.",
+    )
+
+
+def _told(error: float, otherwise: str) -> str:
+    return percent(error).removesuffix(" %") if np.isfinite(error) else otherwise
+
+
+def _notes(found: Fidelity) -> str:
+    facts = found.result.attrs
+    coarse, fine = (int(n) for n in facts["divisions"])
+    notes = [
+        f"The shell has the same pattern, sheet, creases, supports and masses, meshes of {coarse} "
+        f"and {fine} divisions of every edge ({facts['triangles']} triangles) and consistent mass; "
+        "frequencies are extrapolated with the square of the mesh size. Modes are paired by their "
+        "MAC at the nodes that both have, modes of nearly equal frequency as a space. Supports "
+        "hold the same vertices in both."
+    ]
+    if facts["rigid"]:
+        notes.append(f"{facts['rigid']} rigid motions that nothing resists are left out.")
+    if "deflection" in found.result:
+        far = float(found.result["deflection"])
+        notes.append(
+            f"Under the forces in full, were the stiffness that at rest, the shell moves by "
+            f"{far:.4g} m along them in the mean, weighted by the forces."
+        )
+    if "not_forces" in facts:
+        notes.append(f"{facts['not_forces']}: no force, which displacements are not compared for.")
+    if "secant" in facts:
+        notes.append(
+            f"Superlinear hinges have the slope of an oscillation by {facts['secant']:g} degrees."
+        )
+    notes.append(
+        "Times are medians of modal analyses for as many modes of each, measured in this run; "
+        f"the shell's takes {float(found.result['seconds']):.3g} s."
+    )
+    return "\n\n".join(notes)

@@ -1,0 +1,151 @@
+"""Which model a comparison with the shell speaks for, in words that follow from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray
+
+OWN = "own"
+"""Name of the case's own model."""
+GOOD, LARGEST = 0.02, 0.10  # errors: of a model that is left as it is, and of one that can be used
+MESH = 0.02  # error of the mesh that is told
+SCOPE = (
+    "Only small vibrations about rest and small loads were compared: motions and loads that turn "
+    "creases far are not covered."
+)
+
+
+class Reach(NamedTuple):
+    """How far up a model follows the shell: the modes with errors of at most 10 %, from the lowest.
+
+    Attributes
+    ----------
+    model : str
+    count : int
+        How many.
+    worst : float
+        Largest error among them; infinite without any.
+    """
+
+    model: str
+    count: int
+    worst: float
+
+
+def advice(result: xarray.Dataset) -> str:
+    """Sentences on a comparison; see `foldyn.fidelity`."""
+    return " ".join(_sentences(result))
+
+
+def percent(value: float) -> str:
+    """Write a fraction with its sign: "+2.1 %", "-34 %"."""
+    return f"{100.0 * value:+.{0 if abs(value) >= 0.1 else 1}f} %"
+
+
+def size(value: float) -> str:
+    """The same of its size, without a sign."""
+    return percent(abs(value))[1:]
+
+
+def _sentences(result: xarray.Dataset) -> Iterator[str]:
+    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
+    below = int((frequency < limit).sum())
+    reaches = [reach(result, model, below) for model in result["model"].values.tolist()]
+    own, best = reaches[0], min(reaches, key=lambda one: (-one.count, one.worst))
+    if own.count == best.count and own.worst <= max(GOOD, best.worst):
+        best = own
+    if below:
+        yield from _vibrations(result, below, best)
+    else:
+        yield (
+            f"The lowest mode of the shell, {frequency[0]:.4g} Hz, lies above {limit:.4g} Hz, 0.6 "
+            "of the plate frequency: panels vibrate as plates there, which bars and hinges do not. "
+            "Take the shell."
+        )
+    if "deflection" in result:
+        yield _statics(result, best)
+    mesh = float(np.abs(result["mesh_error"].values[: below or None]).max())
+    if mesh > MESH:
+        yield (
+            f"The finer mesh of the shell is itself up to {size(mesh)} off what it tends to: "
+            "compare again with finer divisions."
+        )
+    yield SCOPE
+
+
+def _vibrations(result: xarray.Dataset, below: int, best: Reach) -> Iterator[str]:
+    frequency, limit = result["frequency"].values, float(result.attrs["limit"])
+    if not best.count:
+        yield (
+            f"No model has the lowest mode, {frequency[0]:.4g} Hz, within {size(LARGEST)} of the "
+            "shell: take the shell."
+        )
+    else:
+        top, whole = float(frequency[best.count - 1]), best.count == below
+        upto = f"{top:.4g} Hz"
+        if whole and below < len(frequency):
+            upto = f"{limit:.4g} Hz, 0.6 of the plate frequency"
+        elif whole:
+            upto += ", the highest mode compared"
+        ratio = float(result["cost_ratio"].sel(model=best.model))
+        yield (
+            f"{_called(result, best.model)} is within {size(best.worst)} of the shell up to "
+            f"{upto}, at 1/{ratio:.0f} of its cost{'' if best.model == OWN else ': use it'}."
+        )
+        if not whole:
+            yield (
+                f"The next mode, {frequency[best.count]:.4g} Hz, {_missed(result, best)}: take the "
+                "shell from there."
+            )
+    if best.model != OWN:
+        yield from _own(result, below)
+
+
+def _own(result: xarray.Dataset, below: int) -> Iterator[str]:
+    """What the case's own model does with the modes below the limit."""
+    error = np.abs(result["error"].sel(model=OWN).values[:below])
+    lost = int(np.isinf(error).sum())
+    parts = []
+    if lost < below:
+        parts.append(f"is off by up to {size(float(error[np.isfinite(error)].max()))}")
+    if lost:
+        parts.append(f"has no partner of {lost} of {below} modes")
+    yield f"{_called(result, OWN)} {' and '.join(parts)} there."
+    soft = int(result["soft_hinges"].sel(model=OWN))
+    if soft:
+        yield (
+            f"{soft} of its hinges are superlinear and have no stiffness at rest: take linear "
+            "bends, or judge it with a secant amplitude (secant = 1, in degrees)."
+        )
+
+
+def _statics(result: xarray.Dataset, best: Reach) -> str:
+    """Displacements of the model that is advised, and of the case's own."""
+    errors = result["deflection_error"]
+    told = {one: float(errors.sel(model=one)) for one in dict.fromkeys([best.model, OWN])}
+    texts = (
+        f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
+        for model, error in told.items()
+    )
+    return f"Displacements under its forces, if those are small: {', '.join(texts)}."
+
+
+def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
+    """How far up a model follows the shell among the lowest modes."""
+    error = np.abs(result["error"].sel(model=model).values[:below])
+    bad = np.flatnonzero(error > LARGEST)
+    count = int(bad[0]) if len(bad) else below
+    return Reach(model, count, float(error[:count].max()) if count else float("inf"))
+
+
+def _missed(result: xarray.Dataset, best: Reach) -> str:
+    error = float(result["error"].sel(model=best.model).values[best.count])
+    return "has no partner in it" if np.isinf(error) else f"is off by {size(error)} in it"
+
+
+def _called(result: xarray.Dataset, model: str) -> str:
+    name = "case's own model" if model == OWN else f'model "{model}"'
+    return f"The {name} ({result['options'].sel(model=model).item()})"

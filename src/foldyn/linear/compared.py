@@ -1,0 +1,156 @@
+"""`Fidelity`: what a comparison with the shell found, mode by mode, and what it advises."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from textwrap import fill
+from typing import NamedTuple
+
+import xarray
+
+from foldyn.errors import InputError
+from foldyn.linear.advice import OWN, advice, percent
+from foldyn.values import choice
+
+ABREAST, WIDE = 4, 79  # models beside each other in plain text, and letters of a line
+
+__all__ = ["OWN", "ComparedMode", "Fidelity"]
+
+
+class ComparedMode(NamedTuple):
+    """A mode of the shell and its partner in a model.
+
+    Attributes
+    ----------
+    mode : int
+        Number of the elastic mode of the shell, from 1.
+    shell : float
+        Its frequency, Hz, extrapolated in the size of the mesh.
+    mesh_error : float
+        Relative error of the finer mesh against that.
+    below : bool
+        Whether it lies below 0.6 of the plate frequency.
+    error : float
+        Relative error of the partner's frequency; infinite where the mode is lost: no mode of the
+        model has a MAC of 0.5 or more with it.
+    mac : float
+        Modal assurance criterion of the two.
+    """
+
+    mode: int
+    shell: float
+    mesh_error: float
+    below: bool
+    error: float
+    mac: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fidelity:
+    """A comparison of models with the shell, as `foldyn.fidelity` makes it.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        Its numbers: what `fidelity` computed, or what `fd.load` read from a result of this kind.
+        Dimensions mode and model; the attribute `limit` is 0.6 of the plate frequency (Hz).
+
+    Raises
+    ------
+    InputError
+        Not a result of this kind.
+    """
+
+    result: xarray.Dataset
+
+    def __post_init__(self) -> None:
+        """Check the kind of the result."""
+        kind = getattr(self.result, "attrs", {}).get("foldyn_result")
+        if kind != "fidelity":
+            raise InputError(
+                f": is {'no result' if kind is None else f'a result of the kind {kind}'}; give one "
+                "of fidelity",
+                "result",
+            )
+
+    def __repr__(self) -> str:
+        """One line: how many modes of which models."""
+        below = int((self.result["frequency"].values < self.limit).sum())
+        return (
+            f"<Fidelity of {', '.join(self.models)}: {self.result.sizes['mode']} modes, {below} "
+            f"below {self.limit:.4g} Hz>"
+        )
+
+    def __str__(self) -> str:
+        """A table in plain text, and the advice."""
+        return f"{_text(self)}\n\n{_wrapped(self.advice)}"
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models: "own", then what stands beside it."""
+        return tuple(self.result["model"].values.tolist())
+
+    @property
+    def limit(self) -> float:
+        """0.6 of the plate frequency, Hz: above, modes are those of plates."""
+        return float(self.result.attrs["limit"])
+
+    @property
+    def advice(self) -> str:
+        """Which model is right and up to which frequency, and what was not compared."""
+        return advice(self.result)
+
+    def table(self, model: str = OWN) -> tuple[ComparedMode, ...]:
+        """Modes of the shell beside those of a model."""
+        one = self.result.sel(model=choice("model", model, self.models))
+        names = ("mode", "frequency", "mesh_error", "error", "mac")
+        columns = (one[name].values.tolist() for name in names)
+        return tuple(
+            ComparedMode(mode, shell, mesh, shell < self.limit, error, mac)
+            for mode, shell, mesh, error, mac in zip(*columns, strict=True)
+        )
+
+
+def _wrapped(text: str) -> str:
+    """Lines of a text, numbers beside their units."""
+    held = re.sub(r"(\d) (%|Hz)", "\\1\u00a0\\2", text)
+    return fill(held, WIDE).replace("\u00a0", " ")
+
+
+def _text(found: Fidelity) -> str:
+    """Modes and errors of all models in aligned columns, some models below the others."""
+    parts = [
+        _columns(found, found.models[k : k + ABREAST]) for k in range(0, len(found.models), ABREAST)
+    ]
+    if any(not mode.below for mode in found.table()):
+        parts.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
+    return "\n\n".join(parts)
+
+
+def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
+    """Modes and errors of some models."""
+    result = found.result.sel(model=list(models))
+    tables = [found.table(model) for model in models]
+    rows = [["mode", "shell", *(text for model in models for text in (model, "MAC"))]]
+    for every in zip(*tables, strict=True):
+        first = every[0]
+        row = [f"{first.mode}{'' if first.below else ' *'}", f"{first.shell:.4g} Hz"]
+        for mode in every:
+            row += [percent(mode.error) if math.isfinite(mode.error) else "lost"]
+            row += [f"{mode.mac:.2f}"]
+        rows.append(row)
+    if "deflection" in result:
+        row = ["small loads", f"{result['deflection'].item():.4g} m"]
+        for error in result["deflection_error"].values.tolist():
+            row += [percent(error) if math.isfinite(error) else "soft", ""]
+        rows.append(row)
+    ratios = (text for ratio in result["cost_ratio"].values for text in (f"1/{ratio:.0f}", ""))
+    rows.append(["cost", f"{result['seconds'].item():.2g} s", *ratios])
+    wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first, *others in rows:
+        cells = [text.rjust(n) for text, n in zip(others, wide[1:], strict=True)]
+        lines.append("  ".join([first.ljust(wide[0]), *cells]).rstrip())
+    return "\n".join(lines)

@@ -1,0 +1,307 @@
+"""`fidelity`: how far models of bars and hinges of a case are right, beside its shell."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+import xarray
+
+from foldyn.cases import Case
+from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.linear.compared import OWN, Fidelity
+from foldyn.linear.matched import SPARE, matched
+from foldyn.linear.modes import modes
+from foldyn.linear.operating_point import BALANCED
+from foldyn.linear.reference import Reference, modes_at_rest, reference_modes
+from foldyn.linear.refinement import extrapolated
+from foldyn.linear.shell_of import check_reduced, meshes, shell_of, with_structure
+from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
+from foldyn.materials.law import Law
+from foldyn.results import fidelity_dataset
+from foldyn.statics.tracing import check_movable
+from foldyn.structures import discretize
+from foldyn.structures.plate_frequency import BELOW, plate_frequency
+from foldyn.values import brief, choice, number, show, whole
+
+MODELS: Mapping[str, Mapping[str, Any]] = {
+    "standard": {
+        "scheme": "n5b8", "calibration": "standard", "mass": "mixed_voronoi", "bend_law": "linear",
+    },
+    "plate": {
+        "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
+    },
+}  # fmt: skip
+"""Models that stand beside the case's own: arguments of `discretize` in place of its own."""
+SHOWN = ("calibration", "mass", "bend_law")
+"""Options by which models are told apart."""
+BEYOND = 2  # modes of the shell that are computed, but not compared
+RUNS, SECONDS = 5, 3.0  # how often a modal analysis is timed, unless that takes longer
+
+
+def fidelity(
+    case: Case,
+    count: int = 6,
+    divisions: Sequence[int] | None = None,
+    models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
+    secant: float | None = None,
+    *,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Fidelity:
+    """Compare models of bars and hinges with the shell, for one's own case.
+
+    The shell has the pattern, sheet, creases, supports, loads and masses of the case, and
+    consistent mass. Its lowest elastic modes about rest, extrapolated from two meshes, are paired
+    with those of each model by their MAC at the nodes that both have. Where forces act and
+    supports hold the sheet, displacements along small forces are compared too.
+
+    Parameters
+    ----------
+    case : Case
+        Of bars and hinges, as `discretize` makes them. Histories and damping play no part, loads
+        act in full.
+    count : int
+        How many elastic modes of the shell.
+    divisions : (int, int), optional
+        Pieces of every edge of the two shells: (6, 12), or fewer where the pattern has so many
+        panels that the shell would be large; a warning then says so.
+    models : sequence of str, or mapping of str to mapping, optional
+        What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
+        default all of them, or arguments of `discretize` in place of the case's own, by name.
+    secant : float, optional
+        Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
+        of `modes`.
+    progress : callable
+        Is told the steps, one by one.
+
+    Returns
+    -------
+    Fidelity
+        Its `advice` says which model to use and up to which frequency.
+
+    Raises
+    ------
+    InputError
+        The case is a shell, its structure was changed by hand, the sheet has no density, or it
+        names nodes that are not vertices; a panel cannot be meshed; an argument out of range.
+
+    Warns
+    -----
+    FoldynWarning
+        The shell is coarser than (6, 12); the rest state is no equilibrium.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
+    >>> sheet = fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
+    >>> case = fd.Case(fd.discretize(pattern, sheet), [fd.Fix([0, 1, 2, 3])])
+    >>> result = fd.fidelity(case, count=3, divisions=(4, 8), models=["plate"])
+    >>> [f"{100 * mode.error:+.1f} %" for mode in result.table("plate")]
+    ['...', ...]
+    """
+    return comparison(case, count, divisions, models, secant).run(progress)
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A comparison that is checked, but not begun.
+
+    Attributes
+    ----------
+    case : Case
+        As it was given.
+    count : int
+        How many modes of the shell.
+    shells : (Case, Case)
+        It with the coarser and with the finer shell, its forces alone as loads.
+    compared : mapping of str to Case
+        It with each model, its own first, likewise.
+    not_forces : tuple of int
+        Numbers of the loads that are left out.
+    secant : float or None
+    """
+
+    case: Case
+    count: int
+    shells: tuple[Case, Case]
+    compared: Mapping[str, Case]
+    not_forces: tuple[int, ...]
+    secant: float | None
+
+    def run(self, progress: Callable[[str], None] = lambda step: None) -> Fidelity:
+        """Compute it; `progress` is told the steps, one by one."""
+        began = time.perf_counter()
+        coarse, fine = (one.structure.options.divisions for one in self.shells)
+        progress(f"shell with {coarse} and {fine} divisions")
+        true = reference_modes(*self.shells, self.count + BEYOND)
+        count = min(self.count, len(true.frequency))
+        if not count:
+            raise InputError(": nothing of its shell vibrates; free some of its nodes", "case")
+        found = {}
+        for name, held in self.compared.items():
+            progress(f"model {name}")
+            found[name] = modes_at_rest(held, count + SPARE, self.secant)
+        _warn_of_imbalance(found[OWN].attrs["residual"])
+        pairs = [matched(true, count, held, found[name]) for name, held in self.compared.items()]
+        error = np.stack([pair.error for pair in pairs], axis=1)
+        values: dict[str, Any] = {
+            "frequency": true.frequency[:count],
+            "mesh_error": true.mesh_error[:count],
+            "error": np.where(np.isnan(error), np.inf, error),
+            "mac": np.stack([pair.mac for pair in pairs], axis=1),
+            "options": [_told(held, self.compared[OWN]) for held in self.compared.values()],
+            "soft_hinges": [one.attrs["soft_hinges"] for one in found.values()],
+        }
+        progress("times")
+        values |= self._times(true)
+        if self.compared[OWN].loads and _held(true.found):
+            progress("small loads")
+            values |= self._deflections([name for name, one in found.items() if _held(one)])
+        limit = plate_frequency(self.case.structure.pattern, self.case.structure.sheet)
+        facts = {
+            "limit": BELOW * limit,
+            "plate_frequency": limit,
+            "divisions": [coarse, fine],
+            "triangles": len(true.case.structure.triangles),
+            "rigid": int((true.found["eigenvalue"] <= 0.0).sum()),
+            "secant": self.secant,
+            "not_forces": ", ".join(f"loads[{i}]" for i in self.not_forces) or None,
+            "residual": found[OWN].attrs["residual"],
+            "wall_seconds": time.perf_counter() - began,
+        }
+        return Fidelity(fidelity_dataset(self.case, list(self.compared), values, facts))
+
+    def _times(self, true: Reference) -> dict[str, Any]:
+        """Times of modal analyses for as many modes of all, s, and their ratio."""
+        count, taken = true.found.sizes["mode"], [float(true.found.attrs["wall_seconds"])]
+        shell = _seconds(true.case, count, self.secant, taken)
+        own = np.array([_seconds(held, count, self.secant) for held in self.compared.values()])
+        return {"seconds": shell, "model_seconds": own, "cost_ratio": shell / own}
+
+    def _deflections(self, held: Sequence[str]) -> dict[str, Any]:
+        """Displacements along the forces, work over the forces on the nodes of the case.
+
+        held : names of the models that supports and hinges hold.
+        """
+        coarse, fine = (one.structure.options.divisions for one in self.shells)
+        works = [small_loads(case).work for case in self.shells]
+        true = extrapolated(works[0], works[1], fine / coarse)
+        own = np.array([
+            small_loads(case, self.secant).work if name in held else np.inf
+            for name, case in self.compared.items()
+        ])  # fmt: skip
+        return {
+            "deflection": true / float(np.abs(rest_forces(self.compared[OWN])).sum()),
+            "deflection_mesh_error": works[1] / true - 1.0,
+            "deflection_error": own / true - 1.0,
+        }
+
+
+def comparison(
+    case: Case,
+    count: int = 6,
+    divisions: Sequence[int] | None = None,
+    models: Sequence[str] | Mapping[str, Mapping[str, Any]] | None = None,
+    secant: float | None = None,
+) -> Comparison:
+    """Check a comparison and make its structures; arguments as of `fidelity`."""
+    count = whole("count", count, least=1)
+    if secant is not None:
+        number("secant", secant, above=0.0, most=180.0, unit="degrees")
+    check_reduced(case)
+    forces, others = forces_alone(case)
+    compared = _compared(forces, models)
+    for name, held in compared.items():
+        with within("" if name == OWN else f"models: {name}: "):
+            check_movable(held)
+    coarse, fine = meshes(case.structure.pattern, divisions)
+    shells = shell_of(forces, coarse), shell_of(forces, fine)
+    return Comparison(case, count, shells, compared, tuple(others), secant)
+
+
+def _held(found: xarray.Dataset) -> bool:
+    """Whether something resists every motion."""
+    return bool((found["eigenvalue"] > 0.0).all())
+
+
+def _compared(case: Case, models: Any) -> dict[str, Case]:
+    """The case with its own model and with others, without one that is its own."""
+    structure = case.structure
+    compared = {OWN: with_structure(case, structure)}
+    _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
+    for name, changes in named(models, vars(structure.options)).items():
+        options = {**vars(structure.options), **changes}
+        if options == vars(structure.options):
+            continue
+        with within(f"models: {name}: "):
+            other = discretize(structure.pattern, structure.sheet, **options)
+            _ = other.mass
+        compared[name] = with_structure(case, other)
+    return compared
+
+
+def named(models: Any, known: Iterable[str]) -> Mapping[str, Mapping[str, Any]]:
+    """Arguments of `discretize`, of those `known`, by the name of the model."""
+    if models is None:
+        return MODELS
+    if isinstance(models, Mapping):
+        for name, changes in models.items():
+            if not isinstance(name, str) or name == OWN or not isinstance(changes, Mapping):
+                raise InputError(
+                    f": {show(name)}: give arguments of discretize by the name of the model, as "
+                    '{"stiff": {"calibration": "standard"}}; "own" is the model of the case',
+                    "models",
+                )
+            for key in changes:
+                choice(f"models: {name}: argument", key, known)
+        return models
+    if isinstance(models, str) or not isinstance(models, Iterable):
+        raise InputError(f' = {show(models)}: give a list of names, as ["plate"]', "models")
+    return {choice("models", name, MODELS): MODELS[name] for name in models}
+
+
+def _told(case: Case, own: Case) -> str:
+    """Options of a model as a case file has them: those that tell models apart."""
+    options, others = vars(case.structure.options), vars(own.structure.options)
+    usual = options["scheme"] == others["scheme"] == MODELS["plate"]["scheme"]
+    further = (key for key in options if options[key] != others[key])
+    keys = dict.fromkeys([*(() if usual else ("scheme",)), *SHOWN, *further])
+    return ", ".join(f"{key} = {_written(options[key])}" for key in keys)
+
+
+def _written(value: Any) -> str:
+    return show(value.name if isinstance(value, Law) else value)
+
+
+def _seconds(case: Case, count: int, secant: float | None, taken: Sequence[float] = ()) -> float:
+    """Median of the times of a modal analysis, s; of fewer runs where that takes long.
+
+    taken : times that are known already.
+    """
+    times = list(taken)
+    if not times:
+        modes_at_rest(case, 1, secant)  # what is computed on first use
+    while not times or (len(times) < RUNS and sum(times) < SECONDS):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            found = modes(case, min(count, len(case.free_dofs)), secant=secant)
+        times.append(float(found.attrs["wall_seconds"]))
+    return median(times)
+
+
+def _warn_of_imbalance(residual: float) -> None:
+    if residual > BALANCED:
+        warnings.warn(
+            f"the rest state is no equilibrium: its residual is {residual:.2g} of the forces at "
+            "play (creases with a rest angle of their own, or laws that have a moment at rest); "
+            "what is compared are not free vibrations",
+            FoldynWarning,
+            stacklevel=3,
+        )

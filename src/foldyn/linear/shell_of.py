@@ -1,0 +1,156 @@
+"""The shell that a case of bars and hinges stands for: the same pattern, sheet, supports, loads."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from foldyn.cases import Case, Rayleigh
+from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.linear.reference import DIVISIONS
+from foldyn.patterns import Pattern
+from foldyn.shells import Shell, ShellOptions, shell
+from foldyn.values import show, whole
+
+MOST_TRIANGLES = 15_000
+"""Of a shell that nobody asked for: its modes take ten to twenty seconds."""
+MESH = {"divisions", "mass"}
+"""Options of a shell that a case of bars and hinges does not have."""
+
+
+def check_reduced(case: Any) -> None:
+    """Refuse what is not a case of bars and hinges that a shell can stand for.
+
+    Raises
+    ------
+    InputError
+        Not a case, a shell, a structure that `discretize` did not make, a sheet without density,
+        or a support, load or mass at the center of a panel.
+    """
+    if not isinstance(case, Case):
+        raise InputError(f": got {type(case).__name__}, give a Case", "case")
+    structure = case.structure
+    if structure.kind == Shell.kind:
+        raise InputError(
+            ": is a shell already, with which bars and hinges are compared; make its structure "
+            'with fd.discretize (in a case file model.kind = "bars_and_hinges")',
+            "case",
+        )
+    if structure.pattern is None or not structure.as_made:
+        raise InputError(
+            ": its structure is not as fd.discretize makes it, and a shell cannot be made like it; "
+            "give what differs to fd.discretize",
+            "case",
+        )
+    if structure.sheet.density is None:
+        raise InputError(": missing; frequencies need it (kg/m3)", "sheet.density")
+    _check_nodes(case)
+
+
+def _check_nodes(case: Case) -> None:
+    """Refuse nodes beyond the vertices, which a shell does not have where they are."""
+    count = len(case.structure.pattern.vertices)
+    for place, nodes in _numbered(case):
+        beyond = [node for node in nodes if node >= count]
+        if beyond:
+            panel = np.flatnonzero(case.structure.centers == beyond[0])
+            what = f"is the center of panel {panel[0]}" if len(panel) else "is no vertex"
+            raise InputError(
+                f": node {beyond[0]} {what}, where the shell has no node of this number; name "
+                f"vertices, 0 to {count - 1}",
+                place,
+            )
+
+
+def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
+    """Places of a case that name nodes by number, and the nodes."""
+    for name in ("supports", "loads", "masses"):
+        for i, part in enumerate(getattr(case, name)):
+            for key in ("nodes", "between", "to"):
+                given = getattr(part, key, None)
+                if given is not None and not isinstance(given, str):
+                    yield f"{name}[{i}].{key}", np.ravel(given).tolist()
+
+
+def shell_of(case: Case, divisions: int) -> Case:
+    """The case with a shell of the same pattern, sheet, creases and panels; without damping.
+
+    Its first nodes are the vertices, so supports, loads and masses hold for both.
+    """
+    structure = case.structure
+    own = {item.name for item in fields(structure.options)} - MESH
+    shared = {
+        item.name: getattr(structure.options, item.name)
+        for item in fields(ShellOptions)
+        if item.name in own
+    }
+    with within("shell: "):
+        mesh = shell(
+            structure.pattern, structure.sheet, divisions=divisions, mass="consistent", **shared
+        )
+    return with_structure(case, mesh)
+
+
+def with_structure(case: Case, structure: Any) -> Case:
+    """The case with another structure and without damping, which modes at rest do not need."""
+    with warnings.catch_warnings():  # they were given when the case was made
+        warnings.simplefilter("ignore", FoldynWarning)
+        return replace(case, structure=structure, damping=Rayleigh())
+
+
+def triangle_count(pattern: Pattern, divisions: int) -> int:
+    """Triangles of a shell: two for each cell of a quadrilateral, fans in larger polygons."""
+    fans = {3: 1, 4: 2}
+    return divisions**2 * sum(fans.get(len(face), len(face)) for face in pattern.faces)
+
+
+def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
+    """Divisions of the two shells: as given, or as fine as `DIVISIONS` while that is quick.
+
+    Raises
+    ------
+    InputError
+        Not two increasing numbers; or so many panels that even the coarsest meshes are large.
+
+    Warns
+    -----
+    FoldynWarning
+        The meshes are coarser than `DIVISIONS`.
+    """
+    if given is not None:
+        return checked_divisions(given)
+    whole_size = triangle_count(pattern, DIVISIONS[1])
+    for half in range(DIVISIONS[0], 1, -1):
+        size = triangle_count(pattern, 2 * half)
+        if size > MOST_TRIANGLES:
+            continue
+        if half < DIVISIONS[0]:
+            warnings.warn(
+                f"the shell with {DIVISIONS[1]} divisions would have {whole_size} triangles: it "
+                f"has {2 * half} divisions and {size} triangles; divisions = {DIVISIONS} takes "
+                "the time for the finer one",
+                FoldynWarning,
+                stacklevel=4,
+            )
+        return half, 2 * half
+    raise InputError(
+        f": the shell of {len(pattern.faces)} panels would have "
+        f"{triangle_count(pattern, 4)} triangles even with 4 divisions, more than "
+        f"{MOST_TRIANGLES}; compare fewer cells of the pattern, or give divisions = (2, 4) and "
+        "the time that takes",
+        "divisions",
+    )
+
+
+def checked_divisions(given: Any, name: str = "divisions") -> tuple[int, int]:
+    """Two increasing whole numbers."""
+    if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
+        raise InputError(f" = {show(given)}: give two numbers, as in (6, 12)", name)
+    coarse, fine = (whole(name, value, least=1) for value in given)
+    if coarse >= fine:
+        raise InputError(f" = {show(given)}: the second mesh must be the finer one", name)
+    return coarse, fine

@@ -1,0 +1,104 @@
+"""Models beside the shell: errors of frequencies and the likeness of shapes, over frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from foldyn.errors import InputError
+from foldyn.linear import Fidelity
+from foldyn.linear.matched import LEAST
+from foldyn.plots import style
+from foldyn.plots.modes import hertz
+
+NEAR = 0.05  # errors that are shaded as small
+MOST = 1.0  # errors beyond that are drawn at the edge
+WIDE = 12.0  # ratio of frequencies from which their axis is logarithmic
+MARKERS = "os^DvPX<>*"
+
+
+def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
+    """Draw a comparison with the shell: errors of frequencies, and MAC, over the shell's frequency.
+
+    Parameters
+    ----------
+    fidelity : Fidelity
+        Of `foldyn.fidelity`.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Above, the error of each model for each mode, 5 % shaded, what lies beyond 100 % as an arrow
+        at the edge; below, its MAC, and shaded where modes are lost. The dashed line is 0.6 of the
+        plate frequency, where modes become those of plates.
+
+    Raises
+    ------
+    InputError
+        Not a comparison.
+    """
+    if not isinstance(fidelity, Fidelity):
+        raise InputError("fidelity: give what foldyn.fidelity returns")
+    result = fidelity.result
+    frequency, error = result["frequency"].values, result["error"].values
+    labels = ["error of the frequency (%)", "MAC"]
+    figure, (upper, lower) = style.rows(
+        (8.0, 5.6), title, "frequency of the shell (Hz)", labels, heights=[1.6, 1.0]
+    )
+    shown = np.append(error[np.isfinite(error)], [-2.0 * NEAR, 2.0 * NEAR]).clip(-MOST, MOST)
+    bottom, top = 115.0 * shown.min(), 115.0 * shown.max()
+    upper.axhspan(-100.0 * NEAR, 100.0 * NEAR, color="#EAF3EA", zorder=0.5)
+    upper.axhline(0.0, color=style.GRAY, linewidth=0.8)
+    lower.axhspan(-0.05, LEAST, color="#F3EDED", zorder=0.5)
+    keys = []
+    for k, model in enumerate(fidelity.models):
+        look = {"color": style.CYCLE[k % len(style.CYCLE)], "marker": MARKERS[k % len(MARKERS)]}
+        look |= {"markersize": 5.0, "markerfacecolor": "white", "markeredgewidth": 1.2}
+        line = {"linewidth": 0.7, "linestyle": (0, (1, 2))}
+        found = np.isfinite(error[:, k])
+        inside = found & (np.abs(error[:, k]) <= MOST)
+        upper.plot(frequency[inside], 100.0 * error[inside, k], **look, **line)
+        beyond = found & ~inside
+        arrow = look | {"marker": "$\\uparrow$", "markersize": 9.0, "linestyle": "none"}
+        upper.plot(frequency[beyond], np.full(beyond.sum(), 107.0 * MOST), **arrow)
+        lower.plot(frequency, result["mac"].values[:, k], **look, **line)
+        keys.append(style.key(_named(model), **look, **line))
+    upper.set_ylim(bottom, top)
+    lower.set_ylim(-0.05, 1.05)
+    _note(lower, "lost")
+    _along(upper, lower, frequency, fidelity.limit)
+    if fidelity.limit < upper.get_xlim()[1]:
+        for axes in (upper, lower):
+            axes.axvline(fidelity.limit, color=style.BLACK, linewidth=1.0, linestyle=(0, (4, 2)))
+        text = f"0.6 of the plate frequency, {hertz(fidelity.limit)} Hz"
+        dashes = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+        keys.append(style.key(text, **dashes))
+    return style.finish(figure, keys, columns=4, width=7.6)
+
+
+def _named(model: str) -> str:
+    return "the case's own model" if model == "own" else model
+
+
+def _note(axes: Axes, text: str) -> None:
+    """Write into the shaded part at the bottom."""
+    axes.text(0.006, 0.06, text, transform=axes.transAxes, ha="left", va="bottom", **style.FINE)
+
+
+def _along(upper: Axes, lower: Axes, frequency: np.ndarray, limit: float) -> None:
+    """Set the axis of frequencies: from zero, or logarithmic where they span more than a decade."""
+    low, high = float(frequency[0]), float(frequency[-1])
+    if high > WIDE * low:
+        for axes in (upper, lower):
+            axes.set_xscale("log")
+        upper.set_xlim(low / 1.15, high * 1.15)
+        lower.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        lower.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        lower.xaxis.set_minor_locator(NullLocator())
+        return
+    reach = high if limit > 1.6 * high else max(high, limit)
+    upper.set_xlim(0.0, 1.06 * reach)

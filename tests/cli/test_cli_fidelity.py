@@ -1,0 +1,151 @@
+"""`foldyn fidelity`: any case file beside its shell, and case files of this kind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.analyses.reading import read_as
+from foldyn.errors import FoldynWarning, InputError
+
+FOLD = """
+title = "a fold"
+[pattern]
+kind = "simple_fold"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+mass = ["mixed_voronoi", "consistent"]
+bend_law = "linear"
+[[supports]]
+nodes = [0, 1, 2, 3]
+[[supports]]
+base = "x"
+history = { kind = "step" }
+[[loads]]
+nodes = [4, 5]
+force = [0, 0, 1e-4]
+history = { kind = "half_sine", duration = 0.05 }
+[initial]
+velocity = [0, 0, 1]
+[analysis]
+kind = "dynamics"
+duration = 0.1
+"""
+KIND = FOLD.split("[initial]")[0] + '[analysis]\nkind = "fidelity"\ncount = 2\ndivisions = [2, 4]\n'
+
+
+def test_a_motion_beside_the_shell(workplace) -> None:
+    workplace.write(FOLD)
+    done = workplace.call("fidelity", "case.toml", "--count", "3", "--divisions", "3", "6")
+    assert done.status == 0
+    assert done.err.splitlines() == [
+        "foldyn: warning: case.toml: foldyn fidelity leaves out [initial]: small vibrations about "
+        "rest are compared, and displacements under the loads"
+    ]
+    folder = "case-fidelity"
+    names = ("fidelity.png", "laws.png", "report.html", "result.nc", "structure.png")
+    assert done.new == [folder, *(f"{folder}/{name}" for name in names)]
+    found = fd.Fidelity(fd.load(f"{folder}/result.nc"))
+    assert found.models == ("own", "own (consistent)", "plate")  # "standard" is its own
+    assert found.result.attrs["divisions"].tolist() == [3, 6]
+    assert "deflection" in found.result  # the load acts in full
+    told = done.out
+    assert told.startswith("a fold: 8 nodes, ")
+    assert str(found) in told
+    page = (workplace.folder / folder / "report.html").read_text()
+    assert "Which model" in page and "foldyn fidelity case.toml --count 3" in page
+    for model in found.models:
+        (row,) = [part for part in page.split("<tr>") if f"<td>{model}</td><td>calibration" in part]
+        worst = max(abs(mode.error) for mode in found.table(model) if mode.below)
+        assert f"{100 * worst:.3g}" in row
+    assert page.count("<img") == 3
+
+
+def test_a_case_file_of_this_kind(workplace) -> None:
+    workplace.write(KIND + 'models = ["plate"]\n')
+    done = workplace.call("run", "case.toml", "--no-figures")
+    assert (done.status, done.err) == (0, "")
+    assert done.new == ["case-results", "case-results/result.nc"]
+    stored = fd.load("case-results/result.nc")
+    case_file = fd.read_case("case.toml")
+    again = case_file.run()
+    np.testing.assert_allclose(again["error"], stored["error"], rtol=1e-9)
+    plain = fd.fidelity(case_file.case(), 2, (2, 4), ["plate"]).result
+    np.testing.assert_array_equal(plain["error"], again["error"].sel(model=["own", "plate"]))
+    more = case_file.run(count=1, models=[])
+    assert more["model"].values.tolist() == ["own", "own (consistent)"]
+    assert more.sizes["mode"] == 1
+
+
+def test_flags_stand_in_for_the_file(workplace) -> None:
+    workplace.write(KIND)
+    read = read_as(workplace.folder / "case.toml", "fidelity", {"count": 5, "models": ["plate"]})
+    given = {"count": 5, "divisions": (2, 4), "models": ["plate"], "secant": None}
+    assert read.analysis.arguments == given
+    assert read.masses == ["mixed_voronoi"]
+
+
+def test_a_response_without_its_drive(workplace) -> None:
+    response = KIND.split("[[supports]]\nbase")[0] + (
+        '[[drive]]\nnodes = [4, 5]\nforce = [0, 0, 1]\n[analysis]\nkind = "frf"\n'
+        "frequencies = [1.0]\n"
+    )
+    workplace.write(response)
+    with pytest.warns(FoldynWarning, match=r"leaves out \[drive\]"):
+        read = read_as(workplace.folder / "case.toml", "fidelity", {})
+    assert read.case().loads == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            'mass = ["mixed_voronoi", "consistent"]\nbend_law = "linear"',
+            'kind = "shell"',
+            'model.kind = "shell": bars and hinges are compared with the shell',
+        ),
+        ("density = 1.0\n", "", "sheet.density: missing; a comparison with the shell needs it"),
+        ("[2, 4]", "[4]", "analysis.divisions = [4]: give two numbers, as in (6, 12)"),
+        ("[2, 4]", "[4, 2]", "analysis.divisions = [4, 2]: the second mesh must be the finer"),
+        ("count = 2", "count = 0", "analysis.count = 0: must be at least 1"),
+        (
+            "count = 2",
+            'models = ["plates"]',
+            "analysis.models[0] = \"plates\": did you mean 'plate'? choose one of standard, plate",
+        ),
+        ("count = 2", 'models = "plate"', 'analysis.models = "plate": must be a list of names'),
+        (
+            "count = 2",
+            "count = 2\n[output]\nnodes = [1]",
+            "output.nodes: only for analysis.kind = ",
+        ),
+        (
+            "nodes = [0, 1, 2, 3]",
+            "nodes = [0, 1, 2, 6]",
+            "supports[0].nodes: node 6 is the center of panel 0, where the shell has no node",
+        ),
+        ('"consistent"]', '"equi_inertia"]', "model.mass[1] = "),
+    ],
+)
+def test_what_is_refused(workplace, old, new, message) -> None:
+    assert KIND.count(old) == 1
+    text = KIND.replace(old, new)
+    if "[output]" in new:
+        head, tail = text.split("[output]\nnodes = [1]")
+        text = head + tail.lstrip("\n") + "[output]\nnodes = [1]\n"
+    done = workplace.run(text)
+    assert done.status == 2
+    assert done.err.startswith(f"foldyn: case.toml: {message}"), done.err
+    assert done.new == []
+
+
+def test_a_mass_rule_that_is_refused_is_told_before_anything_runs(workplace) -> None:
+    obtuse = KIND.replace('kind = "simple_fold"', 'kind = "miura"\npanel_angle = 30\nb = 4')
+    workplace.write(obtuse.replace('"consistent"', '"circumcenter"'))
+    with pytest.raises(InputError, match=r"models: own \(circumcenter\): .*circumcenter"):
+        fd.read_case("case.toml").computation()

@@ -1,0 +1,397 @@
+"""Models beside the shell, for one's own case: against the study, by symmetry, and bad input."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear import fidelity as compare_models
+from foldyn.linear.advice import SCOPE, percent, reach
+from foldyn.linear.fidelity import MODELS, comparison
+from foldyn.linear.shell_of import meshes, shell_of, triangle_count
+from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
+from foldyn.studies.fidelity.stored import RESULTS, read
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+PLATE = {"calibration": "plate", "mass": "consistent", "bend_law": "linear"}
+UNIT = {"cells": (1, 1), "a": 1.0, "b": 1.0, "panel_angle": 60, "dihedral": 60}
+FOLDING = [fd.Fix([0, 1, 2], "x"), fd.Fix([1], "y"), fd.Fix([0, 2, 6, 8], "z")]  # case study 2
+SUPPORTS = {"folding": FOLDING, "free": []}
+
+
+def fold(**options) -> fd.Structure:
+    """A simple fold, which takes milliseconds."""
+    return fd.discretize(fd.patterns.simple_fold(), SHEET, **options)
+
+
+def held(*loads, **options) -> fd.Case:
+    return fd.Case(fold(**(options or {"bend_law": "linear"})), [fd.Fix([0, 1, 2, 3])], loads)
+
+
+@pytest.fixture(scope="module")
+def miura():
+    """Case study 2 with linear bends and its load."""
+    structure = fd.discretize(fd.patterns.miura(**UNIT), SHEET, bend_law="linear")
+    case = fd.Case(structure, FOLDING, [fd.Force([7], (0.01, 0, 0), fd.HalfSine(0.5))])
+    return case, fd.fidelity(case, count=8)
+
+
+@pytest.fixture(scope="module")
+def quick():
+    """A fold on a coarse mesh, all models."""
+    case = held(fd.Force([4, 5], (0, 0, 1e-4)), bend_law="superlinear")
+    return case, fd.fidelity(case, 5, (3, 6))
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_errors_are_those_of_the_study(support, miura):
+    """The same shell, models and pairing as the stored tables, on which nothing of this ran."""
+    name = f"miura, cells 1x1, a 1, b 1, panel_angle 60, dihedral 60, {support}, L* 1"
+    (stored,) = [m for m in read(RESULTS / "documented.csv") if m.case == name]
+    found = miura[1]
+    if support == "free":
+        found = fd.fidelity(fd.Case(miura[0].structure), count=8)
+        assert found.result.attrs["rigid"] == 6
+    for model, kept in (("own", "standard, mixed_voronoi"), ("plate", "plate, consistent")):
+        rows = [mode for mode in found.table(model) if mode.below]
+        assert len(rows) == len(stored.rows[kept]) >= 3
+        for mode, row in zip(rows, stored.rows[kept], strict=True):
+            assert mode.mode == row.mode
+            assert mode.shell == pytest.approx(row.shell, rel=1e-5)
+            assert mode.shell / found.limit * 0.6 == pytest.approx(row.over_plate, abs=1e-4)
+            assert mode.error == pytest.approx(row.error, abs=1e-4)
+            assert mode.mac == pytest.approx(row.mac, abs=1e-4)
+
+
+def test_displacements_are_those_of_the_study(miura):
+    """Case study 2 of docs/fidelity.md: 23.9 mm, -28 % and +0.3 % beside 8 and 16 divisions."""
+    result = miura[1].result
+    assert float(result["deflection"]) == pytest.approx(23.95e-3, abs=1e-4)
+    assert result["deflection_error"].values == pytest.approx([-0.28, 0.002], abs=5e-3)
+    assert 0.0 < float(result["deflection_mesh_error"]) < 0.011  # a coarser mesh is softer
+
+
+def test_the_models_of_case_study_2(miura):
+    """The case's own is "standard", which is left out; the plate's errors are the smaller ones."""
+    case, found = miura
+    assert found.models == ("own", "plate")
+    own, plate = (found.table(model) for model in found.models)
+    assert max(abs(m.error) for m in plate if m.below) < 0.06
+    assert max(abs(m.error) for m in own if m.below) > 0.4
+    assert any(math.isinf(m.error) and m.mac < 0.5 for m in plate)  # a plate's mode, lost
+    assert found.result["cost_ratio"].min() > 10.0
+    assert 'The model "plate" (calibration = "plate", mass = "consistent"' in found.advice
+    assert "within 5.9 % of the shell up to 3.835 Hz, 0.6 of the plate frequency" in found.advice
+    assert found.advice.endswith(SCOPE)
+    assert repr(found) == "<Fidelity of own, plate: 8 modes, 3 below 3.835 Hz>"
+    assert fd.case_of(found.result).loads == case.loads
+
+
+def test_warnings_of_the_case_are_not_repeated(recwarn):
+    partly = [fd.Fix([0, 1, 2, 3]), fd.Impose([4], "z", 0.1)]
+    case = fd.Case(fold(**PLATE), partly, [fd.Force([4, 5], (0, 0, 1e-4))])
+    assert len(recwarn) == 1  # the force acts in part where a node is moved
+    found = fd.fidelity(case, 2, (2, 4))
+    assert len(recwarn) == 1
+    assert "small loads" in str(found)
+
+
+def test_numbers_stand_beside_their_units(quick):
+    text = str(quick[1])
+    assert max(map(len, text.splitlines())) <= 79
+    assert quick[1].advice == " ".join(text.split("\n\n")[-1].splitlines())
+    assert not any(line.startswith(("%", "Hz")) for line in text.splitlines())
+
+
+def test_a_case_with_the_right_model_keeps_it():
+    found = fd.fidelity(fd.Case(fold(**PLATE), [fd.Fix([0, 1, 2, 3])]), 2, (4, 8))
+    assert found.models == ("own", "standard")
+    assert found.advice.startswith('The case\'s own model (calibration = "plate"')
+    assert "use it" not in found.advice
+    assert "Displacements" not in found.advice  # there are no loads
+    assert "deflection" not in found.result
+
+
+def test_a_free_sheet_has_no_displacement_under_its_weight():
+    case = fd.Case(fold(**PLATE), [], [fd.Gravity((0, 0, -9.81))])
+    result = fd.fidelity(case, 2, (2, 4), models=[]).result
+    assert result.attrs["rigid"] == 6
+    assert "deflection" not in result
+    assert (result["frequency"] > 0.0).all()
+
+
+def test_superlinear_bends_have_no_stiffness(quick):
+    case, found = quick
+    assert found.models == ("own", "standard", "plate")
+    assert int(found.result["soft_hinges"].sel(model="own")) == 8
+    assert np.isinf(found.result["deflection_error"].sel(model="own"))
+    assert np.isfinite(found.result["deflection_error"].sel(model="plate"))
+    assert "8 of its hinges are superlinear and have no stiffness at rest" in found.advice
+    assert "no stiffness at all (own)" in found.advice
+    assert "soft" in str(found)
+    swung = fd.fidelity(case, 3, (2, 4), ["plate"], secant=5.0)
+    assert np.isfinite(swung.result["deflection_error"]).all()
+    assert "no stiffness" not in swung.advice
+
+
+def test_a_kresling_cell_vibrates_as_plates():
+    """Triangles that are held at their base have no mode below the limit: take the shell."""
+    pattern = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
+    case = fd.Case(fd.discretize(pattern, SHEET, **PLATE), [fd.Fix("zmin")])
+    found = fd.fidelity(case, 3, (2, 4), models=["standard"])
+    assert not any(mode.below for mode in found.table())
+    assert found.table()[1].shell == pytest.approx(found.table()[2].shell, rel=1e-3)  # symmetry
+    assert "Take the shell." in found.advice
+    assert str(found).count(" * ") == 3
+    assert "\n* above 0.6 of the plate frequency, 1.365 Hz" in str(found)
+
+
+def test_it_is_read_as_it_was_saved(quick, tmp_path):
+    _, found = quick
+    fd.save(found.result, tmp_path / "fidelity.nc")
+    again = fd.Fidelity(fd.load(tmp_path / "fidelity.nc"))
+    assert str(again) == str(found)
+    assert again.table("plate") == found.table("plate")
+
+
+def test_the_shell_is_held_and_loaded_as_the_case():
+    pattern = fd.patterns.miura((2, 1), panel_angle=60, dihedral=80)
+    structure = fd.discretize(
+        pattern, SHEET, fold_law="linear", crease_stiffness={"mountain": 0.2}, clamped=[(0, 1)],
+        rigid=[1], bend_law="linear",
+    )  # fmt: skip
+    parts = [fd.Fix("xmin"), fd.Spring(3.0, [12]), fd.Link([13, 14], "z"), fd.BaseMotion("x")]
+    case = fd.Case(
+        structure, parts, [fd.TotalForce((0, 0, 2.0), edges="xmax"), fd.Pressure(0.5)],
+        fd.Rayleigh(0.1), [fd.PointMass([8], 0.7)],
+    )  # fmt: skip
+    made = shell_of(case, 4)
+    assert made.supports == case.supports and made.loads == case.loads
+    assert made.masses == case.masses
+    assert made.rayleigh == fd.Rayleigh()
+    for name in ("fold_law", "crease_stiffness", "clamped", "rigid"):
+        assert getattr(made.structure.options, name) == getattr(structure.options, name)
+    np.testing.assert_allclose(made.structure.fold_stiffness, structure.fold_stiffness)
+    np.testing.assert_array_equal(
+        np.flatnonzero(made.fixed[: len(pattern.vertices)].all(axis=1)), [0, 1, 2]
+    )
+    assert made.total_mass == pytest.approx(case.total_mass)
+    mean = [rest_forces(one).reshape(-1, 3).sum(axis=0) for one in (case, made)]
+    np.testing.assert_allclose(mean[0], mean[1], rtol=1e-6, atol=1e-12)
+    assert np.abs(mean[0]).max() > 2.0  # the pressure, too
+
+
+def test_what_is_no_force_is_left_out():
+    """Of an actuated and heated fold under a force only the force counts."""
+    push = fd.Force([4, 5], (0, 0, 1e-4))
+    case = held(fd.Actuate("all", 100), push, fd.CreaseMoment("all", 1e-3))
+    alone, others = forces_alone(case)
+    assert (alone.loads, others) == ((push,), [0, 2])
+    found = fd.fidelity(case, 1, (2, 4), models=[])
+    assert found.result.attrs["not_forces"] == "loads[0], loads[2]"
+    expected = fd.fidelity(held(push), 1, (2, 4), models=[])
+    assert float(found.result["deflection"]) == float(expected.result["deflection"])
+
+
+def test_pressure_is_a_force():
+    """On a plate of two flat rigid panels under a small pressure: p b a^2/2 on the crease k."""
+    pattern = fd.Pattern(
+        [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], [[0, 1, 4, 3], [1, 2, 5, 4]]
+    )
+    structure = fd.discretize(pattern, SHEET, crease_stiffness=0.1, rigid="all", fold_law="linear")
+    case = fd.Case(structure, [fd.Fix([0, 1, 3, 4])], [fd.Pressure(1e-3, [1])])
+    turn = 1e-3 * 0.5 / 0.1  # rad
+    assert small_loads(case).work == pytest.approx(1e-3 * 0.5 * turn, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("panels", "given", "expected"),
+    [(4, None, (6, 12)), (4, (4, 9), (4, 9)), (60, None, (5, 10)), (400, None, (2, 4))],
+)
+def test_divisions(panels, given, expected):
+    pattern = strip(panels)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert meshes(pattern, given) == expected
+    told = [str(one.message) for one in caught]
+    assert len(told) == (given is None and expected != (6, 12))
+    if told:
+        assert f"would have {288 * panels} triangles: it has {expected[1]} divisions" in told[0]
+
+
+def strip(panels: int) -> fd.Pattern:
+    """Flat squares in a row."""
+    x = np.arange(panels + 1.0)
+    points = np.concatenate([np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x + 1])])
+    n = panels + 1
+    return fd.Pattern(points, [[k, k + 1, n + k + 1, n + k] for k in range(panels)])
+
+
+def test_triangles_are_counted():
+    patterns = [strip(3), fd.patterns.kresling(sides=5, radius=1.0, height=0.9, twist=20)]
+    angle = np.arange(6) * np.pi / 3
+    patterns.append(fd.Pattern(np.column_stack([np.cos(angle), np.sin(angle)]), [range(6)]))
+    for pattern in patterns:
+        made = fd.shell(pattern, SHEET, 4)
+        assert triangle_count(pattern, 4) == len(made.triangles)
+
+
+def test_models_of_ones_own(quick):
+    case, _ = quick
+    found = fd.fidelity(case, 2, (2, 4), {"bubble": {**PLATE, "mass": "bubble"}, "same": {}})
+    assert found.models == ("own", "bubble")
+    assert found.result["options"].values.tolist() == [
+        'calibration = "standard", mass = "mixed_voronoi", bend_law = "superlinear"',
+        'calibration = "plate", mass = "bubble", bend_law = "linear"',
+    ]
+    cut = comparison(held(scheme="n4b5", bend_law="linear"), 2, (2, 4), ["plate"])
+    assert cut.compared["plate"].structure.options.scheme == "n5b8"
+    assert set(MODELS) == {"standard", "plate"}
+
+
+def test_a_rest_state_out_of_balance_is_told():
+    case = held(crease_rest=80.0, bend_law="linear")
+    with pytest.warns(FoldynWarning, match="the rest state is no equilibrium"):
+        fd.fidelity(case, 1, (2, 4), models=[])
+
+
+def advised(frequency, errors, limit=100.0, **more):
+    """Advice on made-up errors."""
+    case = held()
+    from foldyn.results import fidelity_dataset
+
+    k, m = np.shape(errors)
+    values = {
+        "frequency": frequency, "mesh_error": np.full(k, 0.001), "error": errors,
+        "mac": np.where(np.isinf(errors), 0.1, 0.99), "seconds": 2.0,
+        "options": ["a", "b"][:m], "soft_hinges": [0] * m, "model_seconds": [0.02] * m,
+        "cost_ratio": [100.0] * m, **more,
+    }  # fmt: skip
+    return fd.Fidelity(fidelity_dataset(case, ["own", "plate"][:m], values, {"limit": limit}))
+
+
+def test_advice_follows_from_the_numbers():
+    inf = np.inf
+    own = advised([10.0, 20.0], [[0.015, 0.001], [-0.019, 0.001]]).advice
+    assert own.startswith("The case's own model (a) is within 1.9 % of the shell up to 20 Hz, the")
+    other = advised([10.0, 20.0, 120.0], [[0.34, 0.03], [inf, -0.04], [0, 0]]).advice
+    assert 'The model "plate" (b) is within 4.0 % of the shell up to 100 Hz, 0.6 of' in other
+    assert "at 1/100 of its cost: use it." in other
+    assert "own model (a) is off by up to 34 % and has no partner of 1 of 2 modes there" in other
+    partly = advised([10.0, 20.0, 30.0], [[0.5, 0.01], [0.5, 0.02], [0.5, inf]])
+    assert 'plate" (b) is within 2.0 % of the shell up to 20 Hz, at' in partly.advice
+    assert "The next mode, 30 Hz, has no partner in it: take the shell from" in partly.advice
+    none = advised([10.0, 20.0], [[0.5, -0.2], [0.0, 0.0]]).advice
+    assert "No model has the lowest mode, 10 Hz, within 10 % of the shell: take the" in none
+    coarse = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([0.0, -0.05]))
+    assert "The finer mesh of the shell is itself up to 5.0 % off" in coarse.advice
+    assert reach(partly.result, "plate", 3) == ("plate", 2, 0.02)
+
+
+def test_percent():
+    assert [percent(x) for x in (0.021, -0.34, 1.5, -0.0004)] == [
+        "+2.1 %", "-34 %", "+150 %", "-0.0 %",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.structure, r"case: got Structure, give a Case"),
+        (
+            lambda c: fd.Case(fd.shell(c.structure.pattern, SHEET, 3)),
+            r"case: is a shell already, .* with fd.discretize",
+        ),
+        (
+            lambda c: fd.Case(replace(c.structure, bar_area=2 * c.structure.bar_area)),
+            r"case: its structure is not as fd.discretize makes it",
+        ),
+        (
+            lambda c: fd.Case(fd.discretize(c.structure.pattern, replace(SHEET, density=None))),
+            r"sheet.density: missing; frequencies need it \(kg/m3\)",
+        ),
+        (
+            lambda c: replace(c, supports=[fd.Fix([0, 1, 2, 3]), fd.Fix([7], "z")]),
+            r"supports\[1\].nodes: node 7 is the center of panel 1, .* name vertices, 0 to 5",
+        ),
+        (
+            lambda c: replace(c, loads=[fd.Force([6], (0, 0, 1.0))], supports=()),
+            r"loads\[0\].nodes: node 6 is the center of panel 0",
+        ),
+        (
+            lambda c: replace(c, masses=[fd.PointMass([6], 1.0)]),
+            r"masses\[0\].nodes: node 6 is the center of panel 0",
+        ),
+        (
+            lambda c: replace(c, supports=[fd.Link([7], to=[2, 3, 4])]),
+            r"supports\[0\].nodes: node 7 is the center of panel 1",
+        ),
+    ],
+)
+def test_cases_that_are_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        fd.fidelity(change(held()))
+
+
+def test_a_panel_that_no_shell_has_is_refused():
+    arrow = fd.Pattern([[0, 0], [2, 1], [0, 2], [0.5, 1]], [[0, 1, 2, 3]])
+    case = fd.Case(fd.discretize(arrow, SHEET, scheme="n4b5", bend_law="linear"))
+    with pytest.raises(InputError, match=r"shell: .* not convex enough to be meshed"):
+        fd.fidelity(case, models=[])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"count": 0}, "count = 0: must be a whole number, at least 1"),
+        ({"divisions": 12}, "divisions = 12: give two numbers, as in (6, 12)"),
+        ({"divisions": (8, 8)}, "divisions = [8, 8]: the second mesh must be the finer one"),
+        ({"divisions": (0, 8)}, "divisions = 0: must be a whole number, at least 1"),
+        ({"secant": 0.0}, "secant = 0.0: must be"),
+        ({"models": "plate"}, 'models = "plate": give a list of names, as ["plate"]'),
+        ({"models": ["plates"]}, "models = \"plates\": did you mean 'plate'? choose one of"),
+        ({"models": {"own": {}}}, 'models: "own": give arguments of discretize by the name'),
+        ({"models": {"a": {"massed": 1}}}, 'models: a: argument = "massed": did you mean'),
+        ({"models": {"a": {"mass": "heavy"}}}, 'models: a: mass = "heavy": choose one of'),
+    ],
+)
+def test_arguments_that_are_refused(arguments, message):
+    with pytest.raises(InputError) as caught:
+        compare_models(held(), **arguments)
+    assert str(caught.value).startswith(message)
+
+
+def test_patterns_that_are_too_large_are_refused():
+    structure = fd.discretize(strip(500), SHEET, bend_law="linear")
+    with pytest.raises(InputError, match=r"divisions: the shell of 500 panels would have 16000"):
+        fd.fidelity(fd.Case(structure))
+
+
+def test_a_model_that_cannot_move_is_refused():
+    square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2, 3]])
+    corners = [fd.Fix([0, 1, 2, 3])]
+    still = fd.Case(fd.discretize(square, SHEET, scheme="n4b5", bend_law="linear"), corners)
+    with pytest.raises(InputError, match=r"^supports: hold every node along x, y and z"):
+        fd.fidelity(still)
+    moving = fd.Case(fd.discretize(square, SHEET, bend_law="linear"), corners)
+    with pytest.raises(InputError, match=r"^models: cut: supports: hold every node"):
+        fd.fidelity(moving, models={"cut": {"scheme": "n4b5"}})
+    rows = fd.fidelity(moving, 6, (3, 6), models=[]).table()
+    assert [row.shell for row in rows] == sorted(row.shell for row in rows)  # extrapolated, too
+    assert rows[0].mac == 0.0  # nothing moves where both have nodes
+
+
+def test_only_comparisons_are_shown(quick):
+    case, found = quick
+    with pytest.raises(InputError, match=r"result: is a result of the kind modes; give one of"):
+        fd.Fidelity(fd.modes(replace(case, loads=()), 1, secant=1.0))
+    with pytest.raises(InputError, match="result: is no result"):
+        fd.Fidelity(found)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="model = \"plates\": did you mean 'plate'"):
+        found.table("plates")
