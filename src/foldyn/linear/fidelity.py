@@ -22,19 +22,25 @@ from foldyn.linear.reference import Reference, modes_at_rest, reference_modes
 from foldyn.linear.refinement import extrapolated
 from foldyn.linear.shell_of import check_reduced, meshes, shell_of, with_structure
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
+from foldyn.materials import Superlinear
 from foldyn.materials.law import Law
 from foldyn.results import fidelity_dataset
 from foldyn.statics.tracing import check_movable
-from foldyn.structures import discretize
+from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
 from foldyn.values import brief, choice, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
         "scheme": "n5b8", "calibration": "standard", "mass": "mixed_voronoi", "bend_law": "linear",
+        "straight": (),
     },
     "plate": {
         "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
+        "straight": (),
+    },
+    "n5b8e": {
+        "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
     },
 }  # fmt: skip
 """Models that stand beside the case's own: arguments of `discretize` in place of its own."""
@@ -72,7 +78,7 @@ def fidelity(
         panels that the shell would be large; a warning then says so.
     models : sequence of str, or mapping of str to mapping, optional
         What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
-        default all of them, or arguments of `discretize` in place of the case's own, by name.
+        default those of them that take its other options, or arguments of `discretize` in place of the case's own, by name.
     secant : float, optional
         Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
         of `modes`.
@@ -236,7 +242,8 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     structure = case.structure
     compared = {OWN: with_structure(case, structure)}
     _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
-    for name, changes in named(models, vars(structure.options)).items():
+    chosen = _usual(structure) if models is None else named(models, vars(structure.options))
+    for name, changes in chosen.items():
         options = {**vars(structure.options), **changes}
         if options == vars(structure.options):
             continue
@@ -247,10 +254,14 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     return compared
 
 
+def _usual(structure: Structure) -> Mapping[str, Mapping[str, Any]]:
+    """The models that take a structure's other options."""
+    refused = bool(structure.options.clamped) or isinstance(structure.fold_law, Superlinear)
+    return {name: MODELS[name] for name in MODELS if name != "n5b8e" or not refused}
+
+
 def named(models: Any, known: Iterable[str]) -> Mapping[str, Mapping[str, Any]]:
     """Arguments of `discretize`, of those `known`, by the name of the model."""
-    if models is None:
-        return MODELS
     if isinstance(models, Mapping):
         for name, changes in models.items():
             if not isinstance(name, str) or name == OWN or not isinstance(changes, Mapping):

@@ -15,7 +15,7 @@ def plate_frequency(pattern: Pattern, sheet: Sheet) -> float:
     """First frequency (Hz) of a free square plate as large as a panel.
 
     Its side is the panel's longest edge, or the root of its area where that is longer: with five
-    corners and more. Of several panels, and of panels with sheets of their own the lowest one; nan of a sheet without density.
+    corners and more. Of all panels the lowest one; nan of a sheet without density.
     """
     count, x = len(pattern.faces), pattern.vertices
     speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
