@@ -88,10 +88,8 @@ class FidelityAnalysis(Analysis):
         """See `Analysis`."""
         case, given = case_file.case(mass), {**self.arguments, **changes}
         others = {f"own ({rule})": {"mass": rule} for rule in self.masses}
-        known = vars(case.structure.options)
-        checked = comparison(
-            case, **{**given, "models": {**others, **named(given["models"], known)}}
-        )
+        models = {**others, **named(given["models"], case.structure)}
+        checked = comparison(case, **{**given, "models": models})
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             begun()

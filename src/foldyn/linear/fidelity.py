@@ -78,7 +78,8 @@ def fidelity(
         panels that the shell would be large; a warning then says so.
     models : sequence of str, or mapping of str to mapping, optional
         What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
-        default those of them that take its other options, or arguments of `discretize` in place of the case's own, by name.
+        default those of them that take its other options, or arguments of `discretize` in place
+        of the case's own, by name.
     secant : float, optional
         Amplitude (degrees) of the turns of superlinear hinges, which have no stiffness at rest; as
         of `modes`.
@@ -242,8 +243,7 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     structure = case.structure
     compared = {OWN: with_structure(case, structure)}
     _ = structure.mass  # its rule may refuse this pattern: say so before anything runs
-    chosen = _usual(structure) if models is None else named(models, vars(structure.options))
-    for name, changes in chosen.items():
+    for name, changes in named(models, structure).items():
         options = {**vars(structure.options), **changes}
         if options == vars(structure.options):
             continue
@@ -254,14 +254,14 @@ def _compared(case: Case, models: Any) -> dict[str, Case]:
     return compared
 
 
-def _usual(structure: Structure) -> Mapping[str, Mapping[str, Any]]:
-    """The models that take a structure's other options."""
-    refused = bool(structure.options.clamped) or isinstance(structure.fold_law, Superlinear)
-    return {name: MODELS[name] for name in MODELS if name != "n5b8e" or not refused}
+def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
+    """Arguments of `discretize` by the name of the model.
 
-
-def named(models: Any, known: Iterable[str]) -> Mapping[str, Mapping[str, Any]]:
-    """Arguments of `discretize`, of those `known`, by the name of the model."""
+    By default all models of `MODELS` that take the other options of the structure.
+    """
+    if models is None:
+        refused = structure.options.clamped or isinstance(structure.fold_law, Superlinear)
+        return {name: MODELS[name] for name in MODELS if name != "n5b8e" or not refused}
     if isinstance(models, Mapping):
         for name, changes in models.items():
             if not isinstance(name, str) or name == OWN or not isinstance(changes, Mapping):
@@ -271,7 +271,7 @@ def named(models: Any, known: Iterable[str]) -> Mapping[str, Mapping[str, Any]]:
                     "models",
                 )
             for key in changes:
-                choice(f"models: {name}: argument", key, known)
+                choice(f"models: {name}: argument", key, vars(structure.options))
         return models
     if isinstance(models, str) or not isinstance(models, Iterable):
         raise InputError(f' = {show(models)}: give a list of names, as ["plate"]', "models")
