@@ -231,7 +231,15 @@ def test_a_pendulum_on_a_spring_keeps_its_energy():
         assert motion.attrs["energy_error"] < most
 
 
-@pytest.mark.parametrize("method", ["rk4", "central_difference", "dormand_prince", "newmark"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        "rk4",
+        pytest.param("central_difference", marks=pytest.mark.slow),
+        "dormand_prince",
+        "newmark",
+    ],
+)
 def test_the_energy_balance_closes_with_springs_and_damping(method):
     s = structure("bars and hinges", FOLD, HEAVY)
     case = fd.Case(

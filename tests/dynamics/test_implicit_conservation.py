@@ -42,7 +42,9 @@ def energy(motion) -> np.ndarray:
     return total.to_numpy()
 
 
-@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
+@pytest.mark.parametrize(
+    "mass", ["mixed_voronoi", pytest.param("consistent", marks=pytest.mark.slow)]
+)
 def test_free_flight_over_1e4_steps(mass):
     """Energy and angular momentum to 1e-8 (found: 1e-12), linear momentum to rounding.
 

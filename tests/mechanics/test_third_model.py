@@ -49,7 +49,9 @@ def test_statics(method):
     assert path.strain_springs.attrs["long_name"] == "strain energy of the springs"
 
 
-@pytest.mark.parametrize("method", ["rk4", "generalized_alpha"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("rk4", marks=pytest.mark.slow), "generalized_alpha"]
+)
 def test_motions(method):
     """A small vibration of known frequency, lightly damped by the mass."""
     alpha, amplitude = 0.4, 1e-4

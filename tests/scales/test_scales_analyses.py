@@ -185,10 +185,14 @@ ALL = {
     )
     for name, run in cases.items()
 }  # fmt: skip
+LONG = ("motion: base", "motion: imposed")
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")  # of the analysis, not of units
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in ALL],
+)
 def test_results_do_not_depend_on_the_units(name):
     check(name, seeds=[sum(name.encode())])
 

@@ -239,6 +239,7 @@ def test_folds_from_tracked_photographs() -> None:
         evaluation.static_test(photographs().drop_vars("load"), "")
 
 
+@pytest.mark.slow
 def test_a_specimen_that_slid_along_y() -> None:
     """It stands on the plate unglued."""
     straight, slid = photographs(), photographs()
@@ -262,6 +263,7 @@ def test_tracks_that_are_not_of_the_specimen(change, message) -> None:
         evaluation.static_test(change(photographs()), "")
 
 
+@pytest.mark.slow
 def test_a_softer_sheet_is_taken_for_softer_folds() -> None:
     """What the model cannot say goes into the parameters: bends are softer, too."""
     found = calibration.fit_folds(evaluation.static_test(photographs(synthetic.SOFTER), ""))
@@ -286,6 +288,7 @@ def released(motion, tmp_path_factory):
     return evaluation.fit_release(history, folder, {}, COARSER)
 
 
+@pytest.mark.slow
 def test_damping_and_press_are_found_again(released) -> None:
     assert released.press == pytest.approx(calibration.PRESSED, rel=5e-3)  # it still rings
     fit = released.fits["glued"]
