@@ -17,7 +17,7 @@ from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.method_choice import AUTO, choose
-from foldyn.dynamics.methods import Integrator, method_of, suited
+from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
@@ -164,7 +164,7 @@ def prepare(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE
         )
         integrator = method_of(method)
-    integrator = _with_radius(integrator, spectral_radius)
+    integrator, case = _with_radius(integrator, spectral_radius), with_mass(integrator, case)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
     critical = integrator.critical_step(case, u)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -191,9 +192,15 @@ def suited(name: str, case: Case) -> Integrator:
     return method
 
 
+def with_mass(method: Integrator, case: Case) -> Case:
+    """The case for a method: without dofs that have no mass where the method needs one."""
+    other = None if method.massless else case.structure.condensed
+    return case if other is None else replace(case, structure=other)
+
+
 def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
-    if case.structure.massless and not method.massless:
+    if with_mass(method, case).structure.massless and not method.massless:
         return f"{case.structure.massless} have no mass"
     if method.conserving and not case.body.has_discrete_gradient:
         return "the forces of this structure have no discrete gradient"
@@ -224,4 +231,5 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     r from 0 to the largest rate at which modal damping, dashpots and creases damp any motion: for
     RK4 ``|R(s dt)| <= 1``.
     """
-    return suited(method, case).critical_step(case, u)
+    chosen = suited(method, case)
+    return chosen.critical_step(with_mass(chosen, case), u)
