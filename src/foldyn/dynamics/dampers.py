@@ -14,6 +14,7 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
+from foldyn.mechanics.attached import GROUND
 from foldyn.mechanics.body import Body, Numbering
 from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
 
@@ -54,13 +55,13 @@ def dampers(case: Case) -> Dampers:
         ends = dashpot.ends(case.structure, place)
         if dashpot.coefficient == 0.0:
             continue
-        if dashpot.between is not None and dashpot.along is None:
+        along = dashpot.directions
+        if along is None:
             pairs.append(ends)
             strength.append(np.full(len(ends), dashpot.coefficient))
             continue
-        along = dashpot.along
-        block = np.eye(3) if along is None else np.outer(along, along)
-        constant = constant + _fixed(ends, dashpot.coefficient * block, body.size)
+        block = dashpot.coefficient * (along.T @ along)
+        constant = constant + _fixed(ends, block, body.size)
     ends = np.concatenate(pairs)
     return Dampers(sparse.csr_array(constant), _elements(case, body, nodes, ends, strength))
 
@@ -84,7 +85,8 @@ def _elements(
 
 
 def _fixed(ends: NDArray, block: NDArray, size: int) -> sparse.csr_array:
-    """Matrix of dashpots to the ground (k, 1), or between pairs (k, 2), of a block (3, 3) each."""
+    """Matrix of dashpots between ends (k, 2), of a block (3, 3) each."""
+    ends = ends[:, ends[0] != GROUND]
     sign = np.array([1.0]) if ends.shape[1] == 1 else np.array([1.0, -1.0])
     within = np.einsum("i,j,pq->ipjq", sign, sign, block).reshape(3 * len(sign), -1)
     dofs = (3 * ends[:, :, None] + np.arange(3)).reshape(len(ends), -1)
