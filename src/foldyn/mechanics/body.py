@@ -54,9 +54,14 @@ class FoldHinges(NamedTuple):
     per_hidden: float  # rad/m
 
     @property
+    def length(self) -> NDArray:
+        """Length of each (k,), m."""
+        return np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
+
+    @property
     def share(self) -> NDArray:
         """Length of each (k,) over that of its whole fold."""
-        length = np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
+        length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
 
 
