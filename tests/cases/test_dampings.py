@@ -6,26 +6,21 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 S = fd.discretize(fd.patterns.miura(), SHEET, bend_law="linear")
-CASE = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+CASE = (
+    HELD_MIURA_TEXT
+    + """\
 [model]
 bend_law = "linear"
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 """
+)
 
 
 def test_one_is_kept_as_given_and_several_add_up():
