@@ -7,6 +7,7 @@ import pytest
 from casefile_checks import check, edited
 
 import foldyn as fd
+from case_texts import FOLD_TEXT
 from foldyn.analyses import read_case
 from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.cases.models import MODELS
@@ -14,15 +15,9 @@ from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
 # case study 1 of the paper, loaded slowly
-FOLD = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+FOLD = (
+    FOLD_TEXT
+    + """\
 [model]
 kind = "bars_and_hinges"
 [[supports]]
@@ -39,6 +34,7 @@ steps = 1
 [output]
 nodes = [0, 1]
 """
+)
 SHELL = ('kind = "bars_and_hinges"', 'kind = "shell"\ndivisions = 2')
 STATICS = 'kind = "statics"\nsteps = 1'
 MOTION = (STATICS, 'kind = "dynamics"\nduration = 1.0')

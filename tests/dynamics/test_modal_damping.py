@@ -7,8 +7,9 @@ import pytest
 from oscillators import equal_steps
 
 import foldyn as fd
-from foldyn.dynamics import METHODS
-from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics import METHODS, modal_damping
+from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.modal_damping import modal_rows, rows_of
 from foldyn.signals import matrix_pencil
 
 RATIOS = (0.02, 0.05)
@@ -163,3 +164,18 @@ def test_an_unstable_state_is_refused():
     u[2:, 0] = -0.3
     with pytest.raises(fd.errors.InputError, match='the state "start" is unstable'):
         fd.simulate(case, 0.1, initial=fd.State(u))
+
+
+@pytest.mark.parametrize("method", ["rk4", "generalized_alpha", "auto"])
+def test_modes_are_computed_once(method, monkeypatch):
+    """The critical step, the choice of a method and the motion take the same modes."""
+    seen = []
+
+    def counted(*arguments):
+        seen.append(arguments)
+        return rows_of(*arguments)
+
+    monkeypatch.setattr(modal_damping, "rows_of", counted)
+    case = sheet("bars", damping=fd.ModalDamping(RATIOS, state="start"))
+    prepare(case, 0.1, method, every=0.01)
+    assert len(seen) == 1

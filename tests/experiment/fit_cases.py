@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-FOLD = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+from case_texts import FOLD_TEXT
+
+FOLD = (
+    FOLD_TEXT
+    + """
 [model]
 fold_law = {{ kind = "enhanced", theta1 = 45, theta2 = 290 }}
 [damping]
@@ -24,6 +20,7 @@ nodes = [0, 1]
 axes = "z"
 {rest}
 """
+)
 PRESSED = FOLD.format(
     rest="""
 [[supports]]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from sheets import compression, total_force
 from trusses import APEX, VonMises, apex
 
 import foldyn as fd
+from foldyn.errors import FoldynWarning
 from foldyn.statics import OrigamiProblem, trace
 
 PAPER = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
@@ -173,3 +176,23 @@ def test_inertia_relief_in_the_linear_limit():
     found = deformation(fd.Case(s), path.displacement.values[0]) - rest
     assert np.abs(expected).max() > 1e-9
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_a_problem_takes_its_case_as_it_is_checked(monkeypatch):
+    """Loads are told apart without making the case again: nothing is tied or told twice."""
+    s = flat_miura(dihedral=150.0)
+    supports = [fd.Fix("xmin"), fd.Link("xmax", "x")]
+    loads = [fd.Force([0, 24], (1.0, 0, 0)), fd.Gravity("-z"), fd.Pressure(1e-3)]
+    with pytest.warns(FoldynWarning, match="acts in part where supports hold"):
+        case = fd.Case(s, supports, loads)
+    ties = case.constraints
+    monkeypatch.setattr("foldyn.cases.supported.equations_of", None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        problem = OrigamiProblem(case, (1,))
+    push, weight = loads[0].forces(s, ""), loads[1].weight(s.nodal_mass)
+    np.testing.assert_array_equal(problem.growing, ties.force(push.ravel()))
+    np.testing.assert_array_equal(problem.constant, ties.force(weight.ravel()))
+    rest = np.zeros(s.nodes.size)
+    assert not problem.following_force(rest, 0.0).any()  # the pressure grows with the factor
+    assert problem.following_force(rest, 1.0).any()

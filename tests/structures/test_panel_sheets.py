@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 import foldyn as fd
+from case_texts import MIURA_TEXT
 from foldyn.analyses.provenance import provenance
 from foldyn.errors import InputError
 from foldyn.plots.scene import Sheet3D
@@ -222,14 +223,9 @@ def test_wrong_panels(make, message):
         make()
 
 
-FILE = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+FILE = (
+    MIURA_TEXT
+    + """
 {panels}
 [model]
 kind = "{kind}"
@@ -243,6 +239,7 @@ force = [0, 0, 1e-5]
 kind = "statics"
 load_factors = [1]
 """
+)
 PANELS = """[[sheet.panels]]
 panels = [2, 0]
 thickness = 0.03

@@ -7,6 +7,7 @@ import pytest
 from mass_samples import HEXAGON, PANELS, PENTAGON
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import InputError
 from foldyn.structures.plate import ACUTE, ALONE, COMPLIANCE, OBTUSE, POLYGON, SKEW, TRIANGLE
 
@@ -153,24 +154,18 @@ def test_what_stays_as_in_the_standard_calibration():
 
 
 def test_case_files_and_results_keep_it(tmp_path):
-    text = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+    text = (
+        HELD_MIURA_TEXT
+        + """\
 [model]
 calibration = "plate"
 mass = "bubble"
 bend_law = "linear"
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 count = 2
 """
+    )
     (tmp_path / "case.toml").write_text(text, "utf-8")
     found = fd.read_case(tmp_path / "case.toml").run()
     fd.save(found, tmp_path / "modes.nc")

@@ -20,7 +20,7 @@ from foldyn.dynamics import (
 )
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
-from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -137,12 +137,15 @@ class Integrator(NamedTuple):
             return Implicit(self.scheme, packed, course, plan, jumps(case))
         return Compiled(self.loop, packed, course, plan, 1 if self.adaptive else threads_of(packed))
 
-    def critical_step(self, case: Case, u: ArrayLike | None = None) -> float:
-        """See `critical_step`."""
+    def critical_step(
+        self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None
+    ) -> float:
+        """See `critical_step`; `modal` is the modal damping of a motion from u, if it is known."""
         if self.growth is None:
             return np.inf
-        start = None if u is None else np.asarray(u, float)
-        rate = damper_rate(case, u) + modal_rows(case, start).rate
+        if modal is None:
+            modal = modal_rows(case, None if u is None else np.asarray(u, float))
+        rate = damper_rate(case, u) + modal.rate
         omega = largest_frequency(case, u)
         return MARGIN * stability_limit(self.growth, omega, case.rayleigh, rate)
 

@@ -24,7 +24,6 @@ from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import ModelOptions, Structure
-from foldyn.structures.swelling import panel_of_triangle
 from foldyn.values import choice, show, vector
 
 PER_NODE = 5000.0
@@ -146,8 +145,8 @@ def discretize(
         onset = plate_onset(bends, large)
 
     x = mesh.nodes
-    clamps = clamp_rows(edges, mesh.triangles)
-    clamped_panel = panel_of_triangle(mesh.triangles, mesh.triangle_panel, clamps)
+    clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
+    clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     structure = Structure(
         nodes=x,

@@ -39,7 +39,7 @@ from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.plates_body import BarsPlatesBody
 from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
+from foldyn.structures.swelling import Chords, Swelling, chords
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
@@ -269,25 +269,27 @@ class Structure(Discretized):
                 'take "n5b8"',
                 "scheme",
             )
-        turns = np.zeros(0)
-        for kind in self.hinge_kinds:
-            change = np.zeros(len(kind.nodes))
-            for wing in (2, 3):
-                corners = kind.nodes[:, [0, 1, wing]]
-                panel = panel_of_triangle(self.triangles, self.triangle_panel, corners)
-                change -= curvature[panel] * chord_turns(self.nodes[corners])
-            turns = np.concatenate([turns, change])
+        of_hinges, of_clamps = self._chords
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
         tension = -stiffness * self.bar_law.stress(1.0 + free)
         parts = [tensions(self.nodes, self.bars, tension)]
         if len(self.clamps):
             edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
-            panel = panel_of_triangle(self.triangles, self.triangle_panel, self.clamps)
-            turn = -curvature[panel] * chord_turns(self.nodes[self.clamps])
+            turn = of_clamps.turns(curvature)
             rows = np.column_stack([self.clamps, np.full(len(self.clamps), -1)])
             parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
-        return Swelling(turns, joined((part, 0) for part in parts))
+        return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
+
+    @cached_property
+    def _chords(self) -> tuple[Chords, Chords]:
+        """How curvature turns its hinges, folds first, and its clamps."""
+        hinges = np.concatenate([kind.nodes for kind in self.hinge_kinds])
+        of_hinges, of_clamps = (
+            chords(self.nodes, self.triangles, self.triangle_panel, rows)
+            for rows in (hinges, self.clamps)
+        )
+        return of_hinges, of_clamps
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
