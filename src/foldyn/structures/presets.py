@@ -1,0 +1,88 @@
+"""Named models: the options of `discretize` that belong together.
+
+A preset gives what is left out. Without one it is "plate", unless an option is given that stands
+for the model of the paper: a calibration of its own, or superlinear bends without a calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from foldyn.errors import InputError
+from foldyn.materials import EnhancedLinear, PlateSuperlinear, Superlinear, bar_law, hinge_law
+from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.structure import ModelOptions
+from foldyn.values import choice
+
+PLATE, HERKAL, MERLIN2 = "plate", "herkal", "merlin2"
+
+PRESETS: Mapping[str, ModelOptions] = {
+    PLATE: ModelOptions(),
+    HERKAL: ModelOptions(
+        mass="mixed_voronoi", bend_law="superlinear", calibration="standard"
+    ),
+    MERLIN2: ModelOptions(
+        mass="mixed_voronoi", bend_law="superlinear", calibration="merlin2",
+        fold_law=EnhancedLinear(rest="as_published"),
+    ),
+}  # fmt: skip
+"""Options by name of the preset.
+
+plate : panels that bend and twist as thin plates; right about the shell's frequencies and small
+    displacements (docs/fidelity.md).
+herkal : the model of Herkal et al., Int. J. Solids Struct. 309, 2025.
+merlin2 : MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
+    has no mass, and gets that of "herkal".
+"""
+
+
+def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
+    """All options of a model.
+
+    Parameters
+    ----------
+    preset : {"plate", "herkal", "merlin2"}, optional
+        See the module for what its absence means.
+    **given
+        Fields of `ModelOptions` that replace those of the preset, unless they are None.
+
+    Raises
+    ------
+    InputError
+        An option is unknown, or two of them do not go together.
+    """
+    known = {name: value for name, value in given.items() if value is not None}
+    base = PRESETS[implied(known) if preset is None else choice("preset", preset, PRESETS)]
+    options = ModelOptions(**{**vars(base), **known})
+    choice("mass", options.mass, MASS_RULES)
+    bar_law(options.bar_law)
+    hinge_law(options.fold_law, "fold_law")
+    _check_bends(options)
+    return options
+
+
+def implied(given: Mapping[str, Any]) -> str:
+    """Name of the preset that options stand for where none is named."""
+    if "calibration" in given:
+        return PLATE if given["calibration"] == "plate" else HERKAL
+    bends = hinge_law(given.get("bend_law", "linear"), "bend_law")
+    return HERKAL if isinstance(bends, Superlinear) else PLATE
+
+
+def _check_bends(options: ModelOptions) -> None:
+    """Refuse laws of bends that have no meaning with the stiffness of the calibration."""
+    bends = hinge_law(options.bend_law, "bend_law")
+    of_plates = options.calibration == "plate"
+    if isinstance(bends, PlateSuperlinear) and bends.onset is None and not of_plates:
+        raise InputError(
+            ' = "plate_superlinear": has a plate\'s stiffness for small turns, which only '
+            'calibration = "plate" gives to bends; set it, or give PlateSuperlinear(onset=...)',
+            "bend_law",
+        )
+    if isinstance(bends, Superlinear) and of_plates:
+        raise InputError(
+            ' = "superlinear": takes the stiffness of large turns, calibration = "plate" gives '
+            'that of small ones; take "linear" or "plate_superlinear", or preset = "herkal"',
+            "bend_law",
+        )
