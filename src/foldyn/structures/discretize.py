@@ -122,7 +122,7 @@ def discretize(
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
     if options.calibration == "plate":
-        folds = plate.fold_stiffness(folds, pattern, sheet)
+        folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
         bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
         onset = plate_onset(bends, large)
 
