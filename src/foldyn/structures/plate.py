@@ -74,7 +74,8 @@ def fold_stiffness(
     """
     free = _free_edges(pattern)
     share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
-    share[slice(None) if rigid == "all" else list(rigid or ())] = 0.0
+    stiff = range(len(share)) if isinstance(rigid, str) else rigid or ()
+    share[list(stiff)] = 0.0
     length = lengths(pattern.vertices, pattern.creases)
     modulus = sheet.values("bending_modulus", len(pattern.faces))
     panels = (share * pattern.face_areas / modulus)[pattern.crease_faces].sum(axis=1)
