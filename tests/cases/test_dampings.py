@@ -170,7 +170,7 @@ def test_more_ratios_than_modes_that_swing():
 
 def test_hinges_without_slope_are_told():
     """Superlinear bends at rest: modes that only they resist are left out, with a warning."""
-    s = fd.discretize(fd.patterns.miura(), SHEET)
+    s = fd.discretize(fd.patterns.miura(), SHEET, preset="herkal")
     case = fd.Case(s, [fd.Fix("xmin")], damping=fd.ModalDamping(0.02, 2))
     with pytest.warns(fd.errors.FoldynWarning, match="damping: .* modal damping leaves them out"):
         fd.simulate(case, 0.01)

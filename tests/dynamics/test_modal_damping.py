@@ -21,7 +21,7 @@ def sheet(model: str, mass: str | None = None, modulus: float = 1e5, **more) -> 
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=60, dihedral=80)
     if model == "bars":
         laws = {"bend_law": "linear", "fold_law": "linear", "bar_law": "linear"}
-        s = fd.discretize(pattern, material, mass=mass or "circumcenter", **laws)
+        s = fd.discretize(pattern, material, mass=mass or "circumcenter", **laws, preset="herkal")
     else:
         s = fd.shell(pattern, material, divisions=2, mass=mass or "lumped", fold_law="linear")
     return fd.Case(s, [fd.Fix("xmin", "xyz")], **{"damping": fd.ModalDamping(RATIOS)} | more)
@@ -158,7 +158,13 @@ def test_free_bodies_keep_their_momenta():
 def test_an_unstable_state_is_refused():
     """About a state of compression modes have no frequency."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=170)
-    s = fd.discretize(pattern, fd.Sheet(1e4, 0.25, 0.01, 1.0), fold_law="linear", bend_law="linear")
+    s = fd.discretize(
+        pattern,
+        fd.Sheet(1e4, 0.25, 0.01, 1.0),
+        fold_law="linear",
+        bend_law="linear",
+        preset="herkal",
+    )
     case = fd.Case(s, [fd.Fix([0, 1])], damping=fd.ModalDamping(0.1, 2, "start"))
     u = np.zeros_like(s.nodes)
     u[2:, 0] = -0.3

@@ -10,6 +10,7 @@ FOLD = (
     FOLD_TEXT
     + """
 [model]
+preset = "herkal"
 fold_law = {{ kind = "enhanced", theta1 = 45, theta2 = 290 }}
 [damping]
 alpha = 0.4

@@ -18,13 +18,13 @@ PAPER = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
 
 def flat_miura(cells=(2, 2), dihedral=180.0, **model):
     pattern = fd.patterns.miura(cells=cells, a=0.03, b=0.03, panel_angle=60, dihedral=dihedral)
-    return fd.discretize(pattern, PAPER, fold_law="linear", **model)
+    return fd.discretize(pattern, PAPER, fold_law="linear", **model, preset="herkal")
 
 
 def deployment(s, cells=(2, 2)):
     """Every fold actuated to its angle in the sheet folded to 90 degrees; held at six dofs."""
     folded = fd.patterns.miura(cells=cells, a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    goal = np.degrees(fd.discretize(folded, PAPER).fold_rest)
+    goal = np.degrees(fd.discretize(folded, PAPER, preset="herkal").fold_rest)
     width = 2 * cells[1]
     corner = (2 * cells[0]) * (width + 1)
     supports = [fd.Fix([0], "xyz"), fd.Fix([width], "xz"), fd.Fix([corner], "z")]
@@ -120,7 +120,7 @@ def test_adaptive_load_is_in_equilibrium():
 
 def free_sheet(loads):
     pattern = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    return fd.Case(fd.discretize(pattern, PAPER), [], loads)
+    return fd.Case(fd.discretize(pattern, PAPER, preset="herkal"), [], loads)
 
 
 def deformation(case, u):
@@ -155,7 +155,7 @@ def test_free_fall_is_no_load():
 def test_inertia_relief_in_the_linear_limit():
     """K u = p - M R (R' M R)^-1 R' p, solved with the pseudo-inverse of the singular K."""
     pattern = fd.patterns.miura(cells=(1, 1), a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    s = fd.discretize(pattern, PAPER, bend_law="linear", fold_law="linear")
+    s = fd.discretize(pattern, PAPER, bend_law="linear", fold_law="linear", preset="herkal")
     load = fd.Force([4], (0.0, 1e-7, 2e-7))
     path = trace(fd.Case(s, [], [load]), load_factors=[1.0], inertia_relief=True)
     n = len(s.nodes)

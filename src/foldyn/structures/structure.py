@@ -51,14 +51,14 @@ CALIBRATIONS = ("standard", "merlin2", "plate")
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """Arguments of `discretize` besides pattern and sheet; see there."""
+    """Options of a structure, all of them; see `discretize` and `foldyn.structures.presets`."""
 
     scheme: Literal["n5b8", "n4b5", "n5b8e"] = "n5b8"
-    mass: str = "mixed_voronoi"
+    mass: str = "consistent"
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
-    bend_law: str | HingeLaw = "superlinear"
-    calibration: Literal["standard", "merlin2", "plate"] = "standard"
+    bend_law: str | HingeLaw = "linear"
+    calibration: Literal["standard", "merlin2", "plate"] = "plate"
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
