@@ -23,10 +23,14 @@ from foldyn.studies.fidelity.statics import STUDIES
 
 LAWS: Mapping[str, Mapping[str, Any]] = {
     "standard, superlinear": {},
-    "plate, linear": {"calibration": "plate", "bend_law": "linear"},
-    "plate, plate_superlinear": {"calibration": "plate", "bend_law": "plate_superlinear"},
+    "plate, linear": {"calibration": "plate", "mass": "consistent", "bend_law": "linear"},
+    "plate, plate_superlinear": {
+        "calibration": "plate",
+        "mass": "consistent",
+        "bend_law": "plate_superlinear",
+    },
 }
-"""Options of `discretize`."""
+"""Options of `discretize`: the models of the large loads and of the large motions."""
 LOADS = (0.1, 1.0, 3.0)  # of the paper's
 TURNS = (1.0, 8.0, 35.0)  # lifts of a panel's corner over its thickness
 PANELS = {"1 x 1, 60 degrees": (60.0, 1.0), "1 x 1.5, 75 degrees": (75.0, 1.5)}
