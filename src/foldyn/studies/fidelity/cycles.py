@@ -108,7 +108,7 @@ def phase(x: NDArray, dt: float, low: float, high: float) -> tuple[NDArray, NDAr
             break
     skipped = (len(x) - len(tone)) // 2
     about = x[skipped : skipped + len(tone)] - mean
-    share = 1.0 - np.var(about - tone.real) / np.var(about)
+    share = 1.0 - np.var(about - np.real(tone)) / np.var(about)
     return dt * (skipped + np.arange(len(tone))), angle, float(share)
 
 

@@ -86,11 +86,14 @@ def write(path: Path, found: Iterable[Run]) -> None:
 def read(path: Path = STORED) -> list[Run]:
     """A table that `write` wrote."""
     with path.open(encoding="utf-8", newline="") as file:
-        lines = list(csv.reader(file))[1:]
+        lines = list(csv.DictReader(file))
     return [
-        Run(*names, float(mesh), float(share), _numbers(period), _numbers(alike), note)
-        for *names, mesh, share, period, alike, note in lines
-    ]
+        Run(
+            line["case"], line["start"], line["model"], float(line["mesh"]), float(line["share"]),
+            _numbers(line["periods [s]"]), _numbers(line["mac"]), line["note"],
+        )
+        for line in lines
+    ]  # fmt: skip
 
 
 def _numbers(text: str) -> tuple[float, ...]:

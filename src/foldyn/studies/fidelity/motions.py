@@ -151,7 +151,7 @@ def released(
     true = reference(case)
     release = Release.of(case, made[SHELL], shape[0])
     within = _reachable(release, made[SHELL], amplitudes)
-    held = {model: release.held(own, np.radians(within)) for model, own in made.items()}
+    held = {model: release.held(own, np.radians(within).tolist()) for model, own in made.items()}
     dt = 1.0 / (STEPS * frequency[0])
 
     def move(model: str, k: int) -> Motion:
