@@ -26,15 +26,17 @@ def compute() -> tuple[fd.Case, fd.Fidelity]:
 
 
 def check(result: fd.Fidelity) -> None:
-    """The plate calibration follows the shell to 0.6 of the plate frequency, the standard not."""
-    own, plate = (result.table(model)[:BELOW] for model in ("own", "plate"))
+    """Plates follow the shell to 0.6 of the plate frequency, n5b8e best, the standard not."""
+    own, plate, edges = (result.table(model)[:BELOW] for model in ("own", "plate", "n5b8e"))
     assert [mode.below for mode in result.table()] == [True] * BELOW + [False] * 4
     assert max(abs(mode.error) for mode in plate) < 0.08
     assert min(mode.mac for mode in plate) > 0.94
+    assert max(abs(mode.error) for mode in edges) < 0.02
     assert min(mode.error for mode in own) > 0.25
     assert max(abs(mode.mesh_error) for mode in plate) < 0.02
     softness = dict(zip(result.models, result.result["deflection_error"].values, strict=True))
     np.testing.assert_allclose(softness["plate"], 0.06, atol=0.02)
+    np.testing.assert_allclose(softness["n5b8e"], 0.03, atol=0.01)
     assert softness["own"] < -0.6
     assert "use it" in result.advice
 
