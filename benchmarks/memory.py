@@ -23,7 +23,9 @@ def run(steps: int) -> None:
     """Compute a motion of 333 dofs and print this process's peak memory (MiB)."""
     pattern = fd.patterns.miura(cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=60)
     paper = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
-    structure = fd.discretize(pattern, paper, fold_law=fd.EnhancedLinear(theta1=75, theta2=285))
+    structure = fd.discretize(
+        pattern, paper, fold_law=fd.EnhancedLinear(theta1=75, theta2=285), preset="herkal"
+    )
     load = fd.Force([0], (1e-3, 0.0, 0.0), fd.Harmonic(9.0))
     supports = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
     case = fd.Case(structure, supports, [load])

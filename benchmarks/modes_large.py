@@ -23,7 +23,7 @@ def sheet(cells: int) -> fd.Case:
     """A sheet of cells x cells, the edge at x = 0 held."""
     pattern = fd.patterns.miura(cells=(cells, cells), a=0.025, b=0.025, panel_angle=60, dihedral=60)
     paper = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
-    structure = fd.discretize(pattern, paper)
+    structure = fd.discretize(pattern, paper, preset="herkal")
     return fd.Case(structure, [fd.Fix(range(2 * cells + 1), "xyz")])
 
 

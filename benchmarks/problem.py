@@ -88,7 +88,7 @@ def make(cells: tuple[int, int], laws: str) -> Problem:
     fold_law, bend_law = LAWS[laws]
     pattern = fd.patterns.miura(cells, panel_angle=60.0, dihedral=120.0)
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
-    structure = fd.discretize(pattern, sheet, fold_law=fold_law, bend_law=bend_law)
+    structure = fd.discretize(pattern, sheet, fold_law=fold_law, bend_law=bend_law, preset="herkal")
     x = np.asarray(structure.nodes)
     edge = np.flatnonzero(pattern.vertices[:, 0] <= 1e-9)
     far = np.flatnonzero(pattern.vertices[:, 0] >= pattern.vertices[:, 0].max() - 1e-9)
@@ -176,6 +176,7 @@ def _critical_step() -> float:
     """Critical step of a sheet of 2 x 2 cells: the same for all sizes of these sheets."""
     if not _STEPS:
         pattern = fd.patterns.miura((2, 2), panel_angle=60.0, dihedral=120.0)
-        structure = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, density=1.0))
+        sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+        structure = fd.discretize(pattern, sheet, preset="herkal")
         _STEPS.append(fd.critical_step(fd.Case(structure)))
     return _STEPS[0]

@@ -6,7 +6,6 @@ Run it to draw the pictures of the page on supports:  python examples/clamped.py
 from __future__ import annotations
 
 import sys
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ import foldyn as fd
 
 ROOT, TIP = [0, 1, 2], 14
 CLAMPED = [(0, 1), (1, 2)]
-SWING = 5.0  # degrees: amplitude for which superlinear bends get their slope
 
 
 def compute() -> tuple[dict, dict]:
@@ -29,19 +27,14 @@ def compute() -> tuple[dict, dict]:
         "shell, hinged": fd.shell(pattern, sheet, divisions=8),
     }
     cases = {name: fd.Case(structure, [fd.Fix(ROOT)]) for name, structure in structures.items()}
-    found = {}
-    for name, case in cases.items():
-        with warnings.catch_warnings():  # a shell has no bends
-            warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-            found[name] = fd.modes(case, 3, secant=None if "shell" in name else SWING)
-    return cases, found
+    return cases, {name: fd.modes(case, 3) for name, case in cases.items()}
 
 
 def check(found: dict) -> None:
-    """Both models agree to 5 %, and without the clamp the sheet swings more slowly."""
+    """Both models agree to 9 %, and without the clamp the sheet swings more slowly."""
     frequency = {name: modes.frequency.values for name, modes in found.items()}
     reduced, shell = frequency["bars and hinges"], frequency["shell"]
-    np.testing.assert_allclose(reduced[:2], shell[:2], rtol=0.05)
+    np.testing.assert_allclose(reduced[:2], shell[:2], rtol=0.09)
     for model, clamped in (("bars and hinges", reduced), ("shell", shell)):
         assert frequency[f"{model}, hinged"][0] < 0.96 * clamped[0]
 

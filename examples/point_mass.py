@@ -21,9 +21,7 @@ F = np.linspace(0.0, 0.08, 401)
 def sheet_with(added: float) -> fd.Case:
     """A Miura sheet, clamped at one end, with weights on the other."""
     sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.3, thickness=0.01, density=100.0)
-    structure = fd.discretize(
-        fd.patterns.miura(cells=(2, 1)), sheet, bend_law="linear", clamped=[(0, 1), (1, 2)]
-    )
+    structure = fd.discretize(fd.patterns.miura(cells=(2, 1)), sheet, clamped=[(0, 1), (1, 2)])
     mass = added * structure.total_mass / len(TIP)
     weights = [fd.PointMass(TIP, mass)] if added else []
     return fd.Case(structure, [fd.Fix(ROOT)], damping=fd.Rayleigh(alpha=0.01), masses=weights)

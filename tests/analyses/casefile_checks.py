@@ -6,22 +6,6 @@ import pytest
 
 from foldyn.errors import InputError
 
-FOLD = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[[supports]]
-nodes = [4, 5]
-[[supports]]
-nodes = [0, 1]
-axes = "z"
-"""
-
 
 def edited(text: str, edits: list[tuple[str, str]]) -> str:
     """Text with things replaced that occur in it once."""

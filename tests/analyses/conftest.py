@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from case_texts import HELD_MIURA_TEXT
 from foldyn.analyses import read_case
 
 # the example of the design, section 4, with loads that its supports leave free
@@ -51,16 +52,9 @@ nodes = [6, 7]
 every = 0.01
 """
 
-SHORT = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[[supports]]
-nodes = "xmin"
+SHORT = (
+    HELD_MIURA_TEXT
+    + """\
 [[loads]]
 nodes = [7, 6]
 force = [1, 0, 0]
@@ -68,6 +62,7 @@ force = [1, 0, 0]
 kind = "dynamics"
 duration = 10
 """
+)
 
 
 @pytest.fixture

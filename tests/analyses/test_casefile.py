@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from foldyn.errors import InputError
 from foldyn.formats import write_pattern
 from foldyn.materials import EnhancedLinear
 from foldyn.patterns import miura
-from foldyn.structures import MASS_RULES, ModelOptions, Sheet
+from foldyn.structures import MASS_RULES, PRESETS, ModelOptions, Sheet
 
 
 def test_the_example_of_the_design(read, example, tmp_path) -> None:
@@ -24,8 +25,8 @@ def test_the_example_of_the_design(read, example, tmp_path) -> None:
     assert found.sheet == Sheet(1e6, 0.25, 0.01, 1000.0, 1.0)
     np.testing.assert_array_equal(found.pattern.vertices, miura(dihedral=60).vertices)
     case = found.case()
-    assert case.structure.options == ModelOptions(
-        mass="circumcenter", fold_law=EnhancedLinear(45, 315, "stress_free")
+    assert case.structure.options == replace(
+        PRESETS["herkal"], mass="circumcenter", fold_law=EnhancedLinear(45, 315, "stress_free")
     )
     assert case.damping == Rayleigh(0.02, 0.0)
     np.testing.assert_array_equal(case.supported_dofs, range(9))
@@ -103,6 +104,7 @@ def test_a_list_of_mass_rules_makes_a_case_each(read, short) -> None:
 def test_model_values_per_crease_and_laws_by_name(read, short) -> None:
     model = """
     [model]
+    preset = "herkal"
     bar_law = "linear"
     fold_law = "linear"
     bend_law = { kind = "linear" }

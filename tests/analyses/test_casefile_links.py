@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import MIURA_TEXT
 from foldyn.errors import InputError
 
-FILE = """
-[pattern]
-kind = "miura"
-
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-
+FILE = (
+    MIURA_TEXT
+    + """
 [model]
 kind = "{kind}"
 rigid = {rigid}
@@ -53,6 +47,7 @@ force = [0, 0, -1e-4]
 kind = "statics"
 load_factors = [1.0]
 """
+)
 
 
 def read(tmp_path, kind="bars_and_hinges", rigid='"all"', more=""):

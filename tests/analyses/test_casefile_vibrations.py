@@ -6,22 +6,17 @@ import numpy as np
 import pytest
 from casefile_checks import check, edited
 
+from case_texts import HELD_MIURA_TEXT
 from foldyn.cases import BaseMotion, Fix, Force, Gravity, Impose
 from foldyn.errors import InputError
 
-MODES = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[[supports]]
-nodes = "xmin"
+MODES = (
+    HELD_MIURA_TEXT
+    + """\
 [analysis]
 kind = "modes"
 """
+)
 
 RESPONSE = (
     MODES.replace("modes", "frf")

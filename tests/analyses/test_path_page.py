@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from casefile_checks import FOLD
 
 import foldyn as fd
+from case_texts import HELD_FOLD_TEXT as FOLD
 from foldyn.analyses import read_case
 from foldyn.plots import moved_supports
 

@@ -132,7 +132,8 @@ def test_numbers_that_are_missing_are_explained(write):
 def test_a_response_that_depends_on_its_amplitude(write):
     grid = "frequencies = { first = 0.1, last = 1, count = 10 }\n"
     found, page = write(
-        PUSH + f'[analysis]\nkind = "frf"\nmethod = "harmonic"\n{grid}amplitude = 2.0\n'
+        PUSH + '[model]\npreset = "herkal"\n'
+        f'[analysis]\nkind = "frf"\nmethod = "harmonic"\n{grid}amplitude = 2.0\n'
     )
     largest = float(np.nanmax(found["swing"]))
     assert f"the largest is {largest:.3g} degrees" in page

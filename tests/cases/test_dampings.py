@@ -6,26 +6,21 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 S = fd.discretize(fd.patterns.miura(), SHEET, bend_law="linear")
-CASE = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+CASE = (
+    HELD_MIURA_TEXT
+    + """\
 [model]
 bend_law = "linear"
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 """
+)
 
 
 def test_one_is_kept_as_given_and_several_add_up():
@@ -175,7 +170,25 @@ def test_more_ratios_than_modes_that_swing():
 
 def test_hinges_without_slope_are_told():
     """Superlinear bends at rest: modes that only they resist are left out, with a warning."""
-    s = fd.discretize(fd.patterns.miura(), SHEET)
+    s = fd.discretize(fd.patterns.miura(), SHEET, preset="herkal")
     case = fd.Case(s, [fd.Fix("xmin")], damping=fd.ModalDamping(0.02, 2))
     with pytest.warns(fd.errors.FoldynWarning, match="damping: .* modal damping leaves them out"):
         fd.simulate(case, 0.01)
+
+
+@pytest.mark.parametrize("kind", [fd.Spring, fd.Dashpot])
+def test_springs_and_dashpots_take_ends_alike(kind):
+    """Lines shorter than 1e-9 of the structure have no direction; ends on the ground are -1."""
+    for apart, fine in ((5e-10, False), (5e-9, True)):
+        nodes = np.array([[0.0, 0, 0], [1, 0, 0], [1, apart, 0]])
+        sheet = fd.Sheet(1.0, 0.3, 0.01)
+        s = fd.Structure(nodes, np.array([[0, 1], [0, 2]]), np.ones(2), sheet, node_mass=np.ones(3))
+        if fine:
+            assert kind(1.0, between=(1, 2)).ends(s, "").tolist() == [[1, 2]]
+            continue
+        with pytest.raises(InputError, match=r"supports\[3\]\.between.*1.*2"):
+            kind(1.0, between=(1, 2)).ends(s, "supports[3]")
+    assert kind(1.0, nodes=[2, 0]).ends(s, "").tolist() == [[2, -1], [0, -1]]
+    assert kind(1.0, nodes=[2]).directions.tolist() == np.eye(3).tolist()
+    assert kind(1.0, nodes=[2], direction="-y").directions.tolist() == [[0, -1, 0]]
+    assert kind(1.0, between=(0, 1)).directions is None

@@ -174,7 +174,7 @@ def test_rigid_panels_do_not_shorten_the_step() -> None:
     pattern = fd.patterns.miura((2, 2))
     steps = []
     for rigid in (None, "all"):
-        s = fd.discretize(pattern, sheet, rigid=rigid)
+        s = fd.discretize(pattern, sheet, rigid=rigid, preset="herkal")
         steps.append(fd.dynamics.critical_step(fd.Case(s, [fd.Fix([0])])))
     assert 1.1 < steps[1] / steps[0] < 1.6
 

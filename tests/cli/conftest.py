@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from case_texts import FOLD_TEXT
 from foldyn.cli import stamp
 from foldyn.cli.main import main
 
@@ -40,15 +41,9 @@ every = 0.01
 """
 
 # a fold whose creases do not lock, pulled shut: panel passes through panel at 0.28 s
-SHUT = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+SHUT = (
+    FOLD_TEXT
+    + """\
 [model]
 fold_law = "linear"
 [[supports]]
@@ -65,6 +60,7 @@ duration = 2.0
 [output]
 every = 0.01
 """
+)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
         assert f"<td>{rule}</td>" in page
     for told in (
         "youngs modulus 1e+06 Pa; ", "scheme n5b8; mass panel, circumcenter; ",
-        "calibration standard", "alpha 0.0628 1/s; beta 0 s; state rest",
+        "calibration plate", "alpha 0.0628 1/s; beta 0 s; state rest",
         f"Foldyn {fd.__version__}</td>",
         "<td>foldyn run case.toml --out r</td>", "<summary>The case file case.toml</summary>",
         escape(Path("case.toml").read_text("utf-8")),

@@ -26,6 +26,8 @@ dihedral = 60
 youngs_modulus = 1e6
 poissons_ratio = 0.25
 thickness = 0.01
+[model]
+preset = "herkal"
 [[supports]]
 nodes = [0, 1, 2]
 axes = "x"

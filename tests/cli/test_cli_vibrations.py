@@ -190,7 +190,10 @@ def test_a_response_to_a_moving_base(workplace, small) -> None:
 
 
 def test_soft_hinges_are_told_of_once_and_in_the_report(workplace, small) -> None:
-    text = small(('bend_law = "linear"\n', ""), ('"circumcenter"', '["circumcenter", "panel"]'))
+    text = small(
+        ('bend_law = "linear"', 'preset = "herkal"'),
+        ('"circumcenter"', '["circumcenter", "panel"]'),
+    )
     text += "[output]\nshapes = [1]\n"
     workplace.write(text)
     done = workplace.call("run", "case.toml")

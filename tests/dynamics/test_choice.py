@@ -17,7 +17,7 @@ SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))
 
 def miura(**options) -> fd.Structure:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **options, preset="herkal")
 
 
 def pushed(history, vector=(0.01, 0.0, 0.0), **damping) -> fd.Case:
@@ -78,7 +78,9 @@ def test_what_nothing_damps_gets_a_method_that_conserves():
     assert chosen(fd.Case(miura(), SUPPORTS), 0.01, initial=state)[0] == "rk4"
     assert chosen(fd.Case(miura(), SUPPORTS), 100.0, initial=state)[0] == "central_difference"
     # a thin sheet, whose bars are far stiffer than its folds, let go from a slightly bent shape
-    thin = fd.discretize(miura().pattern, fd.Sheet(1e9, 0.25, 1e-4, 1e3), bend_law="linear")
+    thin = fd.discretize(
+        miura().pattern, fd.Sheet(1e9, 0.25, 1e-4, 1e3), bend_law="linear", preset="herkal"
+    )
     bent = fd.trace(fd.Case(thin, SUPPORTS, [fd.Force([7], (1e-6, 0.0, 0.0))]), steps=1)
     start = fd.initial_state(bent)
     name, reason = chosen(fd.Case(thin, SUPPORTS), 100.0, initial=start)

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:the energy balance")
 
 def free_sheet(**options) -> fd.Case:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=100)
-    return fd.Case(fd.discretize(pattern, SHEET, **options))
+    return fd.Case(fd.discretize(pattern, SHEET, **options, preset="herkal"))
 
 
 def tumbling(case: fd.Case, spin: float = 1.0, shake: float = 0.02) -> fd.State:
@@ -86,7 +86,7 @@ def test_angular_momentum_drifts_with_the_order_or_faster(method):
 def test_methods_converge_to_one_motion(method):
     """The others approach the motion of RK4 with their own order."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    structure = fd.discretize(pattern, SHEET, bend_law="linear", fold_law="linear")
+    structure = fd.discretize(pattern, SHEET, bend_law="linear", fold_law="linear", preset="herkal")
     supports = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
     load = fd.Force([7], (0.01, 0.0, 0.0), fd.Harmonic(frequency=0.7))
     case = fd.Case(structure, supports, [load], fd.Rayleigh(alpha=0.5, beta=1e-5))

@@ -20,7 +20,7 @@ def flap(model: str, modulus: float = 1e6, dihedral: float = 120.0, **more) -> f
     sheet = fd.Sheet(modulus, 0.25, 0.01, 1.0)
     laws = {"fold_law": "linear", "crease_stiffness": K}
     if model == "bars":
-        s = fd.discretize(pattern, sheet, bend_law="linear", **laws)
+        s = fd.discretize(pattern, sheet, bend_law="linear", **laws, preset="herkal")
         held = [node for node in range(len(s.nodes)) if node not in (4, 5, 7)]
     else:
         s = fd.shell(pattern, sheet, divisions=3, **laws)
@@ -85,7 +85,7 @@ def test_decay_of_the_shell(method):
 def test_a_folded_sheet_that_spins_loses_nothing(method):
     """Rigid rotation of a free fold."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=100)
-    s = fd.discretize(pattern, fd.Sheet(1e7, 0.25, 0.01, 1.0), fold_law="linear")
+    s = fd.discretize(pattern, fd.Sheet(1e7, 0.25, 0.01, 1.0), fold_law="linear", preset="herkal")
     case = fd.Case(s, damping=fd.CreaseDamping(1.0))
     spin = np.array([0.0, 0.3, 0.0])
     v = np.cross(spin, s.nodes - s.center_of_mass)
@@ -106,8 +106,7 @@ def test_rotation_of_the_whole_changes_nothing():
         sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
         s = fd.discretize(
             turned, sheet, fold_law="linear", bend_law="linear", crease_stiffness=K,
-            mass="circumcenter",
-        )  # fmt: skip
+            mass="circumcenter", preset="herkal")  # fmt: skip
         held = [node for node in range(len(s.nodes)) if node not in (4, 5, 7)]
         force = turn.apply([0.0, 0.0, -2e-3])
         load = fd.Force([4, 5], force, fd.HalfSine(0.5))

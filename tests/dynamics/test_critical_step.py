@@ -85,7 +85,9 @@ def test_growth_is_that_of_a_computed_step(damping, method):
 def test_largest_frequency_equals_a_dense_eigensolver(mass, cells):
     pattern = fd.patterns.miura(cells=cells, a=1.0, b=1.2, panel_angle=70, dihedral=100)
     sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-    s = fd.discretize(pattern, sheet, bend_law="linear", fold_law="linear", mass=mass)
+    s = fd.discretize(
+        pattern, sheet, bend_law="linear", fold_law="linear", mass=mass, preset="herkal"
+    )
     case = fd.Case(s, [fd.Fix([0], "xyz")])
     free = case.free_dofs
     k = s.tangent(np.zeros_like(s.nodes)).toarray()[np.ix_(free, free)]
@@ -102,7 +104,9 @@ def test_the_specimen_as_the_design_measured_it():
         cells=(4, 3), a=0.025, b=0.025, panel_angle=60, dihedral=180 - 2 * tilt
     )
     sheet = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
-    s = fd.discretize(pattern, sheet, mass="circumcenter", fold_law=fd.EnhancedLinear(75, 285))
+    s = fd.discretize(
+        pattern, sheet, mass="circumcenter", fold_law=fd.EnhancedLinear(75, 285), preset="herkal"
+    )
     supports = [fd.Fix(range(56, 63), "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
     undamped = fd.critical_step(fd.Case(s, supports)) / MARGIN
     assert undamped == pytest.approx(1.55e-5, rel=0.02)

@@ -38,7 +38,7 @@ LAWS = {
 def miura(laws: str) -> fd.Structure:
     bar, fold, bend = LAWS[laws]
     pattern = fd.patterns.miura(cells=(2, 1), a=1.0, b=1.0, panel_angle=60, dihedral=70)
-    return fd.discretize(pattern, SHEET, bar_law=bar, fold_law=fold, bend_law=bend)
+    return fd.discretize(pattern, SHEET, bar_law=bar, fold_law=fold, bend_law=bend, preset="herkal")
 
 
 def two_states(s: fd.Structure, turn: float, deform: float, seed: int = 0) -> list[np.ndarray]:

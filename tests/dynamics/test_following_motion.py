@@ -25,7 +25,13 @@ BOX = fd.Pattern(
 
 def bars(pattern, sheet=SHEET, **more):
     return fd.discretize(
-        pattern, sheet, mass="centroid", fold_law="linear", bend_law="linear", **more
+        pattern,
+        sheet,
+        mass="centroid",
+        fold_law="linear",
+        bend_law="linear",
+        **more,
+        preset="herkal",
     )
 
 

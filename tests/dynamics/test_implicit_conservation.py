@@ -15,7 +15,7 @@ def free_sheet(cells=(2, 1), **options) -> fd.Case:
     """The sheet of the gallery's free flight, or a part of it, with smooth laws."""
     pattern = fd.patterns.miura(cells=cells, a=0.025, b=0.025, panel_angle=60, dihedral=90)
     options = {"bend_law": "linear", "fold_law": fd.EnhancedLinear(20, 340)} | options
-    return fd.Case(fd.discretize(pattern, PAPER, **options))
+    return fd.Case(fd.discretize(pattern, PAPER, **options, preset="herkal"))
 
 
 def thrown(case: fd.Case) -> fd.State:
@@ -86,7 +86,7 @@ def test_large_steps_stay_robust():
 def test_snap_through_keeps_its_energy(bend_law):
     """A sheet pushed far from rest and let go: energies change hands, their sum stays."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law=bend_law)
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law=bend_law, preset="herkal")
     supports = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
     v = np.zeros(s.nodes.shape)
     v[[6, 7, 8], 0] = -1.0
@@ -114,7 +114,11 @@ def test_the_balance_closes_with_everything_that_acts(mass):
     """Loads, gravity, damping of both kinds, moving supports, actuated folds: to 1e-9."""
     pattern = fd.patterns.miura(cells=(2, 1), a=1.0, b=1.0, panel_angle=60, dihedral=100)
     s = fd.discretize(
-        pattern, fd.Sheet(1e6, 0.25, 0.01, 1000.0), mass=mass, fold_law=fd.EnhancedLinear(70, 290)
+        pattern,
+        fd.Sheet(1e6, 0.25, 0.01, 1000.0),
+        mass=mass,
+        fold_law=fd.EnhancedLinear(70, 290),
+        preset="herkal",
     )
     supports = [
         fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2], "z"), fd.Fix([1], "y"),

@@ -24,7 +24,7 @@ SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))
 
 def miura(**options) -> fd.Structure:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **options, preset="herkal")
 
 
 @pytest.mark.parametrize("mass", ["circumcenter", "consistent"])
@@ -159,7 +159,9 @@ def test_explicit_methods_name_the_remedy_for_stiff_damping():
 def test_a_free_fold_comes_to_rest_at_its_new_angle(method):
     """Nothing holds it: the dihedral of the crease becomes the rest angle."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    s = fd.discretize(pattern, SHEET, fold_law=fd.EnhancedLinear(90, 270), bend_law="linear")
+    s = fd.discretize(
+        pattern, SHEET, fold_law=fd.EnhancedLinear(90, 270), bend_law="linear", preset="herkal"
+    )
     go = fd.Actuate([0], 200.0, fd.Ramp(duration=3.0, smooth=True))
     motion = fd.simulate(fd.Case(s, loads=[go], damping=fd.Rayleigh(alpha=6.0)), 12.0, method)
     folds, _ = s.dihedrals(motion.displacement[-1])
@@ -172,7 +174,7 @@ def test_a_free_fold_comes_to_rest_at_its_new_angle(method):
 def test_settles_in_the_static_equilibrium(method):
     """Case study 1 under a slow load with strong damping: where statics finds it."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="herkal")
     supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     slow = fd.Force([0, 1], (-1e-3, 0.0, 0.0), fd.Ramp(5.0))
     motion = fd.simulate(fd.Case(s, supports, [slow], fd.Rayleigh(3.0)), 25.0, method, every=5.0)

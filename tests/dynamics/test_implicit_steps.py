@@ -31,7 +31,7 @@ def case2(history=None, alpha: float = 0.0628, beta: float = 0.0, **options) -> 
     """Case study 2 of Herkal et al. (supports, pulse and damping: our assumptions)."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     load = fd.Force([7], (0.01, 0.0, 0.0), history or fd.HalfSine(duration=0.5))
-    s = fd.discretize(pattern, SHEET, **options)
+    s = fd.discretize(pattern, SHEET, **options, preset="herkal")
     return fd.Case(s, SUPPORTS, [load], fd.Rayleigh(alpha, beta))
 
 
@@ -127,7 +127,11 @@ def test_a_motion_goes_on_from_where_it_was_stored(method):
     """
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     s = fd.discretize(
-        pattern, fd.Sheet(1e6, 0.25, 0.01, 1000.0), bend_law="linear", fold_law="linear"
+        pattern,
+        fd.Sheet(1e6, 0.25, 0.01, 1000.0),
+        bend_law="linear",
+        fold_law="linear",
+        preset="herkal",
     )
     pull = fd.Impose([6, 7, 8], "x", 1e-3, lambda t: np.sin(300.0 * t))
     case = fd.Case(s, [*SUPPORTS, pull, fd.BaseMotion("z", fd.Harmonic(40.0), 1e-4)])
@@ -181,7 +185,7 @@ def test_steps_on_which_newton_fails_are_halved_and_counted():
     """A spinning soft sheet with a tenth of a radian a step: some steps are taken in parts."""
     pattern = fd.patterns.miura(cells=(2, 1), a=0.025, b=0.025, panel_angle=60, dihedral=90)
     paper = fd.Sheet(1.219e9, 0.2, 0.24e-3, 667.0, length_scale_ratio=2.7)
-    s = fd.discretize(pattern, paper, bend_law="linear")
+    s = fd.discretize(pattern, paper, bend_law="linear", preset="herkal")
     x = s.nodes - s.nodes.mean(axis=0)
     state = fd.State(velocity=np.cross([2.0, 80.0, 1.5], x))
     motion = fd.simulate(fd.Case(s), 0.4, "energy_momentum", dt=4e-3, initial=state)
@@ -196,7 +200,7 @@ def test_steps_on_which_newton_fails_are_halved_and_counted():
 def test_panels_that_pass_through_each_other_stop_the_motion(method, options):
     """Linear folds do not lock: a fold that is driven shut passes through, and says so."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    structure = fd.discretize(pattern, SHEET, fold_law="linear")
+    structure = fd.discretize(pattern, SHEET, fold_law="linear", preset="herkal")
     v = np.zeros(structure.nodes.shape)
     v[[0, 1], 0], v[[4, 5], 0] = 10.0, -10.0
     with pytest.raises(PenetrationError, match="panel passed through panel") as caught:
@@ -233,11 +237,11 @@ def test_what_goes_wrong_is_named_and_the_motion_until_then_kept(method, options
 
 def test_a_node_that_nothing_holds_and_nothing_slows_is_refused():
     pattern = fd.Pattern([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [3, 3, 0]], [[0, 1, 2, 3]])
-    structure = fd.discretize(pattern, SHEET)
+    structure = fd.discretize(pattern, SHEET, preset="herkal")
     push = fd.Force([4], (1.0, 0.0, 0.0))
     with pytest.raises(InstabilityError, match="a mass or a stiffness may be missing"):
         fd.simulate(fd.Case(structure, [], [push]), 0.1, "newmark")
-    structure = fd.discretize(pattern, SHEET, mass="consistent")
+    structure = fd.discretize(pattern, SHEET, mass="consistent", preset="herkal")
     with pytest.raises(InputError, match="node 4 is free but has no mass"):
         fd.simulate(fd.Case(structure), 0.1, "newmark")
 

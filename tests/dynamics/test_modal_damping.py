@@ -7,8 +7,9 @@ import pytest
 from oscillators import equal_steps
 
 import foldyn as fd
-from foldyn.dynamics import METHODS
-from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics import METHODS, modal_damping
+from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.modal_damping import modal_rows, rows_of
 from foldyn.signals import matrix_pencil
 
 RATIOS = (0.02, 0.05)
@@ -20,7 +21,7 @@ def sheet(model: str, mass: str | None = None, modulus: float = 1e5, **more) -> 
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=60, dihedral=80)
     if model == "bars":
         laws = {"bend_law": "linear", "fold_law": "linear", "bar_law": "linear"}
-        s = fd.discretize(pattern, material, mass=mass or "circumcenter", **laws)
+        s = fd.discretize(pattern, material, mass=mass or "circumcenter", **laws, preset="herkal")
     else:
         s = fd.shell(pattern, material, divisions=2, mass=mass or "lumped", fold_law="linear")
     return fd.Case(s, [fd.Fix("xmin", "xyz")], **{"damping": fd.ModalDamping(RATIOS)} | more)
@@ -157,9 +158,30 @@ def test_free_bodies_keep_their_momenta():
 def test_an_unstable_state_is_refused():
     """About a state of compression modes have no frequency."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=170)
-    s = fd.discretize(pattern, fd.Sheet(1e4, 0.25, 0.01, 1.0), fold_law="linear", bend_law="linear")
+    s = fd.discretize(
+        pattern,
+        fd.Sheet(1e4, 0.25, 0.01, 1.0),
+        fold_law="linear",
+        bend_law="linear",
+        preset="herkal",
+    )
     case = fd.Case(s, [fd.Fix([0, 1])], damping=fd.ModalDamping(0.1, 2, "start"))
     u = np.zeros_like(s.nodes)
     u[2:, 0] = -0.3
     with pytest.raises(fd.errors.InputError, match='the state "start" is unstable'):
         fd.simulate(case, 0.1, initial=fd.State(u))
+
+
+@pytest.mark.parametrize("method", ["rk4", "generalized_alpha", "auto"])
+def test_modes_are_computed_once(method, monkeypatch):
+    """The critical step, the choice of a method and the motion take the same modes."""
+    seen = []
+
+    def counted(*arguments):
+        seen.append(arguments)
+        return rows_of(*arguments)
+
+    monkeypatch.setattr(modal_damping, "rows_of", counted)
+    case = sheet("bars", damping=fd.ModalDamping(RATIOS, state="start"))
+    prepare(case, 0.1, method, every=0.01)
+    assert len(seen) == 1

@@ -17,7 +17,9 @@ SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
 def everything(mass: str) -> fd.Case:
     """Folds and bends of one law, moving supports, actuated folds, every kind of damping."""
     pattern = fd.patterns.miura(cells=(3, 2), a=1.0, b=1.0, panel_angle=60, dihedral=100)
-    s = fd.discretize(pattern, SHEET, fold_law="linear", bend_law="linear", mass=mass)
+    s = fd.discretize(
+        pattern, SHEET, fold_law="linear", bend_law="linear", mass=mass, preset="herkal"
+    )
     supports = [
         fd.Fix([0, 1, 2], "x"),
         fd.Fix([0, 2], "z"),
@@ -67,7 +69,7 @@ def test_hinges_keep_their_numbers():
 
 def test_the_order_of_a_large_sheet_brings_neighbors_together():
     pattern = fd.patterns.miura(cells=(12, 12), a=1.0, b=1.0, panel_angle=60, dihedral=100)
-    plain = fd.discretize(pattern, SHEET).body
+    plain = fd.discretize(pattern, SHEET, preset="herkal").body
     found, by = renumbered(plain)
     np.testing.assert_array_equal(by.order[by.rank], np.arange(plain.rows))
 

@@ -105,7 +105,7 @@ def sheet(kind: str):
     return (
         fd.shell(pattern, material, divisions=3)
         if kind == "shell"
-        else fd.discretize(pattern, material, mass="circumcenter")
+        else fd.discretize(pattern, material, mass="circumcenter", preset="herkal")
     )
 
 

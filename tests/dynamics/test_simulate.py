@@ -26,7 +26,7 @@ SUPPORTS = (fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y"))
 
 def miura(**options) -> fd.Structure:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    return fd.discretize(pattern, SHEET, **options)
+    return fd.discretize(pattern, SHEET, **options, preset="herkal")
 
 
 def case2(history=None, alpha: float = 0.0628, beta: float = 0.0, **options) -> fd.Case:
@@ -45,7 +45,9 @@ def test_motion_of_the_golden_miura():
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     np.testing.assert_allclose(pattern.vertices, golden["nodes"][:9], atol=1e-12)
     sheet = fd.Sheet(1e6, 0.25, float(golden["thickness"]), float(golden["rho"]))
-    structure = fd.discretize(pattern, sheet, mass="circumcenter", calibration="merlin2")
+    structure = fd.discretize(
+        pattern, sheet, mass="circumcenter", calibration="merlin2", preset="herkal"
+    )
     np.testing.assert_allclose(structure.mass.diagonal(), golden["nodal_mass"], rtol=1e-12)
     supports = [fd.Fix([int(k // 3)], "xyz"[k % 3]) for k in golden["fixed_dofs"] - 1]
     forces = golden["load"].reshape(-1, 3)
@@ -226,7 +228,7 @@ def test_nan_in_a_history_stops_with_the_motion_until_then():
 def test_panels_that_pass_through_each_other_stop_the_motion():
     """Linear folds do not lock: a fold that is driven shut passes through, and says so."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    structure = fd.discretize(pattern, SHEET, fold_law="linear")
+    structure = fd.discretize(pattern, SHEET, fold_law="linear", preset="herkal")
     v = np.zeros(structure.nodes.shape)
     v[[0, 1], 0], v[[4, 5], 0] = 10.0, -10.0
     with pytest.raises(PenetrationError, match="panel passed through panel") as caught:
@@ -272,7 +274,7 @@ def test_bad_arguments_are_refused(arguments, message):
 
 def test_a_free_node_without_mass_is_refused():
     pattern = fd.Pattern([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [3, 3, 0]], [[0, 1, 2, 3]])
-    structure = fd.discretize(pattern, SHEET)
+    structure = fd.discretize(pattern, SHEET, preset="herkal")
     with pytest.raises(InputError, match="node 4 is free but has no mass"):
         fd.simulate(fd.Case(structure), 0.1)
     fd.simulate(fd.Case(structure, [fd.Fix([4], "xyz")]), 0.1)
@@ -286,7 +288,7 @@ def test_settles_in_the_static_equilibrium(bend_law, expected):
     (docs/theory.md: 0.0312 m with superlinear bends, 0.0248 m with linear ones).
     """
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    s = fd.discretize(pattern, SHEET, mass="circumcenter", bend_law=bend_law)
+    s = fd.discretize(pattern, SHEET, mass="circumcenter", bend_law=bend_law, preset="herkal")
     load = fd.Force([0, 1], (-1e-3, 0.0, 0.0), fd.Ramp(5.0))
     case = fd.Case(s, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], [load], fd.Rayleigh(3.0))
     end = fd.simulate(case, 25.0, every=5.0).displacement.to_numpy()[-1]
@@ -363,7 +365,9 @@ def test_a_shifted_pattern_moves_the_same():
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     far = fd.Pattern(pattern.vertices + np.array([1e3, -2e3, 5e2]), pattern.faces)
     u = 0.01 * np.random.default_rng(0).standard_normal((13, 3))
-    near, shifted = (fd.discretize(p, SHEET).internal_force(u) for p in (pattern, far))
+    near, shifted = (
+        fd.discretize(p, SHEET, preset="herkal").internal_force(u) for p in (pattern, far)
+    )
     np.testing.assert_allclose(shifted, near, rtol=0, atol=1e-9 * np.abs(near).max())
 
 

@@ -57,7 +57,7 @@ def test_a_sheet_slides_down_an_incline(model, method) -> None:
     normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
     down = np.array([np.cos(slope), 0.0, -np.sin(slope)])
     make = {
-        "bars": lambda: fd.discretize(FLAT, SHEET),
+        "bars": lambda: fd.discretize(FLAT, SHEET, preset="herkal"),
         "shell": lambda: fd.shell(FLAT, SHEET, divisions=2),
         "rigid shell": lambda: fd.shell(FLAT, SHEET, divisions=2, rigid="all"),
     }
@@ -83,7 +83,9 @@ def fold_on_rollers(mass, turn=None, moved=False, damping=None):
     if turn is not None:
         pattern = fd.Pattern(pattern.vertices @ turn.T, pattern.faces, pattern.assignments)
         direction, sideways = turn @ direction, turn @ sideways
-    s = fd.discretize(pattern, SHEET, mass=mass, bend_law="linear", fold_law="linear")
+    s = fd.discretize(
+        pattern, SHEET, mass=mass, bend_law="linear", fold_law="linear", preset="herkal"
+    )
     force = fd.Force([0, 1], -1e-3 * sideways, fd.Pulse(0.7))
     lift = fd.Ramp(1.0)
     if turn is None:
@@ -159,8 +161,8 @@ def test_two_sheets_that_are_linked_are_one(method, mass) -> None:
     whole = fd.Pattern(points, faces, "V")
     cut = fd.Pattern(np.vstack([points, points[1:3]]), [faces[0], [6, 4, 5, 7]], [])
     options = {"mass": mass, "bend_law": "linear"}
-    one = fd.discretize(whole, SHEET, crease_stiffness=0.0, **options)
-    other = fd.discretize(cut, SHEET, **options)
+    one = fd.discretize(whole, SHEET, crease_stiffness=0.0, **options, preset="herkal")
+    other = fd.discretize(cut, SHEET, **options, preset="herkal")
     load = [fd.Force([4, 5], (0.0, 1e-4, -1e-3), fd.Pulse(0.3))]
     supports = [fd.Fix([0, 1, 3])]
     a = fd.simulate(fd.Case(one, supports, load), 0.5, method, every=0.1, **fixed_step(method))
@@ -176,7 +178,7 @@ def test_links_conserve_momentum() -> None:
     """Two free sheets, linked at a corner: nothing but the link acts between them."""
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0.2], [2, 0, 0.2], [1, 1, 0.2]]
     pattern = fd.Pattern(points, [[0, 1, 2], [3, 4, 5]], [])
-    s = fd.discretize(pattern, SHEET)
+    s = fd.discretize(pattern, SHEET, preset="herkal")
     v = np.zeros_like(s.nodes)
     v[0], v[4] = (0.1, 0.2, 1.0), (0.3, 0.0, -0.5)
     case = fd.Case(s, [fd.Link([1, 3])])
@@ -191,7 +193,7 @@ def test_links_conserve_momentum() -> None:
 def test_a_node_without_mass_may_ride() -> None:
     """A point that others carry needs none; one that carries itself is refused as ever."""
     pattern = fd.patterns.simple_fold()
-    s = fd.discretize(pattern, SHEET, mass="mixed_voronoi")
+    s = fd.discretize(pattern, SHEET, mass="mixed_voronoi", preset="herkal")
     mass = s.nodal_mass.copy()
     mass[6] = 0.0
     bare = replace(s, node_mass=mass)

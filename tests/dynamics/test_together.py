@@ -20,7 +20,7 @@ STEPS = 200
 def sheet(**options):
     """A long Miura sheet, so that threads can cut it across."""
     pattern = fd.patterns.miura(cells=(60, 2), dihedral=100)
-    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1000.0), **options)
+    return fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1000.0), **options, preset="herkal")
 
 
 def case(structure=None, loads=None, damping=None):
@@ -77,7 +77,7 @@ def test_small_structures_and_what_cannot_be_shared_run_on_one_thread(monkeypatc
         case(sheet(mass="consistent")),
     ):
         assert threads_of(pack(other, 1e-4)) == 1
-    small = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01, 1000.0))
+    small = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01, 1000.0), preset="herkal")
     assert threads_of(pack(fd.Case(small, [fd.Fix(nodes=[0])]), 1e-4)) == 1
 
 

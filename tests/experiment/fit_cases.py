@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-FOLD = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+from case_texts import FOLD_TEXT
+
+FOLD = (
+    FOLD_TEXT
+    + """
 [model]
+preset = "herkal"
 fold_law = {{ kind = "enhanced", theta1 = 45, theta2 = 290 }}
 [damping]
 alpha = 0.4
@@ -24,6 +21,7 @@ nodes = [0, 1]
 axes = "z"
 {rest}
 """
+)
 PRESSED = FOLD.format(
     rest="""
 [[supports]]

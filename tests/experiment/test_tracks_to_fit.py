@@ -47,6 +47,8 @@ poissons_ratio = 0.2
 thickness = 2.4e-4
 density = 667
 length_scale_ratio = {RATIO}
+[model]
+preset = "herkal"
 [damping]
 alpha = {ALPHA}
 [[supports]]

@@ -17,7 +17,8 @@ ROOM = 128 * memory.MEBI
 """Memory of the machine that the command believes in: what is large is slow, too."""
 WORDS = (
     "pattern", "kind", "cells", "sides", "storeys", "vertices", "faces", "assignments", "sheet",
-    "thickness", "density", "model", "shell", "divisions", "scheme", "mass", "consistent",
+    "thickness", "density", "model", "shell", "divisions", "scheme", "mass", "consistent", "preset",
+    "herkal",
     "fold_law", "bend_law", "crease_rest", "damping", "alpha", "state", "supports", "nodes",
     "axes", "axis", "displacement", "base", "history", "table", "times", "values", "smooth",
     "loads", "force", "gravity", "creases", "angle", "analysis", "dynamics", "statics", "modes",

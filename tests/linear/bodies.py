@@ -17,12 +17,14 @@ TOP, BOTTOM = list(range(7)), list(range(56, 63))
 
 def body(pattern, scheme="n5b8", mass="mixed_voronoi", **model):
     """A structure of the sheet of the paper's case studies."""
-    return fd.discretize(PATTERNS[pattern](), SHEET, scheme=scheme, mass=mass, **model)
+    return fd.discretize(
+        PATTERNS[pattern](), SHEET, scheme=scheme, mass=mass, **model, preset="herkal"
+    )
 
 
 def miura(cells=(2, 2), dihedral=60, **model):
     pattern = fd.patterns.miura(cells=cells, a=1, b=1, panel_angle=60, dihedral=dihedral)
-    return fd.discretize(pattern, SHEET, **model)
+    return fd.discretize(pattern, SHEET, **model, preset="herkal")
 
 
 def paper_specimen(mass="circumcenter", rest="stress_free", supports=(), loads=()):
@@ -32,7 +34,7 @@ def paper_specimen(mass="circumcenter", rest="stress_free", supports=(), loads=(
     )
     sheet = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
     law = fd.EnhancedLinear(75, 285, rest=rest)
-    s = fd.discretize(pattern, sheet, mass=mass, fold_law=law)
+    s = fd.discretize(pattern, sheet, mass=mass, fold_law=law, preset="herkal")
     held = [fd.Fix(BOTTOM, "x"), fd.Fix([59], "y"), fd.Fix([57, 59, 61], "z")]
     return fd.Case(s, [*held, *supports], loads)
 
@@ -41,7 +43,9 @@ def hinged_panel(mass, stiffness):
     """One panel of a simple fold held, the other one turning about the crease on its spring."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
     laws = {"fold_law": "linear", "bend_law": "linear"}
-    s = fd.discretize(pattern, SHEET, mass=mass, crease_stiffness=stiffness, **laws)
+    s = fd.discretize(
+        pattern, SHEET, mass=mass, crease_stiffness=stiffness, **laws, preset="herkal"
+    )
     turning = [4, 5, 7]
     held = [node for node in range(len(s.nodes)) if node not in turning]
     return fd.Case(s, [fd.Fix(held, "xyz")]), turning

@@ -55,7 +55,9 @@ def flap(alpha=0.0, beta=0.0, law="superlinear") -> fd.Case:
     vertices = [[0, 0, 0], [0, 1, 0], [-0.8, 0.5, 0.0], [0.8, 0.5, 0.0]]
     pattern = fd.Pattern(vertices, ((0, 1, 2), (0, 3, 1)))
     sheet = fd.Sheet(1e4, 0.25, 0.01, density=1.0)
-    s = fd.discretize(pattern, sheet, scheme="n4b5", fold_law=law, crease_stiffness=0.05)
+    s = fd.discretize(
+        pattern, sheet, scheme="n4b5", fold_law=law, crease_stiffness=0.05, preset="herkal"
+    )
     return fd.Case(s, [fd.Fix([0, 1, 2], "xyz")], damping=fd.Rayleigh(alpha, beta))
 
 
@@ -64,7 +66,7 @@ def smooth_miura(mass="circumcenter", **model) -> fd.Structure:
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     linear = {"bar_law": "linear", "fold_law": "linear", "bend_law": "linear"}
-    return fd.discretize(pattern, sheet, mass=mass, **(linear | model))
+    return fd.discretize(pattern, sheet, mass=mass, **(linear | model), preset="herkal")
 
 
 def miura_case(loads=(), mass="circumcenter", alpha=0.5, beta=0.0, **model) -> fd.Case:

@@ -119,7 +119,14 @@ def test_creases_on_a_fold(model, method):
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
     sheet = fd.Sheet(1e9, 0.25, 0.01, 1.0)
     if model == "bars":
-        s = fd.discretize(pattern, sheet, fold_law="linear", bend_law="linear", crease_stiffness=k)
+        s = fd.discretize(
+            pattern,
+            sheet,
+            fold_law="linear",
+            bend_law="linear",
+            crease_stiffness=k,
+            preset="herkal",
+        )
     else:
         s = fd.shell(pattern, sheet, divisions=2, fold_law="linear", crease_stiffness=k)
     held = np.flatnonzero(s.nodes[:, 0] <= s.nodes[2, 0] + 1e-9).tolist()

@@ -25,7 +25,7 @@ def test_the_examples_run():
     assert float(names["full"].displacement[40, 0]) > float(names["half"].displacement[40, 0]) > 0
     assert names["values"].shape == (4, 4)
     assert names["pairs"].mac[0] > 0.9
-    assert float(names["what"].share.max("kind")[0]) > 0.9
+    assert float(names["what"].share.max("kind")[0]) > 0.85
 
 
 def test_every_variable_has_a_row():

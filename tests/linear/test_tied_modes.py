@@ -16,7 +16,7 @@ TURN = np.array([[np.cos(A), 0, np.sin(A)], [0, 1, 0], [-np.sin(A), 0, np.cos(A)
 )
 MODELS = {
     "bars": lambda pattern: fd.discretize(
-        pattern, SHEET, mass="consistent", bend_law="linear", fold_law="linear"
+        pattern, SHEET, mass="consistent", bend_law="linear", fold_law="linear", preset="herkal"
     ),
     "shell": lambda pattern: fd.shell(pattern, SHEET, 3, fold_law="linear"),
 }
@@ -117,13 +117,15 @@ def test_bends_of_rigid_panels_are_not_soft() -> None:
     """Only hinges that can turn are counted, and the modes are proper without a secant."""
     pattern = fd.patterns.simple_fold()
     supports = [fd.Fix([4, 5]), fd.Fix([0, 1], "z")]
-    soft = fd.discretize(pattern, SHEET, fold_law="linear")
+    soft = fd.discretize(pattern, SHEET, fold_law="linear", preset="herkal")
     with pytest.warns(fd.errors.FoldynWarning, match="8 hinges of the superlinear law"):
         assert linearize(fd.Case(soft, supports)).soft == 8
-    half = fd.discretize(pattern, SHEET, fold_law="linear", rigid=[1])
+    half = fd.discretize(pattern, SHEET, fold_law="linear", rigid=[1], preset="herkal")
     with pytest.warns(fd.errors.FoldynWarning, match="4 hinges of the superlinear law"):
         assert linearize(fd.Case(half, supports)).soft == 4
-    rigid = fd.Case(fd.discretize(pattern, SHEET, fold_law="linear", rigid="all"), supports)
+    rigid = fd.Case(
+        fd.discretize(pattern, SHEET, fold_law="linear", rigid="all", preset="herkal"), supports
+    )
     assert linearize(rigid).soft == 0
     direct = fd.frf(rigid, fd.Force([0, 1], (1e-3, 0.0, 0.0)), [1.0]).receptance
     balanced = fd.frf(rigid, fd.Force([0, 1], (1e-3, 0.0, 0.0)), [1.0], method="harmonic")

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import InputError
 from foldyn.materials import PlateSuperlinear, Superlinear
 from foldyn.materials.plate_superlinear import SQUARE
@@ -104,23 +105,17 @@ def test_motions_keep_their_energy(method):
 
 
 def test_in_case_files_and_results(tmp_path):
-    text = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+    text = (
+        HELD_MIURA_TEXT
+        + """\
 [model]
 calibration = "plate"
 bend_law = LAW
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 count = 2
 """
+    )
     for law in ('"plate_superlinear"', '{ kind = "plate_superlinear", onset = 3.0 }'):
         (tmp_path / "case.toml").write_text(text.replace("LAW", law), "utf-8")
         found = fd.read_case(tmp_path / "case.toml").run()

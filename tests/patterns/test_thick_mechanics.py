@@ -20,7 +20,9 @@ MODELS = ["n5b8", "n4b5", "shell"]
 def make(model, pattern, sheet=SHEET, **options):
     if model == "shell":
         return fd.shell(pattern, sheet, divisions=4, **options)
-    return fd.discretize(pattern, sheet, scheme=model, bend_law="linear", **options)
+    return fd.discretize(
+        pattern, sheet, scheme=model, bend_law="linear", **options, preset="herkal"
+    )
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -17,7 +17,7 @@ def pattern():
 @pytest.fixture(scope="session")
 def structure(pattern):
     sheet = structures.Sheet(1e6, 0.25, 0.01, density=1.0)
-    return structures.discretize(pattern, sheet)
+    return structures.discretize(pattern, sheet, preset="herkal")
 
 
 @pytest.fixture(scope="session")

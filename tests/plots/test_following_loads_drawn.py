@@ -35,7 +35,7 @@ def heads(figure) -> int:
 @pytest.mark.parametrize("s", models(), ids=["bars", "shell"])
 def test_pressure_is_an_arrow_normal_to_each_panel(s) -> None:
     case = fd.Case(s, loads=[fd.Pressure(3.0), fd.Pressure(-2.0, [1], fd.Ramp(1.0))])
-    first, second = following.pressures(case)
+    first, second = following.on_panels(case, fd.Pressure)
     assert first.numbers.tolist() == [0, 1]
     middles, vectors = following.panel_arrows(case, s.nodes, first)
     centers = [PATTERN.vertices[list(face)].mean(axis=0) for face in PATTERN.faces]

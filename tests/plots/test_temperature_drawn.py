@@ -27,7 +27,7 @@ def test_warm_panels_have_stars_in_their_middles() -> None:
     figure = fd.plots.draw_structure(case())
     assert "20 K warmer on panels 0, 3" in texts(figure)
     assert any(text.startswith("5 K colder on panels 0, 1, 2") for text in texts(figure))
-    share, _ = following.temperatures(case())
+    share, _ = following.on_panels(case(), fd.Temperature)
     middles = following.panel_middles(case().structure, case().structure.nodes, share)
     expected = [PATTERN.vertices[list(PATTERN.faces[panel])].mean(axis=0) for panel in (0, 3)]
     np.testing.assert_allclose(middles, expected)

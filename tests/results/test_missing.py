@@ -10,24 +10,20 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import FOLD_TEXT
 from foldyn.cli.main import main
 from foldyn.results.quantities import REASONS, missing_values
 
 DOCS = (Path(__file__).parents[2] / "docs" / "results.md").read_text("utf-8")
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
-CASE = """
-[pattern]
-kind = "simple_fold"
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+CASE = (
+    FOLD_TEXT
+    + """
 [model]
 bend_law = "linear"
 {rest}
 """
+)
 FREE = CASE.format(rest='[analysis]\nkind = "modes"\ncount = 8\n')
 SHAKEN = CASE.format(
     rest='[analysis]\nkind = "frf"\nfrequencies = [0.0, 1.0]\n[[drive]]\nnodes = [0]\n'

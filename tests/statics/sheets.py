@@ -23,7 +23,7 @@ def specimen(rest="stress_free", **model):
     )
     sheet = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
     law = fd.EnhancedLinear(75, 285, rest=rest)
-    return fd.discretize(pattern, sheet, fold_law=law, **model)
+    return fd.discretize(pattern, sheet, fold_law=law, **model, preset="herkal")
 
 
 def ideal_supports():

@@ -21,7 +21,7 @@ SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 def case1(bend_law="superlinear"):
     """The simple fold opened by 1e-3 N on both nodes of an edge."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
-    s = fd.discretize(pattern, SHEET, bend_law=bend_law)
+    s = fd.discretize(pattern, SHEET, bend_law=bend_law, preset="herkal")
     supports = [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")]
     return fd.Case(s, supports, [fd.Force([0, 1], (-1e-3, 0, 0))])
 
@@ -30,7 +30,7 @@ def case2(bend_law="superlinear", ratio=1.0):
     """The Miura cell pulled along x by 0.01 N at node 7."""
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
     sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0, length_scale_ratio=ratio)
-    s = fd.discretize(pattern, sheet, bend_law=bend_law)
+    s = fd.discretize(pattern, sheet, bend_law=bend_law, preset="herkal")
     supports = [fd.Fix([0, 1, 2], "x"), fd.Fix([0, 2, 6, 8], "z"), fd.Fix([1], "y")]
     return fd.Case(s, supports, [fd.Force([7], (0.01, 0, 0))])
 

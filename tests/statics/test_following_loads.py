@@ -30,7 +30,13 @@ STRIP = fd.Pattern([[0, 0], [1, 0], [1, 0.25], [0, 0.25]], [[0, 1, 2, 3]])
 def bars(pattern, sheet=None, **more):
     sheet = sheet or fd.Sheet(E, 0.25, T, 1.0)
     return fd.discretize(
-        pattern, sheet, fold_law="linear", bend_law="linear", mass="centroid", **more
+        pattern,
+        sheet,
+        fold_law="linear",
+        bend_law="linear",
+        mass="centroid",
+        preset="herkal",
+        **more,
     )
 
 

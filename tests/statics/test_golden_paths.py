@@ -36,7 +36,7 @@ def golden(name):
     sheet = fd.Sheet(*(float(data[k]) for k in ("E", "nu", "t")), None, float(data["LScaleFactor"]))
     low, high = np.ravel(data["fold_limits_deg"]).tolist()
     law = fd.EnhancedLinear(low, high, rest="as_published")
-    s = fd.discretize(pattern, sheet, calibration="merlin2", fold_law=law)
+    s = fd.discretize(pattern, sheet, calibration="merlin2", fold_law=law, preset="herkal")
     np.testing.assert_allclose(s.nodes, data["nodes"], atol=1e-12)
     supports = [fd.Fix([int(k - 1) // 3], "xyz"[int(k - 1) % 3]) for k in data["fixed_dofs"]]
     forces = data["load"].reshape(-1, 3)

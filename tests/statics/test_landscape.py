@@ -45,7 +45,7 @@ def test_truss(snapped):
 def kresling():
     """A storey that snaps from 1.2 m to 0.51 m."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=1.2, twist=40)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear")
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear", preset="herkal")
     low, top = list(range(6)), list(range(6, 12))
     moved = fd.Case(s, [fd.Fix(low, "xyz"), fd.Impose(top, "z", -0.8)])
     loaded = fd.Case(s, [fd.Fix(low, "xyz")], [fd.Force(top, (0, 0, -1.0))])
@@ -84,7 +84,7 @@ def test_barrier_is_the_work_of_the_force(kresling):
 def test_states_stay_when_let_go(kresling):
     """Each state without force is an equilibrium of the structure with its supports alone."""
     pattern = fd.patterns.kresling(sides=6, radius=1.0, height=1.2, twist=40)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear")
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.3, 0.01), fold_law="linear", preset="herkal")
     case = fd.Case(s, [fd.Fix(list(range(6)), "xyz")])
     for state in kresling[0].stable:
         path = trace(case, load_factors=[0.0], initial=fd.State(state.displacement))

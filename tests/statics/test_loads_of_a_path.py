@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from sheets import compression, total_force
 from trusses import APEX, VonMises, apex
 
 import foldyn as fd
+from foldyn.errors import FoldynWarning
 from foldyn.statics import OrigamiProblem, trace
 
 PAPER = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
@@ -15,13 +18,13 @@ PAPER = fd.Sheet(1219e6, 0.2, 0.24e-3, 667.0, 2.7)
 
 def flat_miura(cells=(2, 2), dihedral=180.0, **model):
     pattern = fd.patterns.miura(cells=cells, a=0.03, b=0.03, panel_angle=60, dihedral=dihedral)
-    return fd.discretize(pattern, PAPER, fold_law="linear", **model)
+    return fd.discretize(pattern, PAPER, fold_law="linear", **model, preset="herkal")
 
 
 def deployment(s, cells=(2, 2)):
     """Every fold actuated to its angle in the sheet folded to 90 degrees; held at six dofs."""
     folded = fd.patterns.miura(cells=cells, a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    goal = np.degrees(fd.discretize(folded, PAPER).fold_rest)
+    goal = np.degrees(fd.discretize(folded, PAPER, preset="herkal").fold_rest)
     width = 2 * cells[1]
     corner = (2 * cells[0]) * (width + 1)
     supports = [fd.Fix([0], "xyz"), fd.Fix([width], "xz"), fd.Fix([corner], "z")]
@@ -117,7 +120,7 @@ def test_adaptive_load_is_in_equilibrium():
 
 def free_sheet(loads):
     pattern = fd.patterns.miura(cells=(2, 2), a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    return fd.Case(fd.discretize(pattern, PAPER), [], loads)
+    return fd.Case(fd.discretize(pattern, PAPER, preset="herkal"), [], loads)
 
 
 def deformation(case, u):
@@ -152,7 +155,7 @@ def test_free_fall_is_no_load():
 def test_inertia_relief_in_the_linear_limit():
     """K u = p - M R (R' M R)^-1 R' p, solved with the pseudo-inverse of the singular K."""
     pattern = fd.patterns.miura(cells=(1, 1), a=0.03, b=0.03, panel_angle=60, dihedral=90)
-    s = fd.discretize(pattern, PAPER, bend_law="linear", fold_law="linear")
+    s = fd.discretize(pattern, PAPER, bend_law="linear", fold_law="linear", preset="herkal")
     load = fd.Force([4], (0.0, 1e-7, 2e-7))
     path = trace(fd.Case(s, [], [load]), load_factors=[1.0], inertia_relief=True)
     n = len(s.nodes)
@@ -173,3 +176,23 @@ def test_inertia_relief_in_the_linear_limit():
     found = deformation(fd.Case(s), path.displacement.values[0]) - rest
     assert np.abs(expected).max() > 1e-9
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_a_problem_takes_its_case_as_it_is_checked(monkeypatch):
+    """Loads are told apart without making the case again: nothing is tied or told twice."""
+    s = flat_miura(dihedral=150.0)
+    supports = [fd.Fix("xmin"), fd.Link("xmax", "x")]
+    loads = [fd.Force([0, 24], (1.0, 0, 0)), fd.Gravity("-z"), fd.Pressure(1e-3)]
+    with pytest.warns(FoldynWarning, match="acts in part where supports hold"):
+        case = fd.Case(s, supports, loads)
+    ties = case.constraints
+    monkeypatch.setattr("foldyn.cases.supported.equations_of", None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        problem = OrigamiProblem(case, (1,))
+    push, weight = loads[0].forces(s, ""), loads[1].weight(s.nodal_mass)
+    np.testing.assert_array_equal(problem.growing, ties.force(push.ravel()))
+    np.testing.assert_array_equal(problem.constant, ties.force(weight.ravel()))
+    rest = np.zeros(s.nodes.size)
+    assert not problem.following_force(rest, 0.0).any()  # the pressure grows with the factor
+    assert problem.following_force(rest, 1.0).any()

@@ -61,7 +61,9 @@ def errors_of(solver, u, factor, **given):
 
 def miura_case(bend_law="superlinear", **model):
     pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law=bend_law, **model)
+    s = fd.discretize(
+        pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), bend_law=bend_law, **model, preset="herkal"
+    )
     supports = [
         fd.Fix([0, 1, 2], "x"),
         fd.Fix([0, 2, 6, 8], "z"),
@@ -203,7 +205,7 @@ def test_tighter_tolerance_gives_a_closer_state():
 def test_panels_do_not_pass_through_each_other():
     """A linear fold under a closing moment has no equilibrium beyond closed: the path ends."""
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=40)
-    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), fold_law="linear")
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), fold_law="linear", preset="herkal")
     supports = [fd.Fix([0, 1], "xyz"), fd.Fix([2, 3], "y"), fd.Impose([4, 5], "x", -0.75)]
     case = fd.Case(s, [*supports, fd.Fix([4, 5], "yz")])
     with pytest.raises(ComputationError) as caught:

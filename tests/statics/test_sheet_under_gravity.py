@@ -13,7 +13,7 @@ from foldyn.structures.body import BarsHingesBody
 def sheet(cells, thickness=1e-3):
     """Miura cells with edges of 25 mm between two held rims."""
     pattern = fd.patterns.miura(cells=(cells, cells), a=0.025, b=0.025, panel_angle=60, dihedral=90)
-    s = fd.discretize(pattern, fd.Sheet(1219e6, 0.2, thickness, 667.0, 2.7))
+    s = fd.discretize(pattern, fd.Sheet(1219e6, 0.2, thickness, 667.0, 2.7), preset="herkal")
     held = [fd.Fix("xmin", "xyz"), fd.Fix("xmax", "xyz")]
     return fd.Case(s, held, [fd.Gravity((0, 0, -9.81))])
 

@@ -23,8 +23,7 @@ def strut(kind="force"):
     pattern = fd.Pattern(corners, [[0, 1, 4, 5], [1, 2, 3, 4]])
     s = fd.discretize(
         pattern, fd.Sheet(1e6, 0.25, 0.01), crease_stiffness=0.1, fold_law="linear",
-        bend_law="linear",
-    )  # fmt: skip
+        bend_law="linear", preset="herkal")  # fmt: skip
     supports, loads = [fd.Fix([0, 5], "xyz"), fd.Fix([2, 3], "yz")], []
     if kind == "force":
         loads.append(fd.Force([2, 3], (-1.0, 0.0, 0.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 
+discretize = partial(fd.discretize, preset="herkal")
 E, NU, T = 1e6, 0.25, 0.01
 SHEET = fd.Sheet(E, NU, T)
 G = E * T**3 / (12 * (1 - NU**2))  # 0.0888889 N m
@@ -17,7 +19,7 @@ G = E * T**3 / (12 * (1 - NU**2))  # 0.0888889 N m
 
 def panel(vertices, **options):
     pattern = fd.Pattern(vertices, [list(range(len(vertices)))])
-    return fd.discretize(pattern, options.pop("sheet", SHEET), **options)
+    return discretize(pattern, options.pop("sheet", SHEET), **options)
 
 
 def area_of(s, a, b):
@@ -31,7 +33,7 @@ RECTANGLE = [[0, 0], [2, 0], [2, 1], [0, 1]]
 
 def test_fold_of_case_one():
     """1/kf = 1/G + 1/(0.55 G 100^(1/3)): 0.06387 N m/rad, printed as 0.0639 in the paper."""
-    s = fd.discretize(fd.patterns.simple_fold(1.0, 1.0, 60), SHEET)
+    s = discretize(fd.patterns.simple_fold(1.0, 1.0, 60), SHEET)
     by_hand = 1 / (1 / G + 1 / (0.55 * G * 100 ** (1 / 3)))
     assert pytest.approx(0.0888889, rel=1e-6) == G
     assert s.fold_stiffness == pytest.approx([by_hand], rel=1e-14)
@@ -43,15 +45,15 @@ def test_fold_of_the_specimen():
     """kf = 0.4739 N mm/rad (paper, section 6) in millimeters and in meters."""
     geometry = {"cells": (1, 1), "panel_angle": 60, "dihedral": 39.2}
     mm = fd.Sheet(1219.0, 0.2, 0.24, length_scale_ratio=2.7)
-    s = fd.discretize(fd.patterns.miura(a=25.0, b=25.0, **geometry), mm)
+    s = discretize(fd.patterns.miura(a=25.0, b=25.0, **geometry), mm)
     np.testing.assert_allclose(s.fold_stiffness, 0.4739, atol=5e-5)
     si = fd.Sheet(1219e6, 0.2, 0.24e-3, length_scale_ratio=2.7)
-    s = fd.discretize(fd.patterns.miura(a=0.025, b=0.025, **geometry), si)
+    s = discretize(fd.patterns.miura(a=0.025, b=0.025, **geometry), si)
     np.testing.assert_allclose(s.fold_stiffness, 0.4739e-3, atol=5e-8)
 
 
 def test_fold_takes_its_own_length():
-    s = fd.discretize(fd.patterns.miura(a=1.0, b=8.0), SHEET)
+    s = discretize(fd.patterns.miura(a=1.0, b=8.0), SHEET)
     length = np.linalg.norm(s.nodes[s.folds[:, 1]] - s.nodes[s.folds[:, 0]], axis=1)
     assert sorted(set(length.round(9))) == [1.0, 8.0]
     expected = 1 / (1 / G + 1 / (0.55 * G * (length / T) ** (1 / 3)))
@@ -136,7 +138,7 @@ def test_polygon_bend_takes_the_most_anti_parallel_spoke():
     radius = np.array([1.0, 1.3, 0.9, 1.1, 1.2])
     vertices = np.c_[radius * np.cos(angle), radius * np.sin(angle)]
     pattern = fd.Pattern(vertices, [[0, 1, 2, 3, 4]])
-    s = fd.discretize(pattern, SHEET, centers={0: [0.0, 0.0, 0.0]})
+    s = discretize(pattern, SHEET, centers={0: [0.0, 0.0, 0.0]})
     partner = [3, 4, 4, 0, 2]  # 0-200 (160), 80-300 (140), 130-300 (170), 200-0, 300-130
     for k, row in enumerate(s.bends):
         corner = next(int(v) for v in row[:2] if v < 5)
@@ -159,12 +161,12 @@ def test_polygon_n4b5():
 
 def test_shared_bars_add_up():
     """Two unit squares: the crease has both edges' area, the boundary one."""
-    s = fd.discretize(fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1]],
+    s = discretize(fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1]],
                                  [[0, 1, 2, 3], [1, 4, 5, 2]]), SHEET)  # fmt: skip
     one = T / (2 * 0.9375) * 0.75
     assert area_of(s, 1, 2) == pytest.approx(2 * one, rel=1e-13)
     assert area_of(s, 0, 1) == pytest.approx(one, rel=1e-13)
-    mixed = fd.discretize(
+    mixed = discretize(
         fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0.5]], [[0, 1, 2, 3], [1, 4, 2]]), SHEET
     )
     triangle = 2 * 0.5 * T / (0.75 * (1 + 2 * np.sqrt(1.25)))
@@ -173,8 +175,8 @@ def test_shared_bars_add_up():
 
 def test_length_scale_ratio_softens_folds_only():
     pattern = fd.patterns.miura()
-    soft = fd.discretize(pattern, fd.Sheet(E, NU, T, length_scale_ratio=5.0))
-    stiff = fd.discretize(pattern, SHEET)
+    soft = discretize(pattern, fd.Sheet(E, NU, T, length_scale_ratio=5.0))
+    stiff = discretize(pattern, SHEET)
     assert (soft.fold_stiffness < 0.3 * stiff.fold_stiffness).all()
     np.testing.assert_array_equal(soft.bend_stiffness, stiff.bend_stiffness)
     np.testing.assert_array_equal(soft.bar_area, stiff.bar_area)
@@ -188,7 +190,7 @@ def test_spokes_need_a_positive_poissons_ratio(nu):
     s = panel(RECTANGLE, sheet=sheet, scheme="n4b5")
     d = np.sqrt(5)
     np.testing.assert_allclose(s.bar_area, 2 * 2.0 * T / ((1 - nu) * (6 + d)), rtol=1e-14)
-    fd.discretize(fd.patterns.kresling(), sheet)  # triangles have no spokes
+    discretize(fd.patterns.kresling(), sheet)  # triangles have no spokes
     angle = np.arange(5) * 2 * np.pi / 5
     assert (panel(np.c_[np.cos(angle), np.sin(angle)], sheet=sheet).bar_area > 0).all()
 
@@ -206,7 +208,7 @@ def merlin2_by_the_book(pattern, faces):
     bends, edges = {}, {}
     for p, face in enumerate(faces):
         m = len(face)
-        single = fd.discretize(
+        single = discretize(
             fd.Pattern(pattern.vertices[list(face)], [list(range(m))]), SHEET, "n5b8"
         )
         per_length = {}
@@ -260,7 +262,7 @@ def test_merlin2_order_on_shuffled_sheets(seed):
     pattern = fd.Pattern(vertices, faces)
     assert any(pattern.flipped)
     bends, edges = merlin2_by_the_book(pattern, faces)
-    s = fd.discretize(pattern, SHEET, calibration="merlin2")
+    s = discretize(pattern, SHEET, calibration="merlin2")
     panel_of = {int(c): p for p, c in enumerate(s.centers)}
     n = len(vertices)
     for row, k in zip(s.bends.tolist(), s.bend_stiffness, strict=True):
@@ -276,8 +278,8 @@ def test_standard_differs_only_there(seed):
     """Spoke areas, folds, bars of triangles and of quads with fewer than four folds agree."""
     vertices, faces = shuffled_sheet(seed)
     pattern = fd.Pattern(vertices, faces)
-    s = fd.discretize(pattern, SHEET)
-    m = fd.discretize(pattern, SHEET, calibration="merlin2")
+    s = discretize(pattern, SHEET)
+    m = discretize(pattern, SHEET, calibration="merlin2")
     for name in ("nodes", "bars", "folds", "bends", "fold_stiffness", "fold_rest", "bend_rest"):
         np.testing.assert_array_equal(getattr(s, name), getattr(m, name))
     assert not np.allclose(s.bend_stiffness, m.bend_stiffness)
@@ -303,8 +305,8 @@ def test_stiffness_per_bar_and_bend_sums(seed, calibration):
     """Mis-ordering only exchanges values within a panel: per-length sums stay."""
     vertices, faces = shuffled_sheet(seed)
     pattern = fd.Pattern(vertices, faces)
-    s = fd.discretize(pattern, SHEET)
-    other = fd.discretize(pattern, SHEET, calibration=calibration)
+    s = discretize(pattern, SHEET)
+    other = discretize(pattern, SHEET, calibration=calibration)
     length = np.linalg.norm(s.nodes[s.bends[:, 1]] - s.nodes[s.bends[:, 0]], axis=1)
     panel_of = {int(c): p for p, c in enumerate(s.centers)}
     owner = np.array([panel_of[max(row[:2])] for row in s.bends.tolist()])
@@ -319,14 +321,14 @@ def test_calibrations_agree_on_rhombi_in_symmetric_order():
     c, h = 0.5, np.sqrt(0.75)
     vertices = [[0, 0], [1, 0], [1 + c, h], [c, h], [2, 0], [2 + c, h]]
     pattern = fd.Pattern(vertices, [[0, 1, 2, 3], [1, 4, 5, 2]])
-    s, m = (fd.discretize(pattern, SHEET, calibration=k) for k in ("standard", "merlin2"))
+    s, m = (discretize(pattern, SHEET, calibration=k) for k in ("standard", "merlin2"))
     np.testing.assert_allclose(s.bar_area, m.bar_area, rtol=1e-14)
     first = slice(0, 4)  # face 0: corners 0 1 2 3 in order
     np.testing.assert_allclose(s.bend_stiffness[first], m.bend_stiffness[first], rtol=1e-14)
     # face 1 is listed 1 4 5 2, sorted 1 2 4 5: diagonals are exchanged
     assert not np.allclose(s.bend_stiffness[4:], m.bend_stiffness[4:])
     square = fd.patterns.miura(panel_angle=60)
-    s, m = (fd.discretize(square, SHEET, calibration=k) for k in ("standard", "merlin2"))
+    s, m = (discretize(square, SHEET, calibration=k) for k in ("standard", "merlin2"))
     np.testing.assert_allclose(s.bar_area, m.bar_area, rtol=1e-12)
 
 
@@ -340,8 +342,8 @@ def test_listed_winding_does_not_matter(seed, scheme):
     vertices, _ = shuffled_sheet(seed)
     faces = fd.Pattern(*shuffled_sheet(seed)).faces
     turned = [faces[0], *((f[0], *f[:0:-1]) if k % 2 else f for k, f in enumerate(faces[1:]))]
-    a = fd.discretize(fd.Pattern(vertices, faces), SHEET, scheme)
-    b = fd.discretize(fd.Pattern(vertices, turned), SHEET, scheme)
+    a = discretize(fd.Pattern(vertices, faces), SHEET, scheme)
+    b = discretize(fd.Pattern(vertices, turned), SHEET, scheme)
     for name in ("nodes", "bars", "bar_area", "folds", "fold_stiffness", "fold_rest", "bends",
                  "bend_stiffness", "bend_rest", "triangles"):  # fmt: skip
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
@@ -351,7 +353,7 @@ def test_front_and_back_are_alike():
     """All faces listed the other way round: valleys become mountains, the sheet is the same."""
     pattern = fd.patterns.miura(b=1.3, dihedral=60)
     back = fd.Pattern(pattern.vertices, [f[::-1] for f in pattern.faces])
-    s, t = fd.discretize(pattern, SHEET), fd.discretize(back, SHEET)
+    s, t = discretize(pattern, SHEET), discretize(back, SHEET)
     np.testing.assert_allclose(t.fold_rest, 2 * np.pi - s.fold_rest, rtol=1e-13)
     u = 0.02 * np.random.default_rng(0).standard_normal(s.nodes.shape)
     scale = np.abs(s.internal_force(u)).max()
@@ -364,8 +366,8 @@ def test_first_vertex_of_a_face_does_not_matter():
     vertices, _ = shuffled_sheet(1)
     faces = fd.Pattern(*shuffled_sheet(1)).faces
     shifted = [f[k % len(f) :] + f[: k % len(f)] for k, f in enumerate(faces)]
-    a = fd.discretize(fd.Pattern(vertices, faces), SHEET)
-    b = fd.discretize(fd.Pattern(vertices, shifted), SHEET)
+    a = discretize(fd.Pattern(vertices, faces), SHEET)
+    b = discretize(fd.Pattern(vertices, shifted), SHEET)
     u = 0.02 * np.random.default_rng(0).standard_normal(a.nodes.shape)
     scale = np.abs(a.internal_force(u)).max()
     np.testing.assert_allclose(a.internal_force(u), b.internal_force(u), atol=1e-12 * scale)

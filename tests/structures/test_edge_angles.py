@@ -9,6 +9,11 @@ from mass_samples import HEXAGON, PANELS
 import foldyn as fd
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
+from foldyn.mechanics.plates_condensed import (
+    condensed_energy,
+    condensed_force,
+    condensed_work,
+)
 from foldyn.structures.condensed_panel import _condensed, outline, panel_stiffness
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
@@ -181,11 +186,11 @@ def test_statics_and_actuation():
     assert float(path.strain_bends[-1]) < 1e-12
 
 
-@pytest.mark.parametrize("method", ["generalized_alpha", "newmark"])
+@pytest.mark.parametrize("method", ["generalized_alpha", "newmark", "rk4"])
 def test_motions_close_their_energy_audit(method):
     load = fd.Force([6, 7, 8], (0, 0, 1e-3), fd.HalfSine(0.5))
     case = fd.Case(miura(), [fd.Fix([0, 1, 2], "xyz")], [load], fd.Rayleigh(0.1, 1e-3))
-    motion = fd.simulate(case, duration=2.0, method=method, dt=2e-3)
+    motion = fd.simulate(case, duration=2.0, method=method, every=0.01)
     stored = sum(motion[k] for k in motion if k == "kinetic" or k.startswith("strain"))
     gap = stored + motion.dissipated - motion.work
     assert float(np.abs(gap).max()) < 2e-3 * float(np.abs(motion.work).max())
@@ -247,9 +252,35 @@ def test_what_it_does_not_go_with(options, message):
         miura(**options)
 
 
-def test_explicit_methods_and_curling_panels_are_refused():
-    case = fd.Case(miura(), [fd.Fix([0, 1, 2], "xyz")], [fd.Gravity("-z")])
-    with pytest.raises(InputError, match=r"edge angles.*no mass.*generalized_alpha"):
+@pytest.mark.parametrize("law", ["linear", "enhanced"])
+def test_explicit_methods_balance_the_edges(law):
+    """The same motion as by implicit methods; forces and energies are those in balance."""
+    s = miura(fold_law=law)
+    twin = s.condensed
+    u = displaced(s)[: s.nodes.size]
+    work = condensed_work(twin.body.model)
+    force, energy = np.zeros(s.nodes.shape), np.zeros(3)
+    for at in (0.3 * u, u):  # from one state to the next
+        condensed_force(twin.body.model, at.reshape(-1, 3), force, work)
+        condensed_energy(twin.body.model, at.reshape(-1, 3), work, energy)
+        np.testing.assert_allclose(force, s.internal_force(at), rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(energy, list(s.energies(at).values()), rtol=1e-9)
+    load = fd.Force([6, 7, 8], (0, 0, 2e-2), fd.HalfSine(0.5))
+    case = fd.Case(s, [fd.Fix([0, 1, 2], "xyz")], [load], fd.Rayleigh(0.1))
+    ends = [
+        fd.simulate(case, 1.0, method, every=0.1, tolerance=tolerance).displacement.values
+        for method, tolerance in (("dormand_prince", 1e-7), ("generalized_alpha", 1e-6))
+    ]
+    assert np.abs(ends[0]).max() > 0.05
+    np.testing.assert_allclose(ends[0], ends[1], atol=2e-3 * np.abs(ends[0]).max())
+
+
+def test_moments_on_creases_need_edge_angles():
+    case = fd.Case(miura(), [fd.Fix([0, 1, 2], "xyz")], [fd.CreaseMoment([0], 1e-3)])
+    with pytest.raises(InputError, match=r"method.*n5b8e.*moments on creases"):
         fd.simulate(case, duration=0.1, method="rk4")
+
+
+def test_panels_that_curl_are_refused():
     with pytest.raises(InputError, match=r'scheme = "n5b8e": panels that curl.*"n5b8"'):
         fd.Case(miura(), [fd.Fix([0, 1, 2])], [fd.Temperature(10.0, curvature=1e-3)])

@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 import foldyn as fd
+from case_texts import MIURA_TEXT
 from foldyn.analyses.provenance import provenance
 from foldyn.errors import InputError
 from foldyn.plots.scene import Sheet3D
@@ -69,7 +70,9 @@ def test_stiffness_of_bars_and_bends_is_that_of_each_panel_on_its_own(scheme):
 
 
 def test_a_crease_between_different_panels_is_two_springs_in_series():
-    one, two, both = (fd.discretize(PAIR, s).fold_stiffness[0] for s in (SHEET, ALONE, MIXED))
+    one, two, both = (
+        fd.discretize(PAIR, s, preset="herkal").fold_stiffness[0] for s in (SHEET, ALONE, MIXED)
+    )
     assert 1.0 / both == pytest.approx(0.5 * (1.0 / one + 1.0 / two), rel=1e-14)
     assert fd.shell(PAIR, MIXED, divisions=2).fold_stiffness[0] == both
     # by hand: half of each side's Ls/G + 1/(0.55 G (L/t)^(1/3)), L = 0.8 m
@@ -123,7 +126,7 @@ def test_two_boards_that_flap_on_their_crease(model):
     """Axis held, panels all but rigid: w^2 = k (1/I1 + 1/I2), I = m b^2 / 3 about the crease."""
     boards = fd.Sheet(1e11, 0.3, 0.01, 500.0,
                       panels=[fd.PanelSheet([1], thickness=0.02, density=800.0)])  # fmt: skip
-    options = {"bend_law": "linear"} if model == "n5b8" else {}
+    options = {"preset": "herkal", "bend_law": "linear"} if model == "n5b8" else {}
     s = make(model, PAIR, boards, crease_stiffness=5.0, mass="consistent", **options)
     crease = [1, 4] if model == "n5b8" else np.flatnonzero(abs(s.nodes[:, 0] - 1.0) < 1e-9)
     found = fd.modes(fd.Case(s, [fd.Fix(crease)]), count=2).frequency.to_numpy()
@@ -222,14 +225,9 @@ def test_wrong_panels(make, message):
         make()
 
 
-FILE = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+FILE = (
+    MIURA_TEXT
+    + """
 {panels}
 [model]
 kind = "{kind}"
@@ -243,6 +241,7 @@ force = [0, 0, 1e-5]
 kind = "statics"
 load_factors = [1]
 """
+)
 PANELS = """[[sheet.panels]]
 panels = [2, 0]
 thickness = 0.03

@@ -7,6 +7,7 @@ import pytest
 from mass_samples import HEXAGON, PANELS, PENTAGON
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.errors import InputError
 from foldyn.structures.plate import ACUTE, ALONE, COMPLIANCE, OBTUSE, POLYGON, SKEW, TRIANGLE
 
@@ -142,6 +143,14 @@ def test_folds_of_a_given_stiffness():
     np.testing.assert_allclose(rigid.fold_stiffness, G / (2 * ALONE), rtol=1e-6)
 
 
+@pytest.mark.parametrize(("rigid", "bent"), [("all", 0), ([1], 1), ([0, 1], 0), (None, 2)])
+def test_rigid_panels_do_not_give_way_to_their_creases(rigid, bent):
+    pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=90)
+    (own,) = fd.discretize(pattern, SHEET, calibration="standard").fold_stiffness
+    (found,) = fd.discretize(pattern, SHEET, rigid=rigid).fold_stiffness
+    assert 1.0 / found == pytest.approx(1.0 / own + bent * ALONE / G, rel=1e-12)
+
+
 def test_what_stays_as_in_the_standard_calibration():
     pattern = fd.patterns.miura(cells=(1, 1))
     plain, plate = (
@@ -153,24 +162,18 @@ def test_what_stays_as_in_the_standard_calibration():
 
 
 def test_case_files_and_results_keep_it(tmp_path):
-    text = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+    text = (
+        HELD_MIURA_TEXT
+        + """\
 [model]
 calibration = "plate"
 mass = "bubble"
 bend_law = "linear"
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 count = 2
 """
+    )
     (tmp_path / "case.toml").write_text(text, "utf-8")
     found = fd.read_case(tmp_path / "case.toml").run()
     fd.save(found, tmp_path / "modes.nc")

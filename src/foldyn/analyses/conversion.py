@@ -11,6 +11,7 @@ from foldyn.analyses.motion import MASSLESS_METHODS
 from foldyn.analyses.vibration import STATES
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.structures import PRESETS, ModelOptions
 from foldyn.values import choice
 
 Document = dict[str, Any]
@@ -145,12 +146,22 @@ def remodeled(
     kind = now if model is None else choice("model", model, MODELS)
     if kind != now:
         shared = set(MODELS[kind].keys) - {"mass"}
-        given = {key: value for key, value in given.items() if key in shared}
+        creases = {} if "fold_law" in given else _fold_law_of(given.get("preset"))
+        given = {**creases, **{key: value for key, value in given.items() if key in shared}}
     if kind != now and kind == SHELL:
         changed["analysis"] = _of_a_shell(document["analysis"])
     finer = {} if divisions is None else {"divisions": divisions}
     changed["model"] = {**given, "kind": kind, **finer}
     return changed
+
+
+def _fold_law_of(preset: str | None) -> Document:
+    """The key of a fold law that a preset stands for, where it is not the usual one."""
+    law = None if preset is None else PRESETS[preset].fold_law
+    if law in (None, ModelOptions().fold_law):
+        return {}
+    values = dict(vars(law))
+    return {"fold_law": {"kind": values.pop("name"), **values}}
 
 
 def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:

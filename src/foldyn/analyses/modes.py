@@ -247,7 +247,7 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
             "vanishes: they count without stiffness, and motions that only they resist have the "
             "frequency zero. With a secant amplitude they have the slope of an oscillation of that "
-            "amplitude."
+            'amplitude; the preset "plate" has linear bends.'
         )
     if "secant" in modes.attrs:
         notes.append(

@@ -123,12 +123,10 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     """
     schema = validated(path, document)
     model = MODELS[schema.model.kind]
-    masses = list(schema.model.mass or [model.mass])
     kind, faults = ANALYSES[schema.analysis.kind], Faults()
-    if not kind.by_mass:
-        masses = masses[:1]
     pattern: Any = None
     sheet: Any = None
+    default = ""
     with faults.collected():
         pattern = _pattern(schema.pattern, path.parent)
     with faults.collected():
@@ -139,7 +137,10 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
     if schema.sheet.density is None and kind.needs_density and not schema.masses:
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
+        with faults.collected(), within("model: "):
+            default = model.options(**schema.model.options).mass
         faults.tell()
+        masses = list(schema.model.mass or [default])[: None if kind.by_mass else 1]
         if schema.model.kind == SHELL:
             _check_vertices(schema, len(pattern.vertices))
         with within("damping"):

@@ -35,6 +35,7 @@ from foldyn.errors import Faults, InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
+from foldyn.structures import PRESETS
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
@@ -233,6 +234,7 @@ class ModelSection(Section):
     """[model]: arguments of `discretize` or `shell`; what is left out has its default there."""
 
     kind: Annotated[str, one_of(MODELS)] = BARS_AND_HINGES
+    preset: Annotated[Any, one_of(PRESETS)] = None
     scheme: Annotated[Any, one_of(SCHEMES)] = None
     divisions: Count | None = None
     mass: Annotated[list[str] | None, PlainValidator(_masses)] = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -86,7 +87,7 @@ class Loaded:
     @cached_property
     def gravity_terms(self) -> Terms:
         """Accelerations of gravity (m/s2), shape (3,), each with its history."""
-        gravity = (load for load in self.loads if isinstance(load, Gravity))
+        gravity = (load for _, load in self.placed(Gravity))
         return summed((np.array(load.acceleration), load.history) for load in gravity)
 
     @cached_property
@@ -107,3 +108,37 @@ class Loaded:
     def _loads(self) -> Iterator[tuple[str, Load]]:
         """Loads with their places for messages."""
         return ((f"loads[{i}]", load) for i, load in enumerate(self.loads))
+
+
+@dataclass(frozen=True, eq=False)
+class SomeLoads(Loaded):
+    """Some loads of a case, which has checked them, with their places in it.
+
+    Parameters
+    ----------
+    case : Case
+    numbers : sequence of int
+        Their numbers among the loads of the case.
+    """
+
+    case: Loaded
+    numbers: Sequence[int]
+
+    @property
+    def structure(self) -> Any:
+        """The structure of the case."""
+        return self.case.structure
+
+    @property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Mass (n,) that moves with each node in the case, kg."""
+        return self.case.nodal_mass
+
+    @property
+    def loads(self) -> Sequence[Load]:
+        """These loads."""
+        return tuple(self.case.loads[i] for i in self.numbers)
+
+    def _loads(self) -> Iterator[tuple[str, Load]]:
+        pairs = zip(self.numbers, self.loads, strict=True)
+        return ((f"loads[{i}]", load) for i, load in pairs)

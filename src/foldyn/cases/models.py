@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 from foldyn.shells import Shell, ShellOptions, shell
 from foldyn.shells.shell import MASSES
-from foldyn.structures import MASS_RULES, ModelOptions, Structure, discretize
+from foldyn.structures import MASS_RULES, Structure, discretize
+from foldyn.structures.presets import resolved
 
 BARS_AND_HINGES, SHELL = Structure.kind, Shell.kind
 
@@ -21,8 +23,8 @@ class Model:
     ----------
     make : callable
         ``make(pattern, sheet, **options)`` gives the structure.
-    options : type
-        Dataclass of its options.
+    options : callable
+        ``options(**given)`` gives all its options, the defaults of what is not given among them.
     masses : iterable of str
         Distributions of mass that it offers.
     name : str
@@ -30,22 +32,17 @@ class Model:
     """
 
     make: Callable[..., Any]
-    options: type
+    options: Callable[..., Any]
     masses: Iterable[str]
     name: str
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Names of its options."""
-        return tuple(item.name for item in fields(self.options))
-
-    @property
-    def mass(self) -> str:
-        """Its default distribution of mass."""
-        return self.options().mass
+        """Names of what `make` takes besides pattern and sheet."""
+        return tuple(signature(self.make).parameters)[2:]
 
 
 MODELS: Mapping[str, Model] = {
-    BARS_AND_HINGES: Model(discretize, ModelOptions, MASS_RULES, "bars and hinges"),
+    BARS_AND_HINGES: Model(discretize, resolved, MASS_RULES, "bars and hinges"),
     SHELL: Model(shell, ShellOptions, MASSES, "a shell"),
 }

@@ -7,19 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from foldyn.cases.decode import Part
-from foldyn.cases.directions import check_direction, check_pairs, unit_vector
-from foldyn.cases.selection import check_nodes, resolve_nodes
+from foldyn.cases.connectors import Connector
 from foldyn.errors import InputError
-from foldyn.mechanics.attached import GROUND, Springs, no_springs
+from foldyn.mechanics.attached import Springs, no_springs
 from foldyn.values import brief, number
 
 
 @brief
 @dataclass(frozen=True)
-class Spring(Part):
+class Spring(Connector):
     """Linear springs: from nodes to the ground, or between nodes.
 
     To the ground each node is pulled back with k (u . d), u its displacement from the rest position
@@ -58,21 +55,17 @@ class Spring(Part):
     }
     missing = {"stiffness": "give it (N/m) for each spring"}
     apart = "springs are a support of their own"
+    asked = "nodes, for springs to the ground, or between, for springs between nodes"
+    no_line = (
+        "[{k}] = [{a}, {b}]: these nodes coincide, so that the line between them has no direction; "
+        'give direction, as in direction = "x"'
+    )
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         stiffness = number("stiffness", self.stiffness, above=0.0, unit="N/m")
         object.__setattr__(self, "stiffness", stiffness)
-        if (self.nodes is None) == (self.between is None):
-            raise InputError(
-                ": give nodes, for springs to the ground, or between, for springs between nodes"
-            )
-        if self.nodes is not None:
-            object.__setattr__(self, "nodes", check_nodes(self.nodes))
-        else:
-            object.__setattr__(self, "between", check_pairs("between", self.between))
-        if self.direction is not None:
-            object.__setattr__(self, "direction", check_direction("direction", self.direction))
+        self._check_ends()
         if self.rest_length is None:
             return
         rest = number("rest_length", self.rest_length, least=0.0, unit="m")
@@ -97,7 +90,7 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
     ends, direction, stiffness = [none.ends], [none.direction], [none.stiffness]
     axial, vector, natural, along = [none.ends], [none.vector], [none.length], [none.length]
     for place, spring in parts:
-        pairs, axes = spring_ends(structure, spring, place), spring_directions(spring)
+        pairs, axes = spring.ends(structure, place), spring.directions
         if axes is not None:
             ends.append(np.repeat(pairs, len(axes), axis=0))
             direction.append(np.tile(axes, (len(pairs), 1)))
@@ -105,7 +98,6 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
             continue
         apart = x[pairs[:, 1]] - x[pairs[:, 0]]
         length = np.linalg.norm(apart, axis=1)
-        _check_apart(structure, pairs, length, place)
         axial.append(pairs)
         vector.append(apart)
         rest = spring.rest_length
@@ -123,32 +115,3 @@ def packed(parts: Iterable[tuple[str, Spring]], structure: Any) -> Springs:
         stretch=length - np.concatenate(natural),
         axial_stiffness=np.concatenate(along),
     )
-
-
-def spring_ends(structure: Any, spring: Spring, place: str) -> NDArray[np.int64]:
-    """Ends (k, 2) of the springs of a part; `GROUND` in place of the second."""
-    if spring.nodes is not None:
-        nodes = resolve_nodes(structure, spring.nodes, f"{place}.nodes")
-        return np.stack([nodes, np.full(len(nodes), GROUND)], axis=1)
-    pairs = np.array(spring.between, np.int64)
-    for k, pair in enumerate(pairs):
-        resolve_nodes(structure, pair.tolist(), f"{place}.between[{k}]")
-    return pairs
-
-
-def spring_directions(spring: Spring) -> NDArray[np.float64] | None:
-    """Unit vectors (k, 3) along which a part's springs act; None of the line between their ends."""
-    if spring.direction is not None:
-        return unit_vector(spring.direction)[None]
-    return np.eye(3) if spring.nodes is not None else None
-
-
-def _check_apart(structure: Any, pairs: NDArray, length: NDArray, place: str) -> None:
-    size = float(np.ptp(structure.nodes, axis=0).max())
-    meet = np.flatnonzero(length <= 1e-9 * size)
-    if meet.size:
-        raise InputError(
-            f" = {pairs[meet[0]].tolist()}: these nodes coincide, so that the line between them "
-            'has no direction; give direction, as in direction = "x"',
-            f"{place}.between[{meet[0]}]",
-        )

@@ -26,6 +26,7 @@ def info() -> str:
     from foldyn.plots.writers import find_ffmpeg
     from foldyn.statics import METHODS as PATH_METHODS
     from foldyn.statics import SOLVERS
+    from foldyn.structures import PRESETS
 
     video = _part(find_ffmpeg, "imageio-ffmpeg")
     camera = _part(lambda: opencv().__version__, "opencv-python-headless")
@@ -50,9 +51,10 @@ def info() -> str:
         f"methods of frequency responses: {', '.join(FRF_METHODS)}",
         f"patterns: {', '.join(GENERATORS)}; files: {', '.join(FORMATS)}",
         *(
-            f"model {kind}: mass {', '.join(model.masses)} (default: {model.mass})"
+            f"model {kind}: mass {', '.join(model.masses)} (default: {model.options().mass})"
             for kind, model in MODELS.items()
         ),
+        f"presets of bars and hinges: {', '.join(PRESETS)} (default: {next(iter(PRESETS))})",
         "shipped cases:",
         *(f"  {name}" for name in shipped_cases()),
     ]

@@ -14,7 +14,8 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.mechanics.body import Body, Numbering
+from foldyn.mechanics.block_matrix import assembled, blocks_of_ends, pairs_of_ends
+from foldyn.mechanics.body import Body, Numbering, no_fold_hinges
 from foldyn.mechanics.viscous import Viscous, viscous, viscous_matrix
 
 
@@ -54,13 +55,14 @@ def dampers(case: Case) -> Dampers:
         ends = dashpot.ends(case.structure, place)
         if dashpot.coefficient == 0.0:
             continue
-        if dashpot.between is not None and dashpot.along is None:
+        along = dashpot.directions
+        if along is None:
             pairs.append(ends)
             strength.append(np.full(len(ends), dashpot.coefficient))
             continue
-        along = dashpot.along
-        block = np.eye(3) if along is None else np.outer(along, along)
-        constant = constant + _fixed(ends, dashpot.coefficient * block, body.size)
+        block = dashpot.coefficient * (along.T @ along)
+        blocks = blocks_of_ends(ends, np.tile(block, (len(ends), 1, 1)))
+        constant = constant + assembled(pairs_of_ends(ends), blocks, body.size)
     ends = np.concatenate(pairs)
     return Dampers(sparse.csr_array(constant), _elements(case, body, nodes, ends, strength))
 
@@ -69,26 +71,14 @@ def _elements(
     case: Case, body: Body, nodes: NDArray, pairs: NDArray, strength: list[NDArray]
 ) -> Viscous:
     """Axial dashpots between pairs (p, 2) of nodes, and the hinges of damped creases."""
-    hinges, damping = body.fold_hinges(), case.crease_damping
+    damping = case.crease_damping
+    hinges = body.fold_hinges() if damping.any() else no_fold_hinges()
     unknown = np.setdiff1d(np.flatnonzero(damping), hinges.fold)
     if unknown.size:
         raise InputError(f"damping: this structure cannot damp crease {unknown[0]}: leave it out")
     damped = damping[hinges.fold] > 0.0
-    corners = hinges.corners[damped]
-    length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     return viscous(
         pairs, nodes[pairs[:, 1]] - nodes[pairs[:, 0]], np.concatenate(strength),
-        hinges.nodes[damped], corners, hinges.hidden[damped], hinges.per_hidden,
-        damping[hinges.fold[damped]] * length,
+        hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped], hinges.per_hidden,
+        (damping[hinges.fold] * hinges.length)[damped],
     )  # fmt: skip
-
-
-def _fixed(ends: NDArray, block: NDArray, size: int) -> sparse.csr_array:
-    """Matrix of dashpots to the ground (k, 1), or between pairs (k, 2), of a block (3, 3) each."""
-    sign = np.array([1.0]) if ends.shape[1] == 1 else np.array([1.0, -1.0])
-    within = np.einsum("i,j,pq->ipjq", sign, sign, block).reshape(3 * len(sign), -1)
-    dofs = (3 * ends[:, :, None] + np.arange(3)).reshape(len(ends), -1)
-    row = np.repeat(dofs, dofs.shape[1], axis=1)
-    column = np.tile(dofs, (1, dofs.shape[1]))
-    values = np.tile(within.ravel(), len(ends))
-    return sparse.csr_array((values, (row.ravel(), column.ravel())), (size, size))

@@ -21,7 +21,7 @@ from scipy import sparse
 from foldyn.cases import Case
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
-from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Numbering
@@ -51,8 +51,11 @@ class Damping(NamedTuple):
         return sparse.csr_array((self.data, self.indices, self.indptr), (size, size))
 
 
-def damping_of(case: Case, by: Numbering, start: NDArray | None) -> Damping:
-    """Damping of a case as it stands in memory, for a motion from `start` (n, 3), or from rest."""
+def damping_of(case: Case, by: Numbering, start: NDArray | None, modal: ModalRows) -> Damping:
+    """Damping of a case as it stands in memory, for a motion from `start` (n, 3), or from rest.
+
+    modal : its modal damping in that motion.
+    """
     matrix, body, rayleigh = sparse.csr_array((0, 0)), case.body, case.rayleigh
     if rayleigh.beta > 0.0:
         state = start if rayleigh.state == "start" else None
@@ -62,7 +65,6 @@ def damping_of(case: Case, by: Numbering, start: NDArray | None) -> Damping:
     if more.constant.nnz:
         fixed = by.matrix(more.constant)
         matrix = sparse.csr_array(matrix + fixed if matrix.nnz else fixed)
-    modal = modal_rows(case, start)
     modal.warn()
     return Damping(
         alpha=float(rayleigh.alpha),

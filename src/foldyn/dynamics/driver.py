@@ -17,7 +17,8 @@ from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
 from foldyn.dynamics.method_choice import AUTO, choose
-from foldyn.dynamics.methods import Integrator, method_of, suited
+from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
+from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
@@ -148,6 +149,8 @@ def prepare(
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
+    if method != AUTO:
+        case = with_mass(integrator, case)
     duration = number("duration", duration, above=0.0)
     if not isinstance(force, bool):
         raise InputError(f"force = {force!r}: give True or False")
@@ -157,17 +160,18 @@ def prepare(
         )
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
+    modal = modal_rows(case, u)
     reason = ""
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
         method, reason = choose(
-            case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE
+            case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
         )
         integrator = method_of(method)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
-    critical = integrator.critical_step(case, u)
+    critical = integrator.critical_step(case, u, modal)
     plan = _plan(case, integrator, duration, dt, every, critical, force, tolerance, float(start))
     _warn_of_damping(case, integrator, u, critical)
     warn_of_unstable_damping(case, u)
@@ -200,7 +204,7 @@ def prepare(
             stacklevel=3,
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
-    packed = pack(case, span, u)
+    packed = pack(case, span, u, modal)
     sampler = Sampler(case, sample or {}, u, v, plan.start)
     return Motion(case, integrator, plan, critical, force, (u, v), packed, sampler, reason)
 

@@ -18,6 +18,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
 
@@ -32,11 +33,12 @@ SMOOTH = 1e-3  # of a vibration: the least share that is assumed
 
 def choose(
     case: Case, u: NDArray, v: NDArray, start: float, duration: float, dt: float | None,
-    every: int | float, tolerance: float | None, default: float,
+    every: int | float, tolerance: float | None, default: float, modal: ModalRows,
 ) -> tuple[str, str]:  # fmt: skip
     """The method that should be quicker for a motion from u and v (n, 3) at `start`, and why.
 
-    dt, every and tolerance are those of `simulate`, default what implicit methods take without.
+    dt, every and tolerance are those of `simulate`, default what implicit methods take without;
+    modal is the modal damping of the motion.
     """
     conserved = not case.damped and not any(histories(case))
     conserved = conserved and case.body.has_discrete_gradient
@@ -50,7 +52,7 @@ def choose(
     explicit = "central_difference" if lasting else "rk4"
     if tolerance is not None:
         explicit = "dormand_prince"
-    critical = METHODS[explicit].critical_step(case, u)
+    critical = METHODS[explicit].critical_step(case, u, modal)
     if dt is not None and tolerance is None:
         fits = dt <= critical
         word, name = ("within", explicit) if fits else ("above", implicit)

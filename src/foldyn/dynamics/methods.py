@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from foldyn.dynamics import (
 )
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
-from foldyn.dynamics.modal_damping import modal_rows
+from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -136,12 +137,15 @@ class Integrator(NamedTuple):
             return Implicit(self.scheme, packed, course, plan, jumps(case))
         return Compiled(self.loop, packed, course, plan, 1 if self.adaptive else threads_of(packed))
 
-    def critical_step(self, case: Case, u: ArrayLike | None = None) -> float:
-        """See `critical_step`."""
+    def critical_step(
+        self, case: Case, u: ArrayLike | None = None, modal: ModalRows | None = None
+    ) -> float:
+        """See `critical_step`; `modal` is the modal damping of a motion from u, if it is known."""
         if self.growth is None:
             return np.inf
-        start = None if u is None else np.asarray(u, float)
-        rate = damper_rate(case, u) + modal_rows(case, start).rate
+        if modal is None:
+            modal = modal_rows(case, None if u is None else np.asarray(u, float))
+        rate = damper_rate(case, u) + modal.rate
         omega = largest_frequency(case, u)
         return MARGIN * stability_limit(self.growth, omega, case.rayleigh, rate)
 
@@ -191,9 +195,15 @@ def suited(name: str, case: Case) -> Integrator:
     return method
 
 
+def with_mass(method: Integrator, case: Case) -> Case:
+    """The case for a method: without dofs that have no mass where the method needs one."""
+    other = None if method.massless else case.structure.condensed
+    return case if other is None else replace(case, structure=other)
+
+
 def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
-    if case.structure.massless and not method.massless:
+    if with_mass(method, case).structure.massless and not method.massless:
         return f"{case.structure.massless} have no mass"
     if method.conserving and not case.body.has_discrete_gradient:
         return "the forces of this structure have no discrete gradient"
@@ -224,4 +234,5 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     r from 0 to the largest rate at which modal damping, dashpots and creases damp any motion: for
     RK4 ``|R(s dt)| <= 1``.
     """
-    return suited(method, case).critical_step(case, u)
+    chosen = suited(method, case)
+    return chosen.critical_step(with_mass(chosen, case), u)

@@ -73,7 +73,8 @@ class ModalRows(NamedTuple):
             warnings.warn(
                 f"damping: {self.soft} hinges of the superlinear law stand at their rest angle, "
                 "where their slope vanishes: motions that only they resist are no modes, and modal "
-                'damping leaves them out; take bend_law = "linear", or Rayleigh beside it',
+                'damping leaves them out; take preset = "plate" in place of this law, or Rayleigh '
+                "damping beside it",
                 FoldynWarning,
                 stacklevel=5,
             )

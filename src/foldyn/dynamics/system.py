@@ -37,6 +37,7 @@ from foldyn.dynamics.inertia import (
     substitute,
     times_mass,
 )
+from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, add_reactions, ties_of
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
@@ -116,10 +117,13 @@ class Packed(NamedTuple):
         return self.model, self.system, self.mass
 
 
-def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
+def pack(
+    case: Case, span: float, start: NDArray | None = None, modal: ModalRows | None = None
+) -> Packed:
     """Arrays of a case; `span` (s) is short against the variations of the loads.
 
     start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
+    modal : the modal damping of a motion from there, if it is known.
     """
     body, by = renumbered(case.body)
     nodal = by.matrix(case.mass)
@@ -149,7 +153,7 @@ def pack(case: Case, span: float, start: NDArray | None = None) -> Packed:
         energies=len(body.energy_groups),
         order=by.order,
         supported=by.dofs(case.supported_dofs),
-        damping=damping_of(case, by, start),
+        damping=damping_of(case, by, start, modal_rows(case, start) if modal is None else modal),
         waves=pack_waveforms(histories, callbacks, span),
         loads=_ordered(_entries(loads, histories)),
         moved=_ordered(_entries(moves, histories)),

@@ -161,7 +161,7 @@ def linearize(
             f"{soft} hinges of the superlinear law stand at their rest angle, where their slope "
             "vanishes: they count without stiffness, and motions that only they resist have the "
             "frequency zero. Give secant = an amplitude in degrees, such as 1, for the slopes of "
-            'an oscillation of that amplitude, or take bend_law = "linear"',
+            'an oscillation of that amplitude, or take preset = "plate" in place of this law',
             FoldynWarning,
             stacklevel=3,
         )

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Case, State
+from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
-from foldyn.statics.origami import drives, is_actuated, with_loads
+from foldyn.statics.origami import drives, is_actuated
 from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import check_movable, displacement_of
@@ -113,7 +114,7 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
 
 def _load_vectors(case: Case, body: Body) -> NDArray:
     """Forces (m, loads), N, of each load in full."""
-    alone = [with_loads(case, [i]) for i in range(len(case.loads))]
+    alone = [SomeLoads(case, [i]) for i in range(len(case.loads))]
     vectors = [vector.ravel() for one in alone for vector, _ in one.load_terms]
     loads = np.zeros((body.size, len(vectors)))
     for k, vector in enumerate(vectors):

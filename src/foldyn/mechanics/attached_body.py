@@ -26,6 +26,12 @@ from foldyn.mechanics.attached import (
     no_springs,
     spring_energy,
 )
+from foldyn.mechanics.block_matrix import (
+    assembled,
+    blocks_of_ends,
+    pairs_of_ends,
+    pairs_within,
+)
 from foldyn.mechanics.body import (
     Blocks,
     Body,
@@ -39,7 +45,6 @@ from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 
 GROUP = "strain_springs"
-BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 def attached(body: Body, clamps: Clamps | None = None, springs: Springs | None = None) -> Body:
@@ -120,35 +125,23 @@ class AttachedBody(Body):
         return AttachedBlocks(self.inner.blocks(), self.pairs, self.rows)
 
     @cached_property
-    def _ends(self) -> tuple[NDArray, NDArray]:
-        """Ends (s, 2) of all springs, directed and axial, and which of them stand on the ground."""
-        ends = np.concatenate([self.springs.ends, self.springs.axial_ends])
-        return ends, ends[:, 1] < 0
+    def _ends(self) -> NDArray:
+        """Ends (s, 2) of all springs, directed and axial."""
+        return np.concatenate([self.springs.ends, self.springs.axial_ends])
 
     @cached_property
     def pairs(self) -> NDArray:
         """Rows and columns (k, 2) of the nodes that `blocks_at` couples."""
-        ends, grounded = self._ends
-        pairs = [np.repeat(ends[grounded, :1], 2, axis=1)]
-        for nodes in (ends[~grounded], self.clamps.nodes):
-            count = nodes.shape[1]
-            rows, columns = np.repeat(nodes, count, axis=1), np.tile(nodes, (1, count))
-            pairs.append(np.stack([rows, columns], axis=2).reshape(-1, 2))
-        return np.concatenate(pairs)
+        return np.concatenate([pairs_of_ends(self._ends), pairs_within(self.clamps.nodes)])
 
     def blocks_at(self, q: NDArray, loose: bool = False) -> NDArray:
         """Tangent (k, 3, 3), N/m, of springs and clamps, block by block of `pairs`.
 
         loose : without the forces of axial springs.
         """
-        springs, grounded = self._springs_at(q, loose), self._ends[1]
-        return np.concatenate(
-            [
-                springs[grounded],
-                np.einsum("ij,sab->sijab", BETWEEN, springs[~grounded]).reshape(-1, 3, 3),
-                clamp_blocks(self.clamps, self._nodal(q)).reshape(-1, 3, 3),
-            ]
-        )
+        springs = blocks_of_ends(self._ends, self._springs_at(q, loose))
+        clamps = clamp_blocks(self.clamps, self._nodal(q)).reshape(-1, 3, 3)
+        return np.concatenate([springs, clamps])
 
     def _springs_at(self, q: NDArray, loose: bool) -> NDArray:
         """Stiffness (s, 3, 3), N/m, of all springs against motions of one end."""
@@ -158,7 +151,7 @@ class AttachedBody(Body):
 
     def _plus(self, matrix: sparse.csr_array, blocks: NDArray) -> sparse.csr_array:
         """A matrix (m, m) with blocks of `pairs` added to it."""
-        return sparse.csr_array(matrix + _assembled(self.pairs, blocks, self.size))
+        return sparse.csr_array(matrix + assembled(self.pairs, blocks, self.size))
 
     def workspaces(self, threads: int) -> Sequence[AttachedWork]:
         """See `Body`: one thread."""
@@ -279,23 +272,14 @@ class AttachedBody(Body):
 
     def _stretch(self, bars: Any, lines: NDArray, motion: NDArray) -> float:
         """As `Unstrained.stretch`: the larger of bars' and springs', along lines (s, 3)."""
-        (ends, grounded), u, springs = self._ends, self._nodal(motion), self.springs
-        first, second = u[ends[:, 0]], np.where(grounded[:, None], 0.0, u[ends[:, 1]])
+        ends, u, springs = self._ends, self._nodal(motion), self.springs
+        first, second = u[ends[:, 0]], np.where(ends[:, 1:] < 0, 0.0, u[ends[:, 1]])
         stiffness = np.concatenate([springs.stiffness, springs.axial_stiffness])
         apart, most = first - second, np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1)
         along = np.where(lines.any(axis=1), np.einsum("sa,sa->s", apart, lines), most)
         whole = float((stiffness * most**2).sum())
         own = np.sqrt(float((stiffness * along**2).sum()) / whole) if whole > 0.0 else 0.0
         return max(bars(motion), own)
-
-
-def _assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
-    """Matrix (size, size) of 3x3 blocks at pairs (k, 2) of nodes."""
-    axis = np.arange(3)
-    row = np.broadcast_to(3 * pairs[:, 0, None, None] + axis[:, None], blocks.shape)
-    column = np.broadcast_to(3 * pairs[:, 1, None, None] + axis, blocks.shape)
-    entries = (blocks.ravel(), (row.ravel(), column.ravel()))
-    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
 
 
 class AttachedBlocks:

@@ -54,10 +54,21 @@ class FoldHinges(NamedTuple):
     per_hidden: float  # rad/m
 
     @property
+    def length(self) -> NDArray:
+        """Length of each (k,), m."""
+        return np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
+
+    @property
     def share(self) -> NDArray:
         """Length of each (k,) over that of its whole fold."""
-        length = np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
+        length = self.length
         return length / np.bincount(self.fold, length)[self.fold]
+
+
+def no_fold_hinges() -> FoldHinges:
+    """None."""
+    nodes, hidden = np.zeros((0, 4), np.int64), np.zeros((0, 2), np.int64)
+    return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0)
 
 
 class Blocks(Protocol):
@@ -204,8 +215,7 @@ class Body(ABC):
 
     def fold_hinges(self) -> FoldHinges:
         """Hinges of the folds, of which every fold has one at least."""
-        nodes, hidden = np.zeros((0, 4), np.int64), np.zeros((0, 2), np.int64)
-        return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0)
+        return no_fold_hinges()
 
     def folded(self, rest: NDArray) -> Body:
         """The body with other rest angles (nr,), rad."""

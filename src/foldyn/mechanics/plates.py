@@ -66,6 +66,7 @@ class PlatesWork(NamedTuple):
     gradient: NDArray  # (nh, 12)
     moment: NDArray  # (nh,) N m
     fold_angle: NDArray  # (nf,) rad
+    slope: NDArray  # (nf,) of the folds' law
     turn: NDArray  # (the most angles of a plate,) rad
     strips: Whole
     team: Team
@@ -73,17 +74,17 @@ class PlatesWork(NamedTuple):
 
 def plates_work(model: BarsPlates) -> PlatesWork:
     """Memory for `model`."""
-    nh, most = len(model.hinges), int(np.diff(model.start).max(initial=0))
+    nh, nf = len(model.hinges), len(model.fold_rest)
+    most = int(np.diff(model.start).max(initial=0))
     return PlatesWork(
         workspace(model.bars), np.zeros(nh), np.zeros((nh, 12)), np.zeros(nh),
-        np.zeros(len(model.fold_rest)), np.zeros(most), Whole(np.array([0, model.rows])),
-        team(1)[0],
+        np.zeros(nf), np.zeros(nf), np.zeros(most), Whole(np.array([0, model.rows])), team(1)[0],
     )  # fmt: skip
 
 
 @kernel
-def turn_hinges(model, u, x, work):
-    """Dihedrals and their gradients at a state, and the angles of the folds."""
+def turn_hinges(model, u, work):
+    """Dihedrals and their gradients at displacements u."""
     rest, p = model.bars.rest, np.empty(12)
     for e in range(model.hinges.shape[0]):
         for v in range(4):
@@ -96,6 +97,11 @@ def turn_hinges(model, u, x, work):
         work.angle[e] = found[0]
         for c in range(12):
             work.gradient[e, c] = found[1 + c]
+
+
+@kernel
+def turn_folds(model, x, work):
+    """Angles of the folds with rotations x."""
     for f in range(model.fold_rest.size):
         one, other = model.fold_rotations[f]
         both = (x[one] if one >= 0 else 0.0) + (x[other] if other >= 0 else 0.0)
@@ -128,7 +134,8 @@ def fold_moment(model, work, f):
 def plates_energy(model, u, x, work, out):
     """Energies (J) of bars, folds and bends, to out (3,)."""
     strain_energies(model.bars, u, out)
-    turn_hinges(model, u, x, work)
+    turn_hinges(model, u, work)
+    turn_folds(model, x, work)
     p = model.fold_parameters
     for f in range(model.fold_rest.size):
         w = hinge_energy(
@@ -149,7 +156,19 @@ def plates_energy(model, u, x, work, out):
 def plates_force(model, u, x, force, couple, work):
     """Internal force (n, 3), N, and that of the dofs of rotations (r,), N."""
     internal_force(model.bars, u, force, work.bars, False)
-    turn_hinges(model, u, x, work)
+    turn_hinges(model, u, work)
+    turn_moments(model, x, couple, work)
+    for h in range(model.hinges.shape[0]):
+        for v in range(4):
+            node = model.hinges[h, v]
+            for c in range(3):
+                force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
+
+
+@kernel
+def turn_moments(model, x, couple, work):
+    """Moments of all hinges, and forces (r,) on the dofs of rotations, at known dihedrals."""
+    turn_folds(model, x, work)
     couple[:] = 0.0
     for f in range(model.fold_rest.size):
         moment = fold_moment(model, work, f)
@@ -170,11 +189,6 @@ def plates_force(model, u, x, force, couple, work):
                 work.moment[h] = moment
             else:
                 couple[-1 - h] += model.per_reach * moment
-    for h in range(model.hinges.shape[0]):
-        for v in range(4):
-            node = model.hinges[h, v]
-            for c in range(3):
-                force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
 
 
 @overload(force_of, inline="always")

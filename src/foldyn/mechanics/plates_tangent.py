@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import kernel
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
-from foldyn.mechanics.plates import BarsPlates, fold_moment, turn_hinges, turn_plate
+from foldyn.mechanics.plates import BarsPlates, fold_moment, turn_folds, turn_hinges, turn_plate
 
 
 class PlatesPattern(NamedTuple):
@@ -197,7 +197,8 @@ def add_plates_tangent(
 
     floor : slopes of the folds' law per unit stiffness below it are raised to it.
     """
-    turn_hinges(model, u, x, work)
+    turn_hinges(model, u, work)
+    turn_folds(model, x, work)
     _add_folds(model, pattern, u, work, floor, data)
     wide, count = int(pattern.width.max(initial=0)), int(np.diff(model.start).max(initial=0))
     bend, resist = np.empty((2, count, wide))

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 
-from foldyn.cases.springs import spring_directions, spring_ends
 from foldyn.cases.supports import Spring
+from foldyn.mechanics.attached import GROUND
 from foldyn.patterns.topology import around, edge_of
 from foldyn.plots import scene, style
 from foldyn.plots.scene import Points, Sheet3D, View
@@ -91,10 +91,10 @@ def _of_part(
     sheet: Sheet3D, points: Points, spring: Spring, place: str, size: float, view: View
 ) -> list[Points]:
     """Zigzags of a part's springs."""
-    axes, lines = spring_directions(spring), []
+    axes, lines = spring.directions, []
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    for a, b in spring_ends(sheet.structure, spring, place).tolist():
-        if b >= 0:
+    for a, b in spring.ends(sheet.structure, place).tolist():
+        if b != GROUND:
             lines.append(_zigzag(points[a], points[b], 0.3 * size, view))
             continue
         for axis in np.zeros((0, 3)) if axes is None else axes:
@@ -103,13 +103,6 @@ def _of_part(
             lines.append(_zigzag(points[a], foot, 0.3 * size, view))
             lines.append(_ground(points[a], foot, size, view))
     return lines
-
-
-def _across(line: Points, view: View) -> Points:
-    """Unit vector on the screen across a line."""
-    across = np.cross(view.basis[2], line)
-    length = np.linalg.norm(across)
-    return across / length if length > 1e-9 * np.linalg.norm(line) else view.basis[0]
 
 
 def _zigzag(start: Points, end: Points, width: float, view: View) -> Points:
@@ -121,12 +114,12 @@ def _zigzag(start: Points, end: Points, width: float, view: View) -> Points:
     offset[[0, -1]] = 0.0
     share = np.concatenate([[0.0], inner, [1.0]])
     offset = np.concatenate([[0.0], offset, [0.0]])
-    return start + share[:, None] * line + width * offset[:, None] * _across(line, view)
+    return start + share[:, None] * line + width * offset[:, None] * view.across(line)
 
 
 def _ground(start: Points, foot: Points, size: float, view: View) -> Points:
     """The line on which a spring stands."""
-    across = 0.35 * size * _across(foot - start, view)
+    across = 0.35 * size * view.across(foot - start)
     return np.array([foot - across, foot + across])
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.cases import Case, Dashpot
+from foldyn.cases.directions import unit_vector
+from foldyn.mechanics.attached import GROUND
 from foldyn.plots.scene import Points, View
 
 CUP = (-0.5, 0.5)  # beginning and end of the cup along the line, in lengths of it
@@ -21,11 +23,10 @@ def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points
     """
     segments: list[Points] = []
     for place, dashpot in case.dashpots:
-        for ends in dashpot.ends(case.structure, place):
-            start = points[ends[0]]
-            grounded = len(ends) == 1
-            end = _ground(dashpot, start, size) if grounded else points[ends[1]]
-            segments += _symbol(start, end, size, view, grounded)
+        for a, b in dashpot.ends(case.structure, place).tolist():
+            grounded = b == GROUND
+            end = _ground(dashpot, points[a], size) if grounded else points[b]
+            segments += _symbol(points[a], end, size, view, grounded)
     return np.array(segments).reshape(-1, 2, 3)
 
 
@@ -37,8 +38,9 @@ def describe_dashpot(dashpot: Dashpot) -> str:
 
 def _ground(dashpot: Dashpot, node: Points, size: float) -> Points:
     """Where the ground stands: along the direction, or below."""
-    along = dashpot.along
-    return node + REACH * size * (np.array([0.0, 0.0, -1.0]) if along is None else along)
+    down = np.array([0.0, 0.0, -1.0])
+    along = down if dashpot.direction is None else unit_vector(dashpot.direction)
+    return node + REACH * size * along
 
 
 def _symbol(start: Points, end: Points, size: float, view: View, grounded: bool) -> list[Points]:
@@ -46,10 +48,8 @@ def _symbol(start: Points, end: Points, size: float, view: View, grounded: bool)
     if length <= 0.0:
         return []
     along = (end - start) / length
-    across = np.cross(view.basis[2], along)
-    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else view.basis[0]
     cup = min(size, SHARE * length)
-    middle, half = 0.5 * (start + end), HALF * cup * across
+    middle, half = 0.5 * (start + end), HALF * cup * view.across(along)
     bottom, top = (middle + at * cup * along for at in CUP)
     piston = middle + PISTON * cup * along
     lines = [

@@ -24,13 +24,14 @@ class Share(NamedTuple):
     history: Any
 
 
-def pressures(case: Case) -> list[Share]:
-    """Pressure on panels, one for each load."""
+def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Share]:
+    """Pressure (Pa) or changes of temperature (K) of panels, one for each load of a kind."""
     structure, found = case.structure, []
-    for place, load in case.placed(Pressure):
+    for place, load in case.placed(kind):
         triangles = resolve_panels(structure, load.panels, f"{place}.panels")
         panels = np.unique(structure.triangle_panel[triangles])
-        found.append(Share(panels, np.full(len(panels), load.pressure), load.history))
+        value = load.pressure if kind is Pressure else load.change
+        found.append(Share(panels, np.full(len(panels), value), load.history))
     return found
 
 
@@ -40,16 +41,6 @@ def moments(case: Case) -> list[Share]:
     for place, load in case.placed(CreaseMoment):
         creases, moment = load.of_creases(case.structure, place)
         found.append(Share(creases, moment, load.history))
-    return found
-
-
-def temperatures(case: Case) -> list[Share]:
-    """Changes of temperature (K) of panels, one for each load."""
-    structure, found = case.structure, []
-    for place, load in case.placed(Temperature):
-        triangles = resolve_panels(structure, load.panels, f"{place}.panels")
-        panels = np.unique(structure.triangle_panel[triangles])
-        found.append(Share(panels, np.full(len(panels), load.change), load.history))
     return found
 
 

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from foldyn.cases import Actuate, Case, Impose, resolve_nodes
+from foldyn.cases import Actuate, Case, Impose, Pressure, Temperature, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases
 from foldyn.plots import style
-from foldyn.plots.following import Share, moments, pressures, temperatures
+from foldyn.plots.following import Share, moments, on_panels
 from foldyn.plots.ties import base_vectors
 from foldyn.values import number
 
@@ -71,11 +71,10 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     number("duration", duration, above=0.0, unit="s")
     forces = [_Curve(_peak(f), describe_load(f), h) for f, h in case.force_terms]
     gravity = [_Curve(_peak(g), describe_gravity(g), h) for g, h in case.gravity_terms]
-    pressure = [_Curve(_most(s.value), describe_pressure(s), s.history) for s in pressures(case)]
+    pushed, warm = on_panels(case, Pressure), on_panels(case, Temperature)
+    pressure = [_Curve(_most(s.value), describe_pressure(s), s.history) for s in pushed]
     moment = [_Curve(_most(s.value), describe_moment(s), s.history) for s in moments(case)]
-    warmth = [
-        _Curve(_most(s.value), describe_temperature(s), s.history) for s in temperatures(case)
-    ]
+    warmth = [_Curve(_most(s.value), describe_temperature(s), s.history) for s in warm]
     panels = [
         ("force at a node (N)", forces),
         ("pressure (Pa)", pressure),

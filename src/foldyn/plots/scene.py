@@ -170,6 +170,12 @@ class View:
         """Return the points as seen on the screen, shape (..., 2)."""
         return points @ self.basis[:2].T
 
+    def across(self, line: Points) -> Points:
+        """Return the unit vector (3,) on the screen across a line (3,)."""
+        across = np.cross(self.basis[2], line)
+        length = np.linalg.norm(across)
+        return across / length if length > 1e-6 * np.linalg.norm(line) else self.basis[0]
+
 
 class Seen(NamedTuple):
     """The box around all that a view shows, and its size on the screen."""

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike
 
-from foldyn.cases import Case, Fix, Impose
+from foldyn.cases import Case, Fix, Impose, Pressure, Temperature
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import dashpots, following, marks, scene, style, ties
@@ -111,7 +111,7 @@ def draw_structure(
     keys += [Patch(facecolor=group.color, label=group.text) for group in groups]
     keys += attached.keys
     keys += [key for group in arrows for key in group.keys]
-    warm = following.temperatures(sheet.case) if loads and sheet.case else []
+    warm = following.on_panels(sheet.case, Temperature) if loads and sheet.case else []
     for share in warm:
         look = {"color": style.WARM, "marker": "*", "linestyle": "none", "markersize": 8.0}
         keys.append(style.key(histories.describe_temperature(share), **look))
@@ -223,7 +223,7 @@ def _loads(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_
     case = sheet.case
     vertices = len(sheet.pattern.vertices)
     forces = [(points, vectors) for vectors, _ in case.force_terms]
-    pushed = [share for share in following.pressures(case) if share.value.any()]
+    pushed = [share for share in following.on_panels(case, Pressure) if share.value.any()]
     pressure = [following.panel_arrows(case, points, share) for share in pushed]
     told = iter([histories.describe_pressure(share) for share in pushed])
     gravity = [

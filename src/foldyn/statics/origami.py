@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +12,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Actuate, Case
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.cases.loaded import SomeLoads
+from foldyn.errors import InputError
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.statics.problem import EPS
@@ -94,8 +93,8 @@ class OrigamiProblem:
         self._work, self._ties = body.workspaces(1)[0], case.constraints
         self._shape = structure.nodes.shape
         loads, chosen = range(len(case.loads)), set(constant)
-        steady = with_loads(case, [i for i in loads if i in chosen])
-        growing = with_loads(case, [i for i in loads if i not in chosen])
+        steady = SomeLoads(case, [i for i in loads if i in chosen])
+        growing = SomeLoads(case, [i for i in loads if i not in chosen])
         kinds = enumerate((steady, growing))
         self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
         at_rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
@@ -238,13 +237,6 @@ class OrigamiProblem:
 def _factors(steady: float, growing: float) -> NDArray:
     """Factors (2, 1) of loads that are constant, and of those that grow."""
     return np.array([[steady], [growing]])
-
-
-def with_loads(case: Case, chosen: Sequence[int]) -> Case:
-    """The case with only those of its loads that have these numbers."""
-    with warnings.catch_warnings():  # they were given when the case was made
-        warnings.simplefilter("ignore", FoldynWarning)
-        return replace(case, loads=[case.loads[i] for i in chosen])
 
 
 def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDArray:

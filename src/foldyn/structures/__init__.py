@@ -4,11 +4,13 @@ from foldyn.structures.discretize import discretize
 from foldyn.structures.laminate import Laminate
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.presets import PRESETS
 from foldyn.structures.sheet import PanelSheet, Sheet, sheet_from
 from foldyn.structures.structure import ModelOptions, Structure
 
 __all__ = [
     "MASS_RULES",
+    "PRESETS",
     "Laminate",
     "ModelOptions",
     "PanelSheet",

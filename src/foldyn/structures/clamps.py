@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.mechanics.attached import Clamps
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import Edge, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import show
 
 
@@ -51,14 +51,19 @@ def boundary_edges(
     return tuple((pair[0], pair[1]) for pair in pairs)
 
 
-def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> NDArray:
-    """Rows (c, 3) of boundary edges: the triangle there, from the edge's first corner."""
-    found = {}
-    for triangle in triangles.tolist():
-        for turn in range(3):
-            a, b, third = (triangle[(turn + k) % 3] for k in range(3))
-            found[edge_of(a, b)] = (a, b, third)
-    return np.array([found[edge] for edge in edges], np.int64).reshape(-1, 3)
+def clamp_rows(edges: Sequence[Edge], triangles: NDArray) -> tuple[NDArray, NDArray]:
+    """Rows (c, 3) of boundary edges: the triangle there, from the edge's first corner; its number.
+
+    edges, triangles : (low, high) vertices of each, (nt, 3).
+    """
+    if not edges:
+        return np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
+    sides = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3)
+    weight = [int(triangles.max()) + 1, 1]
+    number = np.sort(sides[:, :2], axis=1) @ weight
+    order = np.argsort(number)
+    place = order[np.searchsorted(number, np.array(edges) @ weight, sorter=order)]
+    return sides[place], place // 3
 
 
 def clamp_stiffness(x: NDArray, rows: NDArray, modulus: NDArray) -> NDArray:

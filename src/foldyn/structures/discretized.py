@@ -161,6 +161,11 @@ class Discretized:
         """The same with a coarser mesh, for those that have one."""
         return None
 
+    @property
+    def condensed(self) -> Discretized | None:
+        """The same by its displacements alone, for those that can do without dofs without mass."""
+        return None
+
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """What it gets where panels would, if they were free, stretch and curl.
 

@@ -8,7 +8,8 @@ spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the 
                             spokes turn in the two curvatures without mean, of size 1; p of
                             `POLYGON`, because a plate that only its corners bend is softer;
 diagonal (N4B5)             2 (1 - nu) G A s / D^2, A the area of its two triangles;
-fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2).
+fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2), but for panels
+                            that are rigid.
 
 All four spokes of a quad are alike. The twist of a parallelogram, with its corners at +w and -w in
 turn, then has the stiffness 32 (1 - nu) G s/A, which without s is that of a plate whose edges stay
@@ -19,6 +20,8 @@ Derivation and errors: docs/fidelity.md.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,13 +65,17 @@ def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
     return bends
 
 
-def fold_stiffness(crease: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+def fold_stiffness(
+    crease: NDArray, pattern: Pattern, sheet: Sheet, rigid: str | Sequence[int] | None = None
+) -> NDArray:
     """Stiffness of whole folds (nf,), N m/rad, from that of the creases alone.
 
-    Each fold acts in series with the two panels that its moment bends.
+    Each fold acts in series with the two panels that its moment bends; rigid ones do not.
     """
     free = _free_edges(pattern)
     share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
+    stiff = range(len(share)) if isinstance(rigid, str) else rigid or ()
+    share[list(stiff)] = 0.0
     length = lengths(pattern.vertices, pattern.creases)
     modulus = sheet.values("bending_modulus", len(pattern.faces))
     panels = (share * pattern.face_areas / modulus)[pattern.crease_faces].sum(axis=1)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
 from foldyn.algebra.solvers import Fill
@@ -31,6 +30,7 @@ from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.structures.body import GROUPS, BarsHingesBody
 from foldyn.structures.clamps import clamps
+from foldyn.structures.condensed_body import CondensedBody, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.edge_angles import edge_plates, plates_model
@@ -39,7 +39,7 @@ from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.plates_body import BarsPlatesBody
 from foldyn.structures.rigid_plates import Plate, rigid_plates
 from foldyn.structures.sheet import Sheet
-from foldyn.structures.swelling import Swelling, chord_turns, panel_of_triangle
+from foldyn.structures.swelling import Chords, Swelling, chords
 from foldyn.values import choice
 
 FILL = Fill(2700.0, 340, "pattern", "take fewer panels, or an explicit method of motion")
@@ -51,14 +51,14 @@ CALIBRATIONS = ("standard", "merlin2", "plate")
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """Arguments of `discretize` besides pattern and sheet; see there."""
+    """Options of a structure, all of them; see `discretize` and `foldyn.structures.presets`."""
 
     scheme: Literal["n5b8", "n4b5", "n5b8e"] = "n5b8"
-    mass: str = "mixed_voronoi"
+    mass: str = "consistent"
     bar_law: str | BarLaw = "ogden"
     fold_law: str | HingeLaw = EnhancedLinear()
-    bend_law: str | HingeLaw = "superlinear"
-    calibration: Literal["standard", "merlin2", "plate"] = "standard"
+    bend_law: str | HingeLaw = "linear"
+    calibration: Literal["standard", "merlin2", "plate"] = "plate"
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
     clamped: tuple[Edge, ...] = ()
@@ -100,6 +100,8 @@ class Structure(Discretized):
         Node number of each panel's center, -1 without one.
     clamps, clamp_stiffness : (c, 3), (c,)
         Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
+    without_edge_angles : bool
+        Whether those of the scheme n5b8e are no dofs but stay in balance.
     pattern, sheet, options
         What it was made from.
     """
@@ -123,6 +125,7 @@ class Structure(Discretized):
     node_mass: NDArray | None = None
     clamps: NDArray = field(default_factory=lambda: _none(3))
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
+    without_edge_angles: bool = False
 
     def __repr__(self) -> str:
         """One line with the counts."""
@@ -186,9 +189,10 @@ class Structure(Discretized):
     @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Its dofs without mass, in words."""
-        return "the edge angles of the scheme n5b8e" if self.has_edge_angles else ""
+        there = self.has_edge_angles and not self.without_edge_angles
+        return "the edge angles of the scheme n5b8e" if there else ""
 
-    def _plates_body(self) -> BarsPlatesBody:
+    def _plates_body(self) -> Body:
         assert self.pattern is not None
         rigid = self.options.rigid or ()
         plates = edge_plates(
@@ -200,7 +204,16 @@ class Structure(Discretized):
             self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
             self.fold_rest, self.fold_law, self.bends, self.bend_rest, plates,
         )  # fmt: skip
-        return BarsPlatesBody(model, (self.fold_law, self.bend_law))
+        body = BarsPlatesBody(model, (self.fold_law, self.bend_law))
+        return CondensedBody(body) if self.without_edge_angles else body
+
+    @property
+    def condensed(self) -> Structure | None:
+        """See `Discretized`."""
+        if not self.massless:
+            return None
+        other = replace(self, without_edge_angles=True)
+        return other.marked() if self.as_made else other
 
     @cached_property
     def plates(self) -> tuple[Plate, ...]:
@@ -256,25 +269,27 @@ class Structure(Discretized):
                 'take "n5b8"',
                 "scheme",
             )
-        turns = np.zeros(0)
-        for kind in self.hinge_kinds:
-            change = np.zeros(len(kind.nodes))
-            for wing in (2, 3):
-                corners = kind.nodes[:, [0, 1, wing]]
-                panel = panel_of_triangle(self.triangles, self.triangle_panel, corners)
-                change -= curvature[panel] * chord_turns(self.nodes[corners])
-            turns = np.concatenate([turns, change])
+        of_hinges, of_clamps = self._chords
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         free = _mean_of_neighbors(self.bars, self.triangles, strain[self.triangle_panel])
         tension = -stiffness * self.bar_law.stress(1.0 + free)
         parts = [tensions(self.nodes, self.bars, tension)]
         if len(self.clamps):
             edges = clamps(self.nodes, self.clamps, self.clamp_stiffness, 0)
-            panel = panel_of_triangle(self.triangles, self.triangle_panel, self.clamps)
-            turn = -curvature[panel] * chord_turns(self.nodes[self.clamps])
+            turn = of_clamps.turns(curvature)
             rows = np.column_stack([self.clamps, np.full(len(self.clamps), -1)])
             parts.append(moments(edges.points, rows, self.clamp_stiffness * turn))
-        return Swelling(turns, joined((part, 0) for part in parts))
+        return Swelling(of_hinges.turns(curvature), joined((part, 0) for part in parts))
+
+    @cached_property
+    def _chords(self) -> tuple[Chords, Chords]:
+        """How curvature turns its hinges, folds first, and its clamps."""
+        hinges = np.concatenate([kind.nodes for kind in self.hinge_kinds])
+        of_hinges, of_clamps = (
+            chords(self.nodes, self.triangles, self.triangle_panel, rows)
+            for rows in (hinges, self.clamps)
+        )
+        return of_hinges, of_clamps
 
     def energies(self, u: ArrayLike) -> Mapping[str, float]:
         """Strain energies (J) of bars, folds and bends at displacement u (n, 3), m."""
@@ -312,16 +327,6 @@ class Structure(Discretized):
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""
         x = self.nodes + self._displacement(u)
         return hinge_angles(x, self.folds), hinge_angles(x, self.bends)
-
-
-def balanced(matrix: sparse.csr_array, hidden: NDArray) -> sparse.csr_array:
-    """The tangent (3n, 3n) of displacements where the `hidden` last dofs give way."""
-    if not len(hidden):
-        return matrix
-    first = hidden[0]
-    across = sparse.csc_array(matrix[first:, :first])
-    given = sparse.csc_array(splu(sparse.csc_array(matrix[first:, first:])).solve(across.toarray()))
-    return sparse.csr_array(matrix[:first, :first] - across.T @ given)
 
 
 def _mean_of_neighbors(pairs: NDArray, triangles: NDArray, value: NDArray) -> NDArray:

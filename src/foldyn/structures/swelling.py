@@ -43,5 +43,42 @@ def chord_turns(corners: NDArray) -> NDArray:
 
 def panel_of_triangle(triangles: NDArray, panel: NDArray, wanted: NDArray) -> NDArray:
     """Panels of triangles `wanted` (n, 3), whatever the order of their corners."""
-    number = {tuple(t): p for t, p in zip(np.sort(triangles).tolist(), panel.tolist(), strict=True)}
-    return np.array([number[tuple(t)] for t in np.sort(wanted).tolist()], np.int64)
+    known, sought = np.split(_numbers(np.concatenate([triangles, wanted])), [len(triangles)])
+    order = np.argsort(known, kind="stable")
+    place = order[np.searchsorted(known[order], sought, "right") - 1]
+    if not np.array_equal(known[place], sought):
+        raise KeyError("a triangle that the structure does not have")
+    return panel[place]
+
+
+def _numbers(triangles: NDArray) -> NDArray:
+    """A number (n,) of each triangle (n, 3), equal for those of the same corners."""
+    low, middle, high = np.sort(triangles, axis=1).T
+    size = int(triangles.max(initial=0)) + 1
+    return (low * size + middle) * size + high
+
+
+class Chords(NamedTuple):
+    """Wings of hinges, w of each of n hinges: how the curvature of their panels turns them."""
+
+    panel: NDArray  # (w, n)
+    turn: NDArray  # (w, n) `chord_turns`, m
+
+    def turns(self, curvature: NDArray) -> NDArray:
+        """Changes (n,), rad, of the angles at curvatures (np,), 1/m, of the panels."""
+        change = np.zeros(self.panel.shape[1])
+        for panel, turn in zip(self.panel, self.turn, strict=True):
+            change -= curvature[panel] * turn
+        return change
+
+
+def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> Chords:
+    """Wings of hinges (n, 2 + w), axis and wings, between triangles (nt, 3) of points x.
+
+    panel : (nt,) of the triangles.
+    """
+    wings = [hinges[:, [0, 1, wing]] for wing in range(2, hinges.shape[1])]
+    return Chords(
+        np.array([panel_of_triangle(triangles, panel, corners) for corners in wings]),
+        np.array([chord_turns(x[corners]) for corners in wings]),
+    )

@@ -22,7 +22,7 @@ from foldyn.studies import find_case
 from foldyn.studies.fidelity.statics import STUDIES
 
 LAWS: Mapping[str, Mapping[str, Any]] = {
-    "standard, superlinear": {},
+    "standard, superlinear": {"preset": "herkal"},
     "plate, linear": {"calibration": "plate", "bend_law": "linear"},
     "n5b8e, linear": {"calibration": "plate", "bend_law": "linear", "scheme": "n5b8e"},
     "plate, plate_superlinear": {"calibration": "plate", "bend_law": "plate_superlinear"},

@@ -1,0 +1,43 @@
+"""Matrices of 3x3 blocks at pairs of nodes: of springs and dashpots, of hinges."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+BETWEEN = np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
+def pairs_within(nodes: NDArray) -> NDArray:
+    """Rows and columns (n k k, 2) of the blocks of n elements that couple k nodes each (n, k)."""
+    count = nodes.shape[1]
+    rows, columns = np.repeat(nodes, count, axis=1), np.tile(nodes, (1, count))
+    return np.stack([rows, columns], axis=2).reshape(-1, 2)
+
+
+def pairs_of_ends(ends: NDArray) -> NDArray:
+    """Rows and columns (k, 2) of the blocks of what stands between ends (s, 2)."""
+    grounded = ends[:, 1] < 0
+    return np.concatenate([pairs_within(ends[grounded, :1]), pairs_within(ends[~grounded])])
+
+
+def blocks_of_ends(ends: NDArray, resistance: NDArray) -> NDArray:
+    """Blocks (k, 3, 3) at `pairs_of_ends` of what stands between ends (s, 2).
+
+    Those with one end on the ground, in place of which is -1, come first.
+
+    resistance : (s, 3, 3) against motions of one end, the other at rest.
+    """
+    grounded = ends[:, 1] < 0
+    between = np.einsum("ij,sab->sijab", BETWEEN, resistance[~grounded]).reshape(-1, 3, 3)
+    return np.concatenate([resistance[grounded], between])
+
+
+def assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
+    """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes, those of a pair added."""
+    axis = np.arange(3)
+    row = np.broadcast_to(3 * pairs[:, 0, None, None] + axis[:, None], blocks.shape)
+    column = np.broadcast_to(3 * pairs[:, 1, None, None] + axis, blocks.shape)
+    entries = (blocks.ravel(), (row.ravel(), column.ravel()))
+    return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))

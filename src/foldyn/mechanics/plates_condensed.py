@@ -1,0 +1,229 @@
+"""Plates whose rotations are in balance at every displacement: for methods that need mass.
+
+The rotations x (r,) of `mechanics.plates` have no forces on them. Newton's method finds them at
+every evaluation, from those of the last one. Their stiffness is that of the plates, which is
+constant, and of the folds, which couple the two rotations beside them; it is factorized as a band
+(Cholesky), once where the law of the folds is linear.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from foldyn.jit.compiled import kernel
+from foldyn.materials import linear
+from foldyn.materials.switch import hinge_slope
+from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
+from foldyn.mechanics.model import ranks
+from foldyn.mechanics.plates import (
+    BarsPlates,
+    PlatesWork,
+    plates_energy,
+    plates_force,
+    plates_work,
+    turn_hinges,
+    turn_moments,
+)
+from foldyn.mechanics.threads import Team
+
+STEPS = 50  # of Newton's method, at most
+BALANCED = 1e-12  # rad, of the last one
+LEAST = 1e-3  # slope per unit stiffness of a fold in these steps
+
+
+class CondensedPlates(NamedTuple):
+    """Arrays of a model whose rotations are in balance.
+
+    Attributes
+    ----------
+    plates : BarsPlates
+    rank : (r,)
+        Place of each rotation in the band.
+    band, factor : (r, w + 1)
+        Lower triangle of the plates' stiffness for the dofs of rotations, N/m, entry (i, j) at
+        [i, w + j - i]; and its factor with folds of slope one.
+    """
+
+    plates: BarsPlates
+    rank: NDArray
+    band: NDArray
+    factor: NDArray
+
+    @property
+    def hinges(self) -> NDArray:
+        """Rows (nh, 4) of all hinges."""
+        return self.plates.hinges
+
+
+class CondensedWork(NamedTuple):
+    """Memory of one evaluation."""
+
+    plates: PlatesWork
+    x: NDArray  # (r,) rotations of the last evaluation, m
+    couple: NDArray  # (r,) N
+    step: NDArray  # (r,) in the order of the band
+    factor: NDArray  # (r, w + 1)
+    angle: NDArray  # those of `plates`
+    fold_angle: NDArray
+    strips: Whole
+    team: Team
+
+
+def condensed_plates(model: BarsPlates) -> CondensedPlates:
+    """Arrays of the same model without rotations."""
+    r, rows, columns, values = model.rotations, [], [], []
+    for p in range(len(model.start) - 1):
+        turned = model.angle[model.start[p] : model.start[p + 1]]
+        own = np.flatnonzero(turned < 0)
+        matrix = model.stiffness[model.entry[p] : model.entry[p + 1]]
+        part = matrix.reshape(len(turned), -1)[np.ix_(own, own)]
+        number = -1 - turned[own]
+        rows.append(np.repeat(number, len(own)))
+        columns.append(np.tile(number, len(own)))
+        values.append(part.ravel() * model.per_reach**2)
+    one, other = model.fold_rotations[(model.fold_rotations >= 0).all(axis=1)].T
+    flat = [np.concatenate([np.zeros(0), *part]) for part in (rows, columns, values)]
+    entries = (flat[2], (flat[0].astype(int), flat[1].astype(int)))
+    stiffness = sparse.csr_array(sparse.coo_array(entries, shape=(r, r)))
+    joined = sparse.csr_array(
+        abs(stiffness) + sparse.coo_array((np.ones(len(one)), (one, other)), shape=(r, r))
+    )
+    order = reverse_cuthill_mckee(sparse.csr_array(joined + joined.T), symmetric_mode=True)
+    rank = ranks(order.astype(np.int64))
+    found = sparse.coo_array(joined)
+    width = int(np.abs(rank[found.coords[0]] - rank[found.coords[1]]).max(initial=0))
+    band = np.zeros((r, width + 1))
+    at = sparse.coo_array(stiffness)
+    i, j = rank[at.coords[0]], rank[at.coords[1]]
+    lower = i >= j
+    np.add.at(band, (i[lower], width + j[lower] - i[lower]), at.data[lower])
+    factor = band.copy()
+    add_folds(model, rank, np.ones(len(model.fold_rest)), factor)
+    factorize_band(factor)
+    return CondensedPlates(model, rank, band, factor)
+
+
+def condensed_work(model: CondensedPlates) -> CondensedWork:
+    """Memory for `model`."""
+    r, plates = model.plates.rotations, plates_work(model.plates)
+    return CondensedWork(
+        plates, np.zeros(r), np.zeros(r), np.zeros(r), model.factor.copy(), plates.angle,
+        plates.fold_angle, Whole(np.array([0, model.plates.nodes])), plates.team,
+    )  # fmt: skip
+
+
+@kernel
+def add_folds(plates, rank, slope, band):
+    """Add folds with slopes per unit stiffness to the stiffness of the rotations."""
+    width = band.shape[1] - 1
+    for f in range(plates.fold_rest.size):
+        stiff = plates.fold_stiffness[f] * slope[f] * plates.per_reach * plates.per_reach
+        one, other = plates.fold_rotations[f]
+        if one >= 0:
+            band[rank[one], width] += stiff
+        if other >= 0:
+            band[rank[other], width] += stiff
+        if one >= 0 and other >= 0:
+            high, low = max(rank[one], rank[other]), min(rank[one], rank[other])
+            band[high, width + low - high] += stiff
+
+
+@kernel
+def factorize_band(band):
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor."""
+    size, width = band.shape[0], band.shape[1] - 1
+    for i in range(size):
+        for j in range(max(0, i - width), i + 1):
+            total = band[i, width + j - i]
+            for k in range(max(0, i - width, j - width), j):
+                total -= band[i, width + k - i] * band[j, width + k - j]
+            if i == j:
+                band[i, width] = math.sqrt(total)
+            else:
+                band[i, width + j - i] = total / band[j, width]
+
+
+@kernel
+def solve_band(factor, x):
+    """Solve with a factor of `factorize_band`, in place."""
+    size, width = factor.shape[0], factor.shape[1] - 1
+    for i in range(size):
+        for k in range(max(0, i - width), i):
+            x[i] -= factor[i, width + k - i] * x[k]
+        x[i] /= factor[i, width]
+    for i in range(size - 1, -1, -1):
+        x[i] /= factor[i, width]
+        for k in range(max(0, i - width), i):
+            x[k] -= factor[i, width + k - i] * x[i]
+
+
+@kernel
+def balance(model, u, work):
+    """Rotations in balance at displacements u, to work.x; nan where there are none."""
+    plates = model.plates
+    turn_hinges(plates, u, work.plates)
+    p, slope = plates.fold_parameters, work.plates.slope
+    for _ in range(STEPS):
+        turn_moments(plates, work.x, work.couple, work.plates)
+        if plates.code != linear.CODE:
+            for f in range(plates.fold_rest.size):
+                found = hinge_slope(
+                    plates.code, work.plates.fold_angle[f], plates.fold_rest[f], p[f, 0], p[f, 1],
+                    plates.addresses[2],
+                )  # fmt: skip
+                slope[f] = max(found, LEAST)
+            work.factor[:] = model.band
+            add_folds(plates, model.rank, slope, work.factor)
+            factorize_band(work.factor)
+        largest = 0.0
+        for k in range(work.x.size):
+            work.step[model.rank[k]] = -work.couple[k]
+        solve_band(work.factor, work.step)
+        for k in range(work.x.size):
+            work.x[k] += work.step[model.rank[k]]
+            largest = max(largest, abs(work.step[model.rank[k]]))
+        if plates.per_reach * largest <= BALANCED or not largest < np.inf:
+            return
+    work.x[:] = np.nan
+
+
+@kernel
+def condensed_force(model, u, force, work):
+    """Internal force (n, 3), N, with rotations in balance."""
+    balance(model, u, work)
+    plates_force(model.plates, u, work.x, force, work.couple, work.plates)
+
+
+@kernel
+def condensed_energy(model, u, work, out):
+    """Energies (J) of bars, folds and bends, to out (3,), with rotations in balance."""
+    balance(model, u, work)
+    plates_energy(model.plates, u, work.x, work.plates, out)
+
+
+@overload(force_of, inline="always")
+def _force(model, u, force, work):
+    if model.instance_class is not CondensedPlates:
+        return None
+    return lambda model, u, force, work: condensed_force(model, u, force, work)
+
+
+@overload(energies_of, inline="always")
+def _energies(model, u, work, out):
+    if model.instance_class is not CondensedPlates:
+        return None
+    return lambda model, u, work, out: condensed_energy(model, u, work, out)
+
+
+@overload(folds_of, inline="always")
+def _folds(model):
+    if model.instance_class is not CondensedPlates:
+        return None
+    return lambda model: folds_of(model.plates)

@@ -1,0 +1,115 @@
+"""Named models: the options of `discretize` that belong together.
+
+A preset gives what is left out. Without one it is "plate", unless an option is given that stands
+for another: the scheme n5b8e; or for the model of the paper, a calibration other than "plate" or
+superlinear bends without a calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from foldyn.errors import InputError
+from foldyn.materials import EnhancedLinear, PlateSuperlinear, Superlinear, bar_law, hinge_law
+from foldyn.structures.mass import MASS_RULES
+from foldyn.structures.structure import ModelOptions
+from foldyn.values import choice, show
+
+PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
+
+PRESETS: Mapping[str, ModelOptions] = {
+    PLATE: ModelOptions(),
+    N5B8E: ModelOptions(scheme="n5b8e", mass="condensed"),
+    HERKAL: ModelOptions(
+        mass="mixed_voronoi", bend_law="superlinear", calibration="standard"
+    ),
+    MERLIN2: ModelOptions(
+        mass="mixed_voronoi", bend_law="superlinear", calibration="merlin2",
+        fold_law=EnhancedLinear(rest="as_published"),
+    ),
+}  # fmt: skip
+"""Options by name of the preset.
+
+plate : panels that bend and twist as thin plates; right about the shell's frequencies and small
+    displacements (docs/fidelity.md).
+n5b8e : the same with panels that give way at their creases; twice as near to the shell.
+herkal : the model of Herkal et al., Int. J. Solids Struct. 309, 2025.
+merlin2 : MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
+    has no mass, and gets that of "herkal".
+"""
+
+
+def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
+    """All options of a model.
+
+    Parameters
+    ----------
+    preset : {"plate", "herkal", "merlin2"}, optional
+        See the module for what its absence means.
+    **given
+        Fields of `ModelOptions` that replace those of the preset, unless they are None.
+
+    Raises
+    ------
+    InputError
+        An option is unknown, or two of them do not go together.
+    """
+    known = {name: value for name, value in given.items() if value is not None}
+    base = PRESETS[implied(known) if preset is None else choice("preset", preset, PRESETS)]
+    options = ModelOptions(**{**vars(base), **known})
+    choice("mass", options.mass, MASS_RULES)
+    bar_law(options.bar_law)
+    hinge_law(options.fold_law, "fold_law")
+    _check_bends(options)
+    _check_edges(options)
+    return options
+
+
+def implied(given: Mapping[str, Any]) -> str:
+    """Name of the preset that options stand for where none is named."""
+    if given.get("scheme") == N5B8E:
+        return N5B8E
+    if "calibration" in given:
+        return PLATE if given["calibration"] == "plate" else HERKAL
+    bends = hinge_law(given.get("bend_law", "linear"), "bend_law")
+    return HERKAL if isinstance(bends, Superlinear) else PLATE
+
+
+def _check_bends(options: ModelOptions) -> None:
+    """Refuse laws of bends that have no meaning with the stiffness of the calibration."""
+    bends = hinge_law(options.bend_law, "bend_law")
+    of_plates = options.calibration == "plate"
+    if isinstance(bends, PlateSuperlinear) and bends.onset is None and not of_plates:
+        raise InputError(
+            ' = "plate_superlinear": has a plate\'s stiffness for small turns, which only '
+            'calibration = "plate" gives to bends; set it, or give PlateSuperlinear(onset=...)',
+            "bend_law",
+        )
+    if isinstance(bends, Superlinear) and of_plates:
+        raise InputError(
+            ' = "superlinear": takes the stiffness of large turns, calibration = "plate" gives '
+            'that of small ones; take "linear" or "plate_superlinear", or preset = "herkal"',
+            "bend_law",
+        )
+
+
+def _check_edges(options: ModelOptions) -> None:
+    """Refuse what the scheme n5b8e does not go with, and edges that cannot bow."""
+    if options.scheme != N5B8E:
+        if options.straight:
+            raise InputError(': edges bow with scheme = "n5b8e" only: leave it out', "straight")
+        return
+    needs = 'scheme = "n5b8e" needs'
+    if options.calibration != "plate":
+        raise InputError(
+            f' = "{options.calibration}": {needs} "plate", whose panels are plates', "calibration"
+        )
+    if hinge_law(options.bend_law, "bend_law") != hinge_law("linear"):
+        raise InputError(
+            f' = {show(options.bend_law)}: {needs} "linear", as its panels bend', "bend_law"
+        )
+    if options.clamped:
+        raise InputError(
+            f': {needs} edges without clamps; take scheme = "n5b8", or a shell', "clamped"
+        )

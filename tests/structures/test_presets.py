@@ -1,0 +1,141 @@
+"""Presets: which options are meant by what is said, and by what is not."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cases.document import from_document, to_document
+from foldyn.errors import InputError
+from foldyn.materials import Superlinear
+from foldyn.structures import PRESETS
+from foldyn.structures.presets import implied, resolved
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+MIURA = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2)
+PAPER = {
+    "scheme": "n5b8", "mass": "mixed_voronoi", "bar_law": "ogden", "bend_law": "superlinear",
+    "fold_law": fd.EnhancedLinear(45.0, 315.0), "calibration": "standard",
+}  # fmt: skip
+"""Defaults of Foldyn before presets: the model of the paper."""
+STEPS = ("crease_stiffness", "crease_rest", "clamped", "rigid")
+
+
+def options(**given):
+    return fd.discretize(MIURA, SHEET, **given).options
+
+
+def told(found) -> dict:
+    return {name: value for name, value in vars(found).items() if name not in STEPS}
+
+
+def test_the_default_is_plates_with_consistent_mass_and_linear_bends():
+    assert told(options()) == PAPER | {
+        "mass": "consistent", "bend_law": "linear", "calibration": "plate",
+    }  # fmt: skip
+    assert options() == options(preset="plate") == PRESETS["plate"]
+
+
+def test_the_model_of_the_paper_has_one_name():
+    assert told(options(preset="herkal")) == PAPER
+    whole, named = (
+        fd.discretize(MIURA, SHEET, **PAPER),
+        fd.discretize(MIURA, SHEET, preset="herkal"),
+    )
+    u = 0.01 * np.sin(np.arange(whole.nodes.size)).reshape(-1, 3)
+    np.testing.assert_array_equal(whole.internal_force(u), named.internal_force(u))
+    np.testing.assert_array_equal(whole.mass.toarray(), named.mass.toarray())
+
+
+def test_merlin2_has_its_order_and_its_moments_at_rest():
+    published = fd.EnhancedLinear(45.0, 315.0, rest="as_published")
+    expected = PAPER | {"calibration": "merlin2", "fold_law": published}
+    assert told(options(preset="merlin2")) == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({}, "plate"),
+        ({"scheme": "n4b5"}, "plate"),
+        ({"mass": "circumcenter", "bar_law": "linear", "fold_law": "linear"}, "plate"),
+        ({"bend_law": "linear"}, "plate"),
+        ({"bend_law": "plate_superlinear"}, "plate"),
+        ({"calibration": "plate"}, "plate"),
+        ({"calibration": "standard"}, "herkal"),
+        ({"calibration": "merlin2"}, "herkal"),
+        ({"calibration": "standard", "bend_law": "linear"}, "herkal"),
+        ({"bend_law": "superlinear"}, "herkal"),
+        ({"bend_law": Superlinear()}, "herkal"),
+    ],
+)
+def test_what_options_stand_for_without_a_preset(given, name):
+    """Scripts of before that say which calibration or that bends are superlinear mean the same."""
+    assert implied(given) == name
+    assert resolved(**given) == replace(PRESETS[name], **given)
+    if name == "herkal":
+        assert told(options(**given)) == PAPER | given
+
+
+def test_what_is_given_replaces_what_the_preset_has():
+    found = options(preset="herkal", mass="consistent", bend_law="linear", crease_rest=100)
+    assert told(found) == PAPER | {"mass": "consistent", "bend_law": "linear"}
+    assert found.crease_rest == 100
+    mixed = options(preset="plate", calibration="standard")
+    assert (mixed.calibration, mixed.mass, mixed.bend_law) == ("standard", "consistent", "linear")
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_resolved_options_mean_themselves(name):
+    """All of them, given one by one, need no preset; so stored results keep their model."""
+    found = options(preset=name)
+    again = {key: value for key, value in vars(found).items() if value is not None}
+    assert options(**again) == found
+    assert asdict(options(**again)) == asdict(found)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_stored_case_states_its_options_whole(name):
+    case = fd.Case(fd.discretize(MIURA, SHEET, preset=name), [fd.Fix("xmin")])
+    document = to_document(case)
+    assert document.obstacles == ()
+    assert set(PAPER) <= set(document.sections["model"])
+    assert "preset" not in document.sections["model"]
+    assert from_document(document.sections, document.arrays).structure.options == (
+        case.structure.options
+    )
+
+
+def test_positions_of_arguments_stay():
+    found = fd.discretize(MIURA, SHEET, "n4b5", "panel", "linear", "linear", "linear", "standard")
+    assert told(found.options) == {
+        "scheme": "n4b5", "mass": "panel", "bar_law": "linear", "fold_law": "linear",
+        "bend_law": "linear", "calibration": "standard",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"preset": "herkel"}, "preset = \"herkel\": did you mean 'herkal'?"),
+        (
+            {"bend_law": "superlinear", "calibration": "plate"},
+            'bend_law = "superlinear": takes the stiffness of large turns, calibration = "plate" '
+            'gives that of small ones; take "linear" or "plate_superlinear", or preset = "herkal"',
+        ),
+        ({"bend_law": "superlinear", "preset": "plate"}, 'bend_law = "superlinear": takes'),
+        ({"calibration": "plate", "preset": "herkal"}, 'bend_law = "superlinear": takes'),
+        (
+            {"bend_law": "plate_superlinear", "preset": "herkal"},
+            'bend_law = "plate_superlinear": has a plate\'s stiffness',
+        ),
+        ({"mass": "heavy"}, 'mass = "heavy": choose one of'),
+    ],
+)
+def test_what_does_not_go_together_is_refused(given, message):
+    with pytest.raises(InputError) as caught:
+        options(**given)
+    assert str(caught.value).startswith(message)
