@@ -19,6 +19,7 @@ poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
 [model]
+calibration = "standard"
 mass = ["mixed_voronoi", "consistent"]
 bend_law = "linear"
 [[supports]]
@@ -107,7 +108,7 @@ def test_a_response_without_its_drive(workplace) -> None:
     ("old", "new", "message"),
     [
         (
-            'mass = ["mixed_voronoi", "consistent"]\nbend_law = "linear"',
+            'calibration = "standard"\nmass = ["mixed_voronoi", "consistent"]\nbend_law = "linear"',
             'kind = "shell"',
             'model.kind = "shell": bars and hinges are compared with the shell',
         ),

@@ -20,6 +20,7 @@ from foldyn.studies.fidelity.stored import RESULTS, read
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 PLATE = {"calibration": "plate", "mass": "consistent", "bend_law": "linear"}
+STANDARD = {"calibration": "standard", "bend_law": "linear"}
 UNIT = {"cells": (1, 1), "a": 1.0, "b": 1.0, "panel_angle": 60, "dihedral": 60}
 FOLDING = [fd.Fix([0, 1, 2], "x"), fd.Fix([1], "y"), fd.Fix([0, 2, 6, 8], "z")]  # case study 2
 SUPPORTS = {"folding": FOLDING, "free": []}
@@ -31,13 +32,13 @@ def fold(**options) -> fd.Structure:
 
 
 def held(*loads, **options) -> fd.Case:
-    return fd.Case(fold(**(options or {"bend_law": "linear"})), [fd.Fix([0, 1, 2, 3])], loads)
+    return fd.Case(fold(**(options or STANDARD)), [fd.Fix([0, 1, 2, 3])], loads)
 
 
 @pytest.fixture(scope="module")
 def miura():
     """Case study 2 with linear bends and its load."""
-    structure = fd.discretize(fd.patterns.miura(**UNIT), SHEET, bend_law="linear")
+    structure = fd.discretize(fd.patterns.miura(**UNIT), SHEET, **STANDARD)
     case = fd.Case(structure, FOLDING, [fd.Force([7], (0.01, 0, 0), fd.HalfSine(0.5))])
     return case, fd.fidelity(case, count=8)
 
@@ -174,7 +175,7 @@ def test_the_shell_is_held_and_loaded_as_the_case():
     pattern = fd.patterns.miura((2, 1), panel_angle=60, dihedral=80)
     structure = fd.discretize(
         pattern, SHEET, fold_law="linear", crease_stiffness={"mountain": 0.2}, clamped=[(0, 1)],
-        rigid=[1], bend_law="linear",
+        rigid=[1], **STANDARD,
     )  # fmt: skip
     parts = [fd.Fix("xmin"), fd.Spring(3.0, [12]), fd.Link([13, 14], "z"), fd.BaseMotion("x")]
     case = fd.Case(
@@ -260,23 +261,23 @@ def test_models_of_ones_own(quick):
         'calibration = "standard", mass = "mixed_voronoi", bend_law = "superlinear"',
         'calibration = "plate", mass = "bubble", bend_law = "linear"',
     ]
-    cut = comparison(held(scheme="n4b5", bend_law="linear"), 2, (2, 4), ["plate"])
+    cut = comparison(held(scheme="n4b5", **STANDARD), 2, (2, 4), ["plate"])
     assert cut.compared["plate"].structure.options.scheme == "n5b8"
     assert set(MODELS) == {"standard", "plate", "n5b8e"}
 
 
 def test_what_n5b8e_does_not_take_leaves_it_out():
     """By default; who names it is told what stands in its way, in the words of discretize."""
-    clamped = held(bend_law="linear", clamped=[(0, 1)])
+    clamped = held(**STANDARD, clamped=[(0, 1)])
     assert list(comparison(clamped, 1, (2, 4)).compared) == ["own", "plate"]
     with pytest.raises(InputError, match=r"^models: n5b8e: clamped: .*edges without clamps"):
         comparison(clamped, 1, (2, 4), ["plate", "n5b8e"])
-    soft = held(bend_law="linear", fold_law="superlinear")  # no slope at rest
+    soft = held(**STANDARD, fold_law="superlinear")  # no slope at rest
     assert list(comparison(soft, 1, (2, 4)).compared) == ["own", "plate"]
 
 
 def test_a_rest_state_out_of_balance_is_told():
-    case = held(crease_rest=80.0, bend_law="linear")
+    case = held(crease_rest=80.0, **STANDARD)
     with pytest.warns(FoldynWarning, match="the rest state is no equilibrium"):
         fd.fidelity(case, 1, (2, 4), models=[])
 
