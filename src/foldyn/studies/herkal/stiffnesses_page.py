@@ -73,7 +73,8 @@ def _statics(study: Study) -> Table | None:
         rows,
         "Static displacement of the loaded nodes along the paper's loads, and as much of them as "
         "leaves the stiffness what it is at rest (scaled up; of shells of 8 and 16 divisions, "
-        "extrapolated). Superlinear bends have no stiffness at rest.",
+        "extrapolated). Without a word bars and hinges have superlinear bends, which have no "
+        "stiffness at rest.",
         digits=3,
     )
 
