@@ -8,16 +8,23 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from foldyn.studies.fidelity import motion_results as motions
 from foldyn.studies.fidelity.stored import RESULTS, read, table
 
 PAGE = Path(__file__).with_name("fidelity.md")
+TABLES = {
+    "documented": lambda: table(read(RESULTS / "documented.csv")),
+    "drawn": lambda: table(read(RESULTS / "drawn.csv")),
+    "motions": lambda: motions.summaries(motions.read()),
+    "motion cases": lambda: motions.by_case(motions.read()),
+}
 
 
 def with_tables(text: str) -> str:
     """The page's text with the tables between their marks."""
-    for name in ("documented", "drawn"):
+    for name, make in TABLES.items():
         begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        found = table(read(RESULTS / f"{name}.csv"))
+        found = make()
         text = re.sub(f"{begin}.*?{end}", f"{begin}\n{found}\n{end}", text, flags=re.S)
     return text
 

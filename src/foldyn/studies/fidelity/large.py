@@ -23,11 +23,11 @@ from foldyn.studies.fidelity.statics import STUDIES
 
 LAWS: Mapping[str, Mapping[str, Any]] = {
     "standard, superlinear": {"preset": "herkal"},
-    "plate, linear": {"calibration": "plate", "bend_law": "linear"},
-    "n5b8e, linear": {"calibration": "plate", "bend_law": "linear", "scheme": "n5b8e"},
-    "plate, plate_superlinear": {"calibration": "plate", "bend_law": "plate_superlinear"},
+    "plate, linear": {"preset": "plate"},
+    "n5b8e, linear": {"preset": "n5b8e"},
+    "plate, plate_superlinear": {"preset": "plate", "bend_law": "plate_superlinear"},
 }
-"""Options of `discretize`."""
+"""Options of `discretize`: the models of the large loads and of the large motions."""
 LOADS = (0.1, 1.0, 3.0)  # of the paper's
 TURNS = (1.0, 8.0, 35.0)  # lifts of a panel's corner over its thickness
 PANELS = {"1 x 1, 60 degrees": (60.0, 1.0), "1 x 1.5, 75 degrees": (75.0, 1.5)}

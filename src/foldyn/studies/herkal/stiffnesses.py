@@ -30,7 +30,7 @@ SPECIMEN = ("specimen-modes", "specimen-frf")
 MODES = 5
 MESHES = (6, 12)  # divisions of the specimen's shells
 
-Rows = Sequence[Mapping[str, Any]]
+Rows = list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Stiffness:
 
     def make(self, folder: Path) -> None:
         """Compute its result into a folder."""
-        KEPT.keep(folder / f"{self.name}.json", self.settings(), list(ROWS[self.kind](self)))
+        KEPT.keep(folder / f"{self.name}.json", self.settings(), ROWS[self.kind](self))
 
 
 def tasks(cases: Sequence[str], divisions: tuple[int, int] = MESHES) -> list[Stiffness]:

@@ -1,0 +1,196 @@
+"""Results of the large motions as a CSV table, one row a run and model, and what they say."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from foldyn.studies.fidelity.stored import ALIKE, NEAR, RESULTS
+
+STORED = RESULTS / "motions.csv"
+SHELL = "shell"
+PULSE = "pulse"
+SHARE = 0.5  # of the shell's variance that is its fundamental's, at least, for a period to be told
+SCATTER = 0.1  # standard deviation of the shell's periods over their mean, at most
+FEWEST = 3  # cycles
+SIZES = {5.0: "to 5 degrees", 20.0: "to 20 degrees", 50.0: "to 50 degrees"}
+HEADS = ("case", "start", "model", "mesh", "share", "periods [s]", "mac", "note")
+
+
+class Run(NamedTuple):
+    """A motion by a model.
+
+    Attributes
+    ----------
+    case, start, model : str
+        The start is an amplitude in degrees, or "pulse".
+    mesh : float
+        Frequency of the shell's mesh over the extrapolated one, for small vibrations.
+    share : float
+        Part of the variance of the coordinate that is the fundamental's.
+    period : tuple of float
+        Of each cycle, s.
+    alike : tuple of float
+        MAC with the shell at the extremes of the fundamental, two in a cycle.
+    note : str
+        Why there are no cycles.
+    """
+
+    case: str
+    start: str
+    model: str
+    mesh: float
+    share: float = float("nan")
+    period: tuple[float, ...] = ()
+    alike: tuple[float, ...] = ()
+    note: str = ""
+
+
+class Beside(NamedTuple):
+    """A model's motion beside the shell's.
+
+    Attributes
+    ----------
+    case, start : str
+    error : float
+        Of the mean period over the cycles of both; infinite without any.
+    largest : float
+        The largest magnitude of the error of a single cycle's period.
+    mac : float
+        Median over the extremes; 0 without any.
+    """
+
+    case: str
+    start: str
+    error: float
+    largest: float
+    mac: float
+
+
+def write(path: Path, found: Iterable[Run]) -> None:
+    """Write a table."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(HEADS)
+        for run in found:
+            periods = " ".join(f"{value:.5g}" for value in run.period)
+            alike = " ".join(f"{value:.3f}" for value in run.alike)
+            numbers = [f"{run.mesh:.4f}", f"{run.share:.3f}", periods, alike]
+            out.writerow([run.case, run.start, run.model, *numbers, run.note])
+
+
+def read(path: Path = STORED) -> list[Run]:
+    """A table that `write` wrote."""
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    return [
+        Run(
+            line["case"], line["start"], line["model"], float(line["mesh"]), float(line["share"]),
+            _numbers(line["periods [s]"]), _numbers(line["mac"]), line["note"],
+        )
+        for line in lines
+    ]  # fmt: skip
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split())
+
+
+def told(run: Run) -> bool:
+    """Whether a run of the shell has a period."""
+    period = np.array(run.period)
+    if len(period) < FEWEST:
+        return False
+    return run.share >= SHARE and bool(period.std() <= SCATTER * period.mean())
+
+
+def grouped(found: Iterable[Run]) -> dict[tuple[str, str], dict[str, Run]]:
+    """Runs of each start, by model."""
+    starts: dict[tuple[str, str], dict[str, Run]] = {}
+    for run in found:
+        starts.setdefault((run.case, run.start), {})[run.model] = run
+    return starts
+
+
+def beside(true: Run, own: Run) -> Beside:
+    """A model's run beside the shell's, the shell's periods without the error of its mesh."""
+    count = min(len(true.period), len(own.period))
+    if not count:
+        return Beside(true.case, true.start, np.inf, np.inf, 0.0)
+    right = np.array(true.period[:count]) * true.mesh
+    now = np.array(own.period[:count])
+    return Beside(
+        true.case, true.start, float(now.sum() / right.sum() - 1.0),
+        float(np.abs(now / right - 1.0).max()), float(np.median(own.alike)),
+    )  # fmt: skip
+
+
+def compared(found: Iterable[Run]) -> dict[str, list[Beside]]:
+    """All models beside the shell, where it has a period."""
+    models: dict[str, list[Beside]] = {}
+    for every in grouped(found).values():
+        if told(every[SHELL]):
+            for model, own in every.items():
+                if model != SHELL:
+                    models.setdefault(model, []).append(beside(every[SHELL], own))
+    return models
+
+
+def untold(found: Iterable[Run]) -> list[Run]:
+    """Runs of the shell without a period."""
+    return [every[SHELL] for every in grouped(found).values() if not told(every[SHELL])]
+
+
+def size(start: str) -> str:
+    """The rows of the table by amplitude that a start belongs to."""
+    if start == PULSE:
+        return "the paper's pulses"
+    return next(name for bound, name in SIZES.items() if float(start) <= bound)
+
+
+def summaries(found: list[Run]) -> str:
+    """Errors by model and amplitude, in Markdown."""
+    lines = [
+        "| start | model | runs | period within 5 % | median error | 90th percentile "
+        "| median MAC | MAC above 0.95 |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    models = compared(found)
+    starts = dict.fromkeys(size(b.start) for b in next(iter(models.values()), []))
+    for chosen in [*starts, "all"]:
+        for model, rows in models.items():
+            kept = [b for b in rows if chosen in (size(b.start), "all")]
+            lines.append(f"| {chosen} | {model} | {_summary(kept)} |")
+    return "\n".join(lines)
+
+
+def _summary(rows: list[Beside]) -> str:
+    error = np.abs([b.error for b in rows])
+    alike = np.array([b.mac for b in rows])
+    median, ninetieth = np.percentile(error, [50, 90], method="higher")
+    shares = [100 * (error < NEAR).mean(), 100 * median, 100 * ninetieth]
+    near, middle, most = (f"{value:.3g} %" for value in shares)
+    good = f"{100 * (alike > ALIKE).mean():.0f} %"
+    return f"{len(rows)} | {near} | {middle} | {most} | {np.median(alike):.3f} | {good}"
+
+
+def by_case(found: list[Run]) -> str:
+    """Errors of the mean period of every run, in Markdown."""
+    starts = {k: v for k, v in grouped(found).items()}
+    models = [m for m in next(iter(starts.values())) if m != SHELL]
+    lines = [f"| case | start | {' | '.join(models)} |", "|---|---|" + "---|" * len(models)]
+    for (case, start), every in starts.items():
+        cells = _cells(every, models) if told(every[SHELL]) else ["no period"] * len(models)
+        lines.append(f"| {case} | {start} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _cells(every: Mapping[str, Run], models: Iterable[str]) -> list[str]:
+    rows = [beside(every[SHELL], every[model]) for model in models]
+    return [
+        f"{100 * b.error:+.1f} %, {b.mac:.2f}" if np.isfinite(b.error) else "none" for b in rows
+    ]
