@@ -18,7 +18,7 @@ from PIL import Image
 from foldyn import plots
 from foldyn.report import Table
 from foldyn.report.album import Album
-from foldyn.studies.herkal import report, sensitivity_page, variations
+from foldyn.studies.herkal import report, sensitivity_page, stiffnesses_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, tolerance
 from foldyn.studies.herkal.runs import reported
 from foldyn.studies.herkal.sensitivity import BEND_LAWS
@@ -77,16 +77,15 @@ def main(folder: Path) -> None:
     assert found is not None
     draw(study, found)
     for case, row in study.table().items():
-        paper = [paper_table()[case].get(m) for m in rules()]
-        table(
-            [f"case {case[-1]}", *map(label, rules())], [["paper", *paper], ["here", *row.values()]]
-        )
+        paper = [paper_table()[case].get(m) for m in row]
+        table([f"case {case[-1]}", *map(label, row)], [["paper", *paper], ["here", *row.values()]])
     table(
         ["claim", "paper or bound", "here", ""],
         [[v.target.what, v.asked, float(v.computed), v.word] for v in claims(study)],
     )
     for one in (
         report.rank_table(study),
+        *(one for one in stiffnesses_page.sections(study) if isinstance(one, Table)),
         sensitivity_page.one_at_a_time(found, tolerance()),
         sensitivity_page.by_load(found),
         *(sensitivity_page.over_all(found, law) for law in BEND_LAWS),

@@ -19,6 +19,7 @@ poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
 [model]
+calibration = "standard"
 mass = ["mixed_voronoi", "consistent"]
 bend_law = "linear"
 [[supports]]
@@ -51,7 +52,8 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     names = ("fidelity.png", "laws.png", "report.html", "result.nc", "structure.png")
     assert done.new == [folder, *(f"{folder}/{name}" for name in names)]
     found = fd.Fidelity(fd.load(f"{folder}/result.nc"))
-    assert found.models == ("own", "own (consistent)", "plate")  # "standard" is its own
+    models = ("own", "own (consistent)", "plate", "n5b8e")  # "standard" is its own
+    assert found.models == models
     assert found.result.attrs["divisions"].tolist() == [3, 6]
     assert "deflection" in found.result  # the load acts in full
     told = done.out
@@ -60,7 +62,8 @@ def test_a_motion_beside_the_shell(workplace) -> None:
     page = (workplace.folder / folder / "report.html").read_text()
     assert "Which model" in page and "foldyn fidelity case.toml --count 3" in page
     for model in found.models:
-        (row,) = [part for part in page.split("<tr>") if f"<td>{model}</td><td>calibration" in part]
+        start = "scheme" if model == "n5b8e" else "calibration"
+        (row,) = [part for part in page.split("<tr>") if f"<td>{model}</td><td>{start}" in part]
         worst = max(abs(mode.error) for mode in found.table(model) if mode.below)
         assert f"{100 * worst:.3g}" in row
     assert page.count("<img") == 3
@@ -105,7 +108,7 @@ def test_a_response_without_its_drive(workplace) -> None:
     ("old", "new", "message"),
     [
         (
-            'mass = ["mixed_voronoi", "consistent"]\nbend_law = "linear"',
+            'calibration = "standard"\nmass = ["mixed_voronoi", "consistent"]\nbend_law = "linear"',
             'kind = "shell"',
             'model.kind = "shell": bars and hinges are compared with the shell',
         ),

@@ -12,6 +12,7 @@ import xarray as xr
 import foldyn as fd
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.linear.fidelity import MODELS as BESIDE
 from foldyn.structures.discretize import PER_NODE
 from foldyn.studies.herkal import pool, report, runs
 from foldyn.studies.herkal import study as studies
@@ -26,6 +27,7 @@ from foldyn.studies.herkal.sheet_models import (
     REFERENCE,
     Variant,
     case_with,
+    compared,
     model_of,
     paper_rules,
     rules,
@@ -100,7 +102,8 @@ def test_ranks():
 def test_models_are_those_of_the_paper_and_more():
     assert paper_rules() == ("equi_inertial", "panel", "centroid", "circumcenter", "consistent")
     assert set(rules()) - set(paper_rules()) == {"mixed_voronoi", "inertia_exact"}
-    assert next(iter(MODELS)) == REFERENCE and REFERENCE not in rules()
+    assert compared() == (*rules(), "plate", "n5b8e")
+    assert next(iter(MODELS)) == REFERENCE and REFERENCE not in compared()
     with pytest.raises(InputError, match="choose one of shell, equi_inertial"):
         model_of("voronoi")
 
@@ -115,6 +118,23 @@ def test_models_share_supports_and_loads(name):
     assert case.loads == given.loads and case.damping == given.damping
     assert case.structure.mass.sum() == pytest.approx(given.structure.mass.sum(), rel=1e-12)
     assert case.structure.options.fold_law == given.structure.options.fold_law
+
+
+def test_models_beyond_the_paper_are_those_of_the_fidelity_study():
+    """No variant of bends and calibration is one of theirs; distributions keep the file's."""
+    case_file = fd.read_case(fd.studies.find_case("herkal/case2"))
+    for name in ("plate", "n5b8e"):
+        made = [
+            case_with(case_file, name, variant).structure.options
+            for variant in (Variant(), Variant(bend_law="superlinear", calibration="merlin2"))
+        ]
+        assert made[0] == made[1]
+        options = vars(made[0])
+        assert {key: options[key] for key in BESIDE[name]} == dict(BESIDE[name])
+    own = vars(case_file.case().structure.options)
+    for name in rules():
+        options = vars(case_with(case_file, name).structure.options)
+        assert {key for key in own if own[key] != options[key]} <= {"mass"}
 
 
 def test_variants():
@@ -164,8 +184,9 @@ def test_other_settings_and_damaged_files_are_computed_again(tmp_path):
     longer = replace(job, numerics=replace(SHORT, duration=0.6))
     assert runs.stored(tmp_path, longer) is None
     assert runs.stored(tmp_path, replace(job, variant=LINEAR)) is None
-    shells = [Job("case1", REFERENCE, "motion", n) for n in (SHORT, finer.numerics)]
-    assert shells[0].settings() != shells[1].settings()
+    for model in (REFERENCE, "n5b8e"):  # these have steps of their own
+        coarse, fine = (Job("case1", model, "motion", n) for n in (SHORT, finer.numerics))
+        assert coarse.settings() != fine.settings()
 
 
 def test_one_failure_does_not_stop_the_others(tmp_path, monkeypatch):
@@ -200,7 +221,7 @@ def test_plans_have_the_longest_first_and_statics_once():
     assert len(set(jobs)) == len(jobs)
     assert {job.model for job in jobs[:4]} == {REFERENCE} and jobs[0].kind == "motion"
     paths = {(job.case, job.model, job.variant) for job in jobs if job.kind == "path"}
-    assert len(paths) == 4 * 3  # shell, bars and hinges, and with linear bends
+    assert len(paths) == 4 * 5  # shell, bars and hinges, and with linear bends, plate, n5b8e
     assert sum(job.kind == "motion" for job in jobs) == 4 * len(MODELS)
 
 
@@ -222,7 +243,7 @@ def small(tmp_path_factory):
 def test_table_from_stored_runs(small):
     row = small.table()["case1"]
     assert row["panel"] == 0.0 and best(row) == "panel"
-    assert all(0.0 < row[m] < 1.0 for m in rules() if m != "panel")
+    assert all(0.0 < row[m] < 1.0 for m in compared() if m != "panel")
     assert row["mixed_voronoi"] == pytest.approx(row["circumcenter"], rel=1e-6)  # equal squares
     assert small.node_errors("case1", "consistent").mean() == row["consistent"]
     assert math.isnan(small.error("case1", "panel", LINEAR))  # not computed
@@ -230,10 +251,13 @@ def test_table_from_stored_runs(small):
 
 def test_statics_of_shell_and_bars_and_hinges(small):
     found = small.displacements("case1")
-    assert list(found) == ["shell", "bars and hinges", "bars and hinges, linear bends"]
+    bars = ["bars and hinges", "bars and hinges, linear bends"]
+    assert list(found) == ["shell", *bars, "plate", "n5b8e"]
     assert found["bars and hinges"][0] == pytest.approx(-0.0312, abs=5e-5)  # design, section 5
     assert found["bars and hinges, linear bends"][0] == pytest.approx(-0.0248, abs=5e-5)
     assert found["shell"][0] == pytest.approx(-0.0348, rel=0.1)  # at 2 divisions
+    assert found["plate"][0] == pytest.approx(-0.0348, rel=0.01)
+    assert found["n5b8e"][0] == pytest.approx(-0.0348, rel=0.01)
 
 
 def test_modes_have_partners(small):
@@ -313,6 +337,8 @@ def test_page_of_a_study(small):
     for text in ("This is a coarse run", "In this coarse run", "Table 1 of the paper and ours"):
         assert text in page
     assert page.count("<img") == 5  # sensitivity, structure, statics, motions of two groups
+    assert page.count("plate (ours)") == page.count("n5b8e (ours)") == 1  # Table 1
+    assert "consistent (ours)" not in page
     for model in MODELS.values():
         assert model.label in page
     assert "nan" not in page.split("<style>")[0] and ">nan<" not in page
@@ -363,7 +389,8 @@ def test_the_command_runs_and_goes_on(tmp_path, capsys):
     capsys.readouterr()
     assert main(["study", "herkal", "--quick", "--out", out]) == 0
     count = study.count
-    assert count == len(study.plan.jobs()) + 4
+    assert count == len(study.plan.jobs()) + 8 + 4  # other stiffnesses, the specimen
+    assert study.error("case2", "n5b8e") < study.error("case2", "consistent")
     assert f"skipped {count} of {count} runs" in capsys.readouterr().out
 
 

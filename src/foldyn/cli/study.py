@@ -101,8 +101,8 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
     one = Study(QUICK if given.quick else FULL, results.folder, data)
     n = one.plan.numerics
     say(
-        f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} mass "
-        f"distributions, {n.duration:g} s of motion"
+        f"case studies 1 to 4: shell with {n.divisions} divisions, {len(one.plan.models)} models "
+        f"of bars and hinges, {n.duration:g} s of motion"
     )
     if data is not None:
         names = ", ".join(file.name for file in data.files.values())

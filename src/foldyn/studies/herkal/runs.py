@@ -21,7 +21,14 @@ from foldyn.statics import trace
 from foldyn.store import Store
 from foldyn.studies import find_case
 from foldyn.studies.herkal.metric import UP_TO
-from foldyn.studies.herkal.sheet_models import AS_FILED, REFERENCE, Variant, case_study, case_with
+from foldyn.studies.herkal.sheet_models import (
+    AS_FILED,
+    REFERENCE,
+    Variant,
+    case_study,
+    case_with,
+    model_of,
+)
 
 COMPUTING = tuple(
     f"studies/herkal/{name}.py" for name in ("sheet_models", "runs", "metric", "sensitivity")
@@ -43,7 +50,7 @@ class Numerics:
     divisions : int
         Of the shell.
     dt : float
-        Step (s) of the shell's motions.
+        Step (s) of the motions of the shell and of other implicit models.
     duration : float
         Of motions (s).
     """
@@ -87,9 +94,10 @@ class Job:
     def settings(self) -> dict[str, Any]:
         """All that its result depends on."""
         numerics = {} if self.kind != "motion" else {"duration": self.numerics.duration}
-        if self.model == REFERENCE:  # others have neither a mesh nor steps of their own
+        if self.model == REFERENCE:  # others have no mesh
             numerics["divisions"] = self.numerics.divisions
-            numerics |= {"dt": self.numerics.dt} if self.kind == "motion" else {}
+        if self.kind == "motion" and model_of(self.model).implicit:
+            numerics["dt"] = self.numerics.dt
         return {
             "case": self.case,
             "case_file": case_file_digest(self.case),
@@ -129,14 +137,14 @@ def compute(job: Job) -> xarray.Dataset:
     """Run a computation; the result covers the pattern's vertices, which all models share."""
     case_file = case_study(job.case)
     case = case_with(case_file, job.model, job.variant, job.numerics.divisions)
-    of_shell = job.model == REFERENCE
+    model, of_shell = model_of(job.model), job.model == REFERENCE
     if job.kind == "path":
         found = trace(case, steps=STEPS)
     elif job.kind == "modes":
-        count, secant = (SHELL_MODES, None) if of_shell else (RULE_MODES, SECANT)
-        found = modes(replace(case, loads=()), count, secant=secant)
+        count, secant = SHELL_MODES if of_shell else RULE_MODES, SECANT
+        found = modes(replace(case, loads=()), count, secant=secant if model.distribution else None)
     else:
-        own = {"method": "newmark", "dt": job.numerics.dt} if of_shell else {}
+        own = {"method": "newmark", "dt": job.numerics.dt} if model.implicit else {}
         given = {"every": EVERY, **case_file.analysis.arguments, **own}
         found = simulate(case, **{**given, "duration": job.numerics.duration})
     kept = found.drop_vars("velocity", errors="ignore")

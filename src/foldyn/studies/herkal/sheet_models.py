@@ -10,6 +10,7 @@ from typing import Any
 from foldyn.analyses import CaseFile, read_case
 from foldyn.cases import Case, Force, HalfSine
 from foldyn.errors import InputError
+from foldyn.linear.fidelity import MODELS as STIFFNESSES
 from foldyn.shells import shell
 from foldyn.structures import discretize
 from foldyn.studies import find_case
@@ -17,6 +18,7 @@ from foldyn.values import choice
 
 CASES = ("case1", "case2", "case3", "case4")
 REFERENCE = "shell"
+BARS_AND_HINGES = "bars and hinges"
 LOADS = ("file", "edge")
 
 
@@ -81,20 +83,28 @@ class SheetModel:
         Models with the same name here differ in mass only and share their equilibria.
     paper : bool
         Whether it is one of the paper's.
+    implicit : bool
+        Whether its motions are computed by Newmark's method, with the steps of the study.
     """
 
     name: str
     label: str
     structure: Callable[[CaseFile, Mapping[str, Any], int], Any]
-    statics: str = "bars and hinges"
+    statics: str = BARS_AND_HINGES
     paper: bool = False
+    implicit: bool = False
+
+    @property
+    def distribution(self) -> bool:
+        """Whether it is the case file's model with another distribution of the mass."""
+        return self.statics == BARS_AND_HINGES
 
 
 def _bars_and_hinges(
-    mass: str, case_file: CaseFile, options: Mapping[str, Any], divisions: int
+    own: Mapping[str, Any], case_file: CaseFile, options: Mapping[str, Any], divisions: int
 ) -> Any:
-    """Structure of the case file with a mass rule; it has no use for `divisions`."""
-    arguments = {**vars(case_file.case().structure.options), "mass": mass, **options}
+    """Structure of the case file with options of its own; it has no use for `divisions`."""
+    arguments = {**vars(case_file.case().structure.options), **options, **own}
     return discretize(case_file.pattern, case_file.sheet, **arguments)
 
 
@@ -106,13 +116,19 @@ def _shell(case_file: CaseFile, options: Mapping[str, Any], divisions: int) -> A
 
 
 def _rule(name: str, label: str, paper: bool = False) -> SheetModel:
-    return SheetModel(name, label, partial(_bars_and_hinges, name), paper=paper)
+    return SheetModel(name, label, partial(_bars_and_hinges, {"mass": name}), paper=paper)
+
+
+def _stiffness(name: str, implicit: bool = False) -> SheetModel:
+    """One that `foldyn.fidelity` sets beside the shell, with bends and mass of its own."""
+    structure = partial(_bars_and_hinges, STIFFNESSES[name])
+    return SheetModel(name, name, structure, statics=name, implicit=implicit)
 
 
 MODELS: Mapping[str, SheetModel] = {
     model.name: model
     for model in (
-        SheetModel(REFERENCE, "shell", _shell, statics="shell"),
+        SheetModel(REFERENCE, "shell", _shell, statics="shell", implicit=True),
         _rule("equi_inertial", "equi-inertial", paper=True),
         _rule("panel", "panel", paper=True),
         _rule("centroid", "centroid", paper=True),
@@ -120,6 +136,8 @@ MODELS: Mapping[str, SheetModel] = {
         _rule("consistent", "consistent", paper=True),
         _rule("mixed_voronoi", "mixed Voronoi"),
         _rule("inertia_exact", "inertia-exact"),
+        _stiffness("plate"),
+        _stiffness("n5b8e", implicit=True),  # its edges have no mass of their own
     )
 }
 """The reference and what is compared with it, in the order of the tables."""
@@ -136,9 +154,14 @@ def model_of(name: str) -> SheetModel:
     return known[choice("model", name, known)]
 
 
-def rules() -> tuple[str, ...]:
+def compared() -> tuple[str, ...]:
     """Names of the models that are compared with the reference."""
     return tuple(name for name in MODELS if name != REFERENCE)
+
+
+def rules() -> tuple[str, ...]:
+    """Names of those that differ in the distribution of mass only."""
+    return tuple(name for name, model in MODELS.items() if model.distribution)
 
 
 def paper_rules() -> tuple[str, ...]:

@@ -10,14 +10,22 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.studies.herkal import metric
+from foldyn.studies.herkal import metric, stiffnesses
 from foldyn.studies.herkal.opensees.stored import read_motion, stored_motions
 from foldyn.studies.herkal.pool import Done, run
 from foldyn.studies.herkal.runs import Job, Numerics, reported, stored
-from foldyn.studies.herkal.sheet_models import AS_FILED, CASES, REFERENCE, Variant, model_of, rules
+from foldyn.studies.herkal.sheet_models import (
+    AS_FILED,
+    CASES,
+    REFERENCE,
+    Variant,
+    compared,
+    model_of,
+)
 from foldyn.studies.herkal.specimen.measured import Data
 from foldyn.studies.herkal.specimen.synthetic import COARSE, PAPERS, Shot
 from foldyn.studies.herkal.specimen.tasks import Part, parts
+from foldyn.studies.herkal.stiffnesses import MESHES, Rows, Stiffness
 
 RESULTS = "runs"  # folder of the results in that of the study
 LINEAR = Variant(bend_law="linear")
@@ -35,12 +43,15 @@ class StudyPlan:
         Without the reference, which is always there.
     shot : Shot
         How the synthetic film of the specimen is taken.
+    meshes : tuple of int
+        Divisions of the specimen's shells.
     """
 
     numerics: Numerics = field(default_factory=Numerics)
     cases: tuple[str, ...] = CASES
-    models: tuple[str, ...] = field(default_factory=rules)
+    models: tuple[str, ...] = field(default_factory=compared)
     shot: Shot = PAPERS
+    meshes: tuple[int, int] = MESHES
 
     def jobs(self) -> list[Job]:
         """All computations, the longest first."""
@@ -56,19 +67,23 @@ class StudyPlan:
             for model, variant in self.paths().values()
         ]
 
+    def stiffnesses(self) -> list[Stiffness]:
+        """Computations of the stiffnesses beyond the paper, besides jobs."""
+        return stiffnesses.tasks(self.cases, self.meshes)
+
     def paths(self) -> dict[str, tuple[str, Variant]]:
         """Model and variant of each stiffness, by label: mass plays no part in statics."""
         found: dict[str, tuple[str, Variant]] = {}
         for name in (REFERENCE, *self.models):
             stiffness = model_of(name).statics
             found.setdefault(stiffness, (name, AS_FILED))
-            if name != REFERENCE:
+            if model_of(name).distribution:
                 found.setdefault(f"{stiffness}, linear bends", (name, LINEAR))
         return found
 
 
 FULL = StudyPlan()
-QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE)
+QUICK = StudyPlan(Numerics(divisions=8, dt=0.01), shot=COARSE, meshes=(3, 6))
 VARIED = Numerics(divisions=8, dt=0.01)  # of the sensitivity
 
 
@@ -98,7 +113,8 @@ class Study:
     @property
     def count(self) -> int:
         """Number of computations."""
-        return len(self.plan.jobs()) + sum(map(len, self.parts))
+        tasks = (self.plan.jobs(), self.plan.stiffnesses(), *self.parts)
+        return sum(map(len, tasks))
 
     def compute(
         self, tell: Callable[[Done], None] = lambda done: None, processes: int = 2
@@ -107,7 +123,7 @@ class Study:
         results = self.folder / RESULTS
         results.mkdir(parents=True, exist_ok=True)
         first, then = self.parts
-        ended = run([*first, *self.plan.jobs()], results, tell, processes)
+        ended = run([*first, *self.plan.jobs(), *self.plan.stiffnesses()], results, tell, processes)
         return ended + run(then, results, tell, processes=1)
 
     def result(
@@ -118,6 +134,11 @@ class Study:
         if self._read.get(job) is None:
             self._read[job] = stored(self.folder / RESULTS, job)
         return self._read[job]
+
+    def rows(self, kind: str, of: str = "specimen") -> Rows | None:
+        """Result of a computation of `stiffnesses`, or None where there is none."""
+        task = Stiffness(kind, of, self.plan.meshes)  # type: ignore[arg-type]
+        return task.result(self.folder / RESULTS)
 
     # ------------------------------------------------------------------ tables
     def node_errors(self, case: str, model: str, variant: Variant = AS_FILED) -> NDArray | None:

@@ -1,0 +1,150 @@
+"""What the case studies and the specimen are with other stiffnesses than the paper's.
+
+Small loads on the case studies, and modes and peaks of the specimen, by the models that
+`foldyn.fidelity` sets beside the shell. Each computation is kept as rows of a JSON file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from foldyn import program as programs
+from foldyn.linear.fidelity import MODELS, fidelity
+from foldyn.studies.fidelity import statics
+from foldyn.studies.herkal import vibration
+from foldyn.studies.herkal.runs import case_file_digest
+from foldyn.studies.herkal.sensitivity import KEPT
+
+COMPUTING = (
+    "studies/fidelity/statics.py", "studies/herkal/stiffnesses.py", "studies/herkal/vibration.py",
+)  # fmt: skip
+"""Files that the results depend on, besides the solvers."""
+OWN = "own"
+"""The model of the specimen's case file."""
+PEAKED = (OWN, "plate", "n5b8e")
+SPECIMEN = ("specimen-modes", "specimen-frf")
+MODES = 5
+MESHES = (6, 12)  # divisions of the specimen's shells
+
+Rows = list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """A computation with these models.
+
+    Attributes
+    ----------
+    kind : {"small-loads", "modes", "peaks"}
+    of : str
+        A case study of which small loads are computed, the specimen of which modes are, or a model
+        of `PEAKED` of which the specimen's peaks are.
+    divisions : tuple of int
+        Of the specimen's shells.
+    """
+
+    kind: Literal["small-loads", "modes", "peaks"]
+    of: str = "specimen"
+    divisions: tuple[int, int] = MESHES
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return f"{self.of}-{self.kind}" if self.kind != "peaks" else f"specimen-{self.of}-peaks"
+
+    def settings(self) -> dict[str, Any]:
+        """All that its result depends on."""
+        files = (self.of,) if self.kind == "small-loads" else SPECIMEN
+        mesh = {"divisions": list(self.divisions)} if self.kind == "modes" else {}
+        return {
+            "task": self.name,
+            "case_files": [case_file_digest(file) for file in files],
+            "program": programs.program(*COMPUTING),
+            **mesh,
+        }
+
+    def there(self, folder: Path) -> bool:
+        """Whether its result is in a folder."""
+        return self.result(folder) is not None
+
+    def result(self, folder: Path) -> Rows | None:
+        """Rows in a folder; None if there are none, or some of other settings."""
+        return KEPT.find(folder / f"{self.name}.json", self.settings())
+
+    def make(self, folder: Path) -> None:
+        """Compute its result into a folder."""
+        KEPT.keep(folder / f"{self.name}.json", self.settings(), ROWS[self.kind](self))
+
+
+def tasks(cases: Sequence[str], divisions: tuple[int, int] = MESHES) -> list[Stiffness]:
+    """All that is to be computed, the longest first."""
+    found = [Stiffness("modes", divisions=divisions)]
+    found += [Stiffness("small-loads", case) for case in cases]
+    return found + [Stiffness("peaks", model) for model in PEAKED]
+
+
+def _small_loads(asked: Stiffness) -> Rows:
+    """Displacement (m) of the shell and relative errors, as the fidelity study has them."""
+    found = statics.study(asked.of)
+    return [{"shell": found.shell, **found.error}]
+
+
+def specimen_modes(divisions: tuple[int, int] = MESHES, **changes: Any) -> Rows:
+    """First modes of the specimen by every model beside the shell.
+
+    Parameters
+    ----------
+    divisions : tuple of int
+        Of the shells.
+    **changes
+        Other values of keys of [model], as fold_law="linear".
+
+    Returns
+    -------
+    sequence of mappings
+        A mode of a model each: model, mode, frequencies `shell` and `frequency` (Hz, None without a
+        partner) and mac.
+    """
+    file = vibration.specimen("modes", changes={f"model.{k}": v for k, v in changes.items()})
+    secant = file.analysis.arguments["secant"]
+    found = fidelity(file.case(file.masses[0]), MODES, divisions, secant=secant)
+    return [
+        {
+            "model": model,
+            "mode": one.mode,
+            "shell": float(one.shell),
+            "frequency": float(one.shell * (1 + one.error)) if math.isfinite(one.error) else None,
+            "mac": float(one.mac),
+        }
+        for model in found.models
+        for one in found.table(model)
+    ]
+
+
+def specimen_peaks(model: str) -> Rows:
+    """Peaks of the specimen's frequency response, as the paper measured them.
+
+    Returns
+    -------
+    sequence of mappings
+        A peak each: frequency (Hz) and damping, None where it has no half-power points.
+    """
+    own = {} if model == OWN else {k: v for k, v in MODELS[model].items() if k != "straight"}
+    file = vibration.specimen("frf", changes={f"model.{key}": value for key, value in own.items()})
+    found = vibration.Response.of(file.run(file.masses[0]))
+    return [
+        {"frequency": f, "damping": ratio if math.isfinite(ratio) else None}
+        for f, ratio in zip(found.frequencies, found.damping, strict=True)
+    ]
+
+
+ROWS: Mapping[str, Callable[[Stiffness], Rows]] = {
+    "small-loads": _small_loads,
+    "modes": lambda asked: specimen_modes(asked.divisions),
+    "peaks": lambda asked: specimen_peaks(asked.of),
+}
+"""How each kind is computed."""
