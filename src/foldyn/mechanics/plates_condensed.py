@@ -18,7 +18,6 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from foldyn.jit.compiled import kernel
-from foldyn.materials import linear
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.model import ranks
@@ -44,6 +43,8 @@ class CondensedPlates(NamedTuple):
     Attributes
     ----------
     plates : BarsPlates
+    constant : bool
+        Whether the folds have the slope one at every angle.
     rank : (r,)
         Place of each rotation in the band.
     band, factor : (r, w + 1)
@@ -52,6 +53,7 @@ class CondensedPlates(NamedTuple):
     """
 
     plates: BarsPlates
+    constant: bool
     rank: NDArray
     band: NDArray
     factor: NDArray
@@ -76,8 +78,8 @@ class CondensedWork(NamedTuple):
     team: Team
 
 
-def condensed_plates(model: BarsPlates) -> CondensedPlates:
-    """Arrays of the same model without rotations."""
+def condensed_plates(model: BarsPlates, constant: bool) -> CondensedPlates:
+    """Arrays of the same model without rotations; `constant` as there."""
     r, rows, columns, values = model.rotations, [], [], []
     for p in range(len(model.start) - 1):
         turned = model.angle[model.start[p] : model.start[p + 1]]
@@ -107,7 +109,7 @@ def condensed_plates(model: BarsPlates) -> CondensedPlates:
     factor = band.copy()
     add_folds(model, rank, np.ones(len(model.fold_rest)), factor)
     factorize_band(factor)
-    return CondensedPlates(model, rank, band, factor)
+    return CondensedPlates(model, constant, rank, band, factor)
 
 
 def condensed_work(model: CondensedPlates) -> CondensedWork:
@@ -172,7 +174,7 @@ def balance(model, u, work):
     p, slope = plates.fold_parameters, work.plates.slope
     for _ in range(STEPS):
         turn_moments(plates, work.x, work.couple, work.plates)
-        if plates.code != linear.CODE:
+        if not model.constant:
             for f in range(plates.fold_rest.size):
                 found = hinge_slope(
                     plates.code, work.plates.fold_angle[f], plates.fold_rest[f], p[f, 0], p[f, 1],

@@ -26,7 +26,7 @@ class CondensedBody(Body):
 
     def __init__(self, inner: BarsPlatesBody) -> None:
         self.inner, self.energy_groups = inner, inner.energy_groups
-        self.model = condensed_plates(inner.model)
+        self.model = condensed_plates(inner.model, inner.linear_folds)
         self.size, self.rows = 3 * inner.model.nodes, inner.model.nodes
 
     def _whole(self, q: NDArray) -> NDArray:

@@ -72,6 +72,11 @@ class BarsPlatesBody(Body):
         bars = self._bars.tangent(np.zeros(self._nodal))
         return plates_pattern(self.model, bars.indptr, bars.indices)
 
+    @property
+    def linear_folds(self) -> bool:
+        """Whether the law of the folds is linear."""
+        return isinstance(self._laws[0], LinearHinge)
+
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
         """See `Body`: rotations by Newton's method.
 
