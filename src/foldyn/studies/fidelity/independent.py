@@ -25,18 +25,20 @@ from foldyn.studies.herkal.opensees.model import PanelShells
 
 STORED = RESULTS / "opensees.csv"
 MESHES = (8, 16)  # divisions
+BESIDE = ("plate, consistent", "n5b8e, condensed")
 HELD = ("case 1", "panel", "folding")
 LINEAR = EnhancedLinear(5.0, 355.0)  # folds that are linear wherever they rest
 
 
 class Independent(NamedTuple):
-    """Frequencies (Hz) of a mode: of OpenSees, extrapolated, of the shell and of a model."""
+    """Frequencies (Hz) of a mode: of OpenSees, extrapolated, of the shell and of two models."""
 
     case: str
     mode: int
     opensees: float
     shell: float
     plate: float  # calibration plate, consistent mass
+    n5b8e: float  # condensed mass
 
 
 def frequencies(case: FidelityCase, count: int) -> NDArray:
@@ -54,20 +56,17 @@ def taken(case: FidelityCase) -> bool:
 
 def computed() -> list[Independent]:
     """All modes of the documented set that are stored and that OpenSees' model takes."""
-    stored = {
-        modes.case: modes.rows["plate, consistent"] for modes in read(RESULTS / "documented.csv")
-    }
+    stored = {modes.case: modes.rows for modes in read(RESULTS / "documented.csv")}
     found = []
     for case in documented():
-        rows = stored.get(case.name, [])
-        if not rows or not taken(case):
+        if case.name not in stored or not taken(case):
             continue
-        own = frequencies(case, max(row.mode for row in rows) + 1)
-        for row in rows:
-            plate = row.shell * (1.0 + row.error)
-            found.append(
-                Independent(case.name, row.mode, float(own[row.mode - 1]), row.shell, plate)
-            )
+        both = [stored[case.name][model] for model in BESIDE]
+        own = frequencies(case, max(row.mode for row in both[0]) + 1)
+        for rows in zip(*both, strict=True):
+            mode, shell = rows[0].mode, rows[0].shell
+            models = (row.shell * (1.0 + row.error) for row in rows)
+            found.append(Independent(case.name, mode, float(own[mode - 1]), shell, *models))
     return found
 
 
@@ -75,7 +74,9 @@ def write(path: Path, found: list[Independent]) -> None:
     """Write a table."""
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        out.writerow(["case", "mode", "opensees [Hz]", "shell [Hz]", "plate, consistent [Hz]"])
+        out.writerow(
+            ["case", "mode", "opensees [Hz]", "shell [Hz]", *(f"{m} [Hz]" for m in BESIDE)]
+        )
         for one in found:
             out.writerow([one.case, one.mode, *(f"{f:.6g}" for f in one[2:])])
 
@@ -87,17 +88,17 @@ def read_stored(path: Path = STORED) -> list[Independent]:
     return [Independent(name, int(mode), *map(float, values)) for name, mode, *values in lines]
 
 
-def errors(found: list[Independent]) -> tuple[NDArray, NDArray]:
-    """Relative errors of the shell and of the plate calibration against OpenSees."""
+def errors(found: list[Independent]) -> dict[str, NDArray]:
+    """Relative errors of the shell and of both models against OpenSees."""
     true = np.array([one.opensees for one in found])
-    shell, plate = (np.array([getattr(one, name) for one in found]) for name in ("shell", "plate"))
-    return shell / true - 1.0, plate / true - 1.0
+    named = ("shell", "plate", "n5b8e")
+    return {name: np.array([getattr(one, name) for one in found]) / true - 1.0 for name in named}
 
 
 if __name__ == "__main__":
     results = computed()
     write(STORED, results)
-    for what, error in zip(("shell", "plate"), errors(results), strict=True):
+    for what, error in errors(results).items():
         median, ninetieth = np.percentile(np.abs(error), [50, 90], method="higher")
         print(
             f"{what}: {len({one.case for one in results})} cases, {len(error)} modes, "
