@@ -37,7 +37,9 @@ def everything(mass: str) -> fd.Case:
 
 @pytest.mark.filterwarnings("ignore:steps of")  # the stiff bars alone need small ones
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("mass", ["mixed_voronoi", "consistent"])
+@pytest.mark.parametrize(
+    "mass", [pytest.param("mixed_voronoi", marks=pytest.mark.slow), "consistent"]
+)
 def test_a_motion_in_another_order(mass, method, monkeypatch):
     case = everything(mass)
     u = 1e-3 * np.random.default_rng(1).standard_normal(case.structure.nodes.shape)

@@ -73,6 +73,7 @@ def test_without_a_model_corners_are_followed(sharp):
     assert np.isfinite(ds["position_px"].values[-1, :, 0]).sum() >= 12
 
 
+@pytest.mark.slow
 def test_the_region_of_interest_shifts_nothing(sharp, tracked):
     from foldyn.experiment import open_film
 

@@ -32,7 +32,11 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text("utf-8"))
 
 
-@pytest.mark.parametrize("named", [True, False], ids=["NUMBA_CACHE_DIR", "beside the sources"])
+@pytest.mark.parametrize(
+    "named",
+    [True, pytest.param(False, marks=pytest.mark.slow)],
+    ids=["NUMBA_CACHE_DIR", "beside the sources"],
+)
 def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):
     package = copy_package(tmp_path)
     where = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")} if named else {}

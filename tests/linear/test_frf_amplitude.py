@@ -141,6 +141,7 @@ def test_peaks_of_the_specimen(alpha, beta, mass, within):
         assert peaks[2].textbook == pytest.approx(0.09, abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_simulated_motion_of_the_specimen_agrees():
     """At the drive of the paper the middle row moves by millimeters: one harmonic is enough."""
     case, f = specimen(15.8), [9.5]
