@@ -208,7 +208,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert motions.main(["--out", str(tmp_path)]) == 0
     told_of = capsys.readouterr()
     assert "| all | plate, linear | 1 |" in told_of.out
-    assert len(read(tmp_path / "motions.csv")) == 4
+    assert len(read(tmp_path / "motions.csv")) == 5  # the shell and four models
 
 
 def test_why_panels_harden():
