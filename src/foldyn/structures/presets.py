@@ -31,12 +31,12 @@ PRESETS: Mapping[str, ModelOptions] = {
 }  # fmt: skip
 """Options by name of the preset.
 
-plate : panels that bend and twist as thin plates; right about the shell's frequencies and small
-    displacements (docs/fidelity.md).
-n5b8e : the same with panels that give way at their creases; twice as near to the shell.
-herkal : the model of Herkal et al., Int. J. Solids Struct. 309, 2025.
-merlin2 : MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
-    has no mass, and gets that of "herkal".
+- "plate": panels that bend and twist as thin plates; right about the shell's frequencies and small
+  displacements (docs/fidelity.md);
+- "n5b8e": the same with panels that give way at their creases, twice as near to the shell;
+- "herkal": the model of Herkal et al., Int. J. Solids Struct. 309, 2025;
+- "merlin2": MERLIN2 as published (Liu and Paulino, 2018), in its order and with moments at rest; it
+  has no mass, and gets that of "herkal".
 """
 
 
