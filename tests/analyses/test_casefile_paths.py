@@ -288,4 +288,5 @@ def test_a_file_that_does_not_say_its_kind(read) -> None:
     with pytest.raises(InputError) as caught:
         read(text)
     (line,) = str(caught.value).splitlines()  # what depends on the kind is not complained about
-    assert line.endswith("analysis.kind: missing; choose one of dynamics, statics, modes, frf")
+    known = "dynamics, statics, modes, frf, fidelity"
+    assert line.endswith(f"analysis.kind: missing; choose one of {known}")

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from casefile_checks import FOLD, check
+from casefile_checks import check
 
 import foldyn as fd
+from case_texts import HELD_FOLD_TEXT as FOLD
 from foldyn.structures import PRESETS, ModelOptions
 from foldyn.structures.presets import resolved
 from foldyn.studies import shipped_cases
