@@ -7,6 +7,7 @@ import pytest
 from mass_samples import HEXAGON, PANELS
 
 import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
 from foldyn.checks import gradient_error, observed_order, tangent_error
 from foldyn.errors import InputError
 from foldyn.mechanics.plates_condensed import (
@@ -197,22 +198,13 @@ def test_motions_close_their_energy_audit(method):
 
 
 def test_case_files_and_results_keep_it(tmp_path):
-    text = """
-[pattern]
-kind = "miura"
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
+    text = f"""{HELD_MIURA_TEXT}
 [model]
 scheme = "n5b8e"
 calibration = "plate"
 mass = "condensed"
 bend_law = "linear"
 straight = [[0, 1], [1, 2]]
-[[supports]]
-nodes = "xmin"
 [analysis]
 kind = "modes"
 count = 2

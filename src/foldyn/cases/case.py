@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +19,7 @@ from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
 from foldyn.cases.supported import Supported
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
-from foldyn.errors import Faults, InputError, within
+from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.attached_body import GROUP, attached
 from foldyn.mechanics.body import Body
 from foldyn.structures.discretized import read_only
@@ -134,6 +135,12 @@ class Case(Supported, Loaded, Damped):
             with faults.collected():
                 load.following(self.structure, place)
         faults.tell()
+
+    def altered(self, **changes: Any) -> Case:
+        """With other fields; what this case warned of when it was made is not said again."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            return replace(self, **changes)
 
     @cached_property
     def body(self) -> Body:

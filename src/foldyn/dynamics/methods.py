@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -198,13 +197,14 @@ def suited(name: str, case: Case) -> Integrator:
 def with_mass(method: Integrator, case: Case) -> Case:
     """The case for a method: without dofs that have no mass where the method needs one."""
     other = None if method.massless else case.structure.condensed
-    return case if other is None else replace(case, structure=other)
+    return case if other is None else case.altered(structure=other)
 
 
 def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
-    if with_mass(method, case).structure.massless and not method.massless:
-        return f"{case.structure.massless} have no mass"
+    structure = case.structure
+    if structure.massless and structure.condensed is None and not method.massless:
+        return f"{structure.massless} have no mass"
     if method.conserving and not case.body.has_discrete_gradient:
         return "the forces of this structure have no discrete gradient"
     return ""

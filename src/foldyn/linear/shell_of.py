@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -97,9 +97,7 @@ def shell_of(case: Case, divisions: int) -> Case:
 
 def with_structure(case: Case, structure: Any) -> Case:
     """The case with another structure and without damping, which modes at rest do not need."""
-    with warnings.catch_warnings():  # they were given when the case was made
-        warnings.simplefilter("ignore", FoldynWarning)
-        return replace(case, structure=structure, damping=Rayleigh())
+    return case.altered(structure=structure, damping=Rayleigh())
 
 
 def triangle_count(pattern: Pattern, divisions: int) -> int:

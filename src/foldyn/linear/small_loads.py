@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,9 +50,7 @@ def forces_alone(case: Case) -> tuple[Case, list[int]]:
         if turns or changes or load.turns(structure, place) is not None:
             others.append(i)
     kept = [load for i, load in enumerate(case.loads) if i not in others]
-    with warnings.catch_warnings():  # they were given when the case was made
-        warnings.simplefilter("ignore", FoldynWarning)
-        return replace(case, loads=kept), others
+    return case.altered(loads=kept), others
 
 
 def rest_forces(case: Case) -> NDArray:

@@ -19,10 +19,16 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
+from foldyn.errors import ComputationError
 from foldyn.materials import HingeLaw
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity
+
+ITERATIONS = 50
+BALANCED = 1e-13  # rad, of the last step of Newton's method for hidden dofs
+LEAST_SLOPE = 1e-3  # of a fold's stiffness, in these steps
 
 
 class SoftHinges(NamedTuple):
@@ -244,6 +250,35 @@ class Body(ABC):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """The body as if it had no strain at q; None where only rigid motions could keep it so."""
         return None
+
+
+def hidden_in_balance(
+    body: Body, displacement: NDArray, push: NDArray | None, per_reach: float
+) -> NDArray:
+    """Vector (m,) of displacements (n, 3) with its hidden dofs in balance, by Newton's method.
+
+    push : forces (m,), N, of which those on the hidden dofs count; none by default.
+    per_reach : turn (rad) that a hidden dof of 1 m stands for.
+
+    Raises
+    ------
+    ComputationError
+        There are none near zero.
+    """
+    first, work = body.size - len(body.hidden), body.workspaces(1)[0]
+    q = np.concatenate([np.asarray(displacement, float).ravel(), np.zeros(len(body.hidden))])
+    for _ in range(ITERATIONS):
+        couple = body.internal(q, work)[first:]
+        if push is not None:
+            couple -= push[first:]
+        if not couple.any():
+            return q
+        stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]
+        step = splu(sparse.csc_array(stiffness)).solve(-couple)
+        q[first:] += step
+        if per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
+            return q
+    raise ComputationError("the rotations of the panels do not balance at this displacement")
 
 
 def largest_turn(largest: float, before: NDArray, after: NDArray) -> float:

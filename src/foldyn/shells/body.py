@@ -8,12 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, Superlinear
-from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, largest_turn, unit_rows
+from foldyn.mechanics.body import (
+    Body,
+    FoldHinges,
+    SoftHinges,
+    hidden_in_balance,
+    largest_turn,
+    unit_rows,
+)
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.shells.kernels import (
@@ -32,9 +38,6 @@ from foldyn.shells.tangent import (
     shell_tangent,
 )
 
-ITERATIONS = 50
-BALANCED = 1e-13  # rad, of the last step of Newton's method
-FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
 GROUPS: Mapping[str, str] = {
     "strain_membrane": "strain energy of stretching",
     "strain_bending": "strain energy of bending",
@@ -82,9 +85,7 @@ class ShellBody(Body):
 
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
         """See `Body`."""
-        u = np.ascontiguousarray(displacement, float).reshape(-1, 3)
-        push = None if push is None else push[self.hidden]
-        return np.concatenate([u.ravel(), balanced_rotations(self.model, self.sparsity, u, push)])
+        return hidden_in_balance(self, displacement, push, self.model.per_reach)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
@@ -230,31 +231,3 @@ def positions(model: ShellModel) -> NDArray:
     has = model.rotation >= 0
     points[3 * n + model.rotation[has]] = middle[has]
     return points
-
-
-def balanced_rotations(
-    model: ShellModel, pattern: ShellPattern, u: NDArray, push: NDArray | None = None
-) -> NDArray:
-    """Dofs (r,), m, of the rotations in balance at displacement u (n, 3), by Newton's method.
-
-    push : forces (r,), N, on them; none by default.
-
-    Raises
-    ------
-    ComputationError
-        There are none near zero.
-    """
-    work, x = shell_work(model), np.zeros(model.rotations)
-    force, couple = np.empty_like(u), np.empty_like(x)
-    for _ in range(ITERATIONS):
-        shell_force(model, u, x, force, couple, work)
-        if push is not None:
-            couple -= push
-        if not couple.any():
-            return x
-        stiffness = shell_tangent(model, pattern, u, x, FLOOR)[u.size :][:, u.size :]
-        step = splu(sparse.csc_array(stiffness)).solve(-couple)
-        x = x + step
-        if model.per_reach * np.abs(step).max(initial=0.0) <= BALANCED:
-            return x
-    raise ComputationError("the rotations of the shell do not balance at this displacement")

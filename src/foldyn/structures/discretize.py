@@ -128,11 +128,14 @@ def discretize(
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
+    plates = None
     if options.scheme == "n5b8e":
-        bends = spoke_stiffness(
-            edge_plates(mesh.nodes, mesh.centers, mesh.folds, pattern, sheet, options.straight),
-            len(mesh.folds), len(mesh.bends),
+        every = range(len(pattern.faces))
+        plates = edge_plates(
+            mesh.nodes, mesh.centers, mesh.folds, pattern, sheet, options.straight,
+            every if isinstance(options.rigid, str) else options.rigid or (),
         )  # fmt: skip
+        bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends))
     elif options.calibration == "plate":
         folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
         bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
@@ -161,6 +164,7 @@ def discretize(
         centers=mesh.centers,
         clamps=clamps,
         clamp_stiffness=clamp_stiffness(x, clamps, modulus),
+        edge_plates=plates,
     )
     _ = structure.plates  # refuse panels that are not flat
     return structure.marked()

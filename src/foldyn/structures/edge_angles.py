@@ -12,6 +12,7 @@ It counts as such above `STRAIGHT` t/L, t the thickness and L its length.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +29,21 @@ from foldyn.structures.sheet import Sheet
 STRAIGHT = 3.0
 
 
+class EdgePlates(NamedTuple):
+    """Panels as plates: what `BarsPlates` has of them."""
+
+    fold_rotations: NDArray
+    start: NDArray
+    angle: NDArray
+    entry: NDArray
+    stiffness: NDArray
+
+
 def edge_plates(
     nodes: NDArray, centers: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet,
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
-) -> dict[str, NDArray]:  # fmt: skip
-    """Arrays `fold_rotations`, `start`, `angle`, `entry` and `stiffness` of `BarsPlates`.
+) -> EdgePlates:  # fmt: skip
+    """Panels of a mesh with center nodes as plates.
 
     straight_edges : boundary edges (low, high) that stay straight.
     rigid : numbers of rigid panels, which have no angles.
@@ -66,13 +77,13 @@ def edge_plates(
         matrices.append(own.bending_modulus * panel_stiffness(panel, own.poissons_ratio))
         angles.append(turned)
     sizes = [len(turned) for turned in angles]
-    return {
-        "fold_rotations": rotations,
-        "start": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        "angle": np.array([k for turned in angles for k in turned], np.int64),
-        "entry": np.concatenate([[0], np.cumsum(np.square(sizes))]).astype(np.int64),
-        "stiffness": np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)]),
-    }
+    return EdgePlates(
+        fold_rotations=rotations,
+        start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        angle=np.array([k for turned in angles for k in turned], np.int64),
+        entry=np.concatenate([[0], np.cumsum(np.square(sizes))]).astype(np.int64),
+        stiffness=np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)]),
+    )
 
 
 def _straight(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
@@ -85,13 +96,13 @@ def _straight(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) ->
 def plates_model(
     nodes: NDArray, bars: NDArray, bar_stiffness: NDArray, bar_law: BarLaw, folds: NDArray,
     fold_stiffness: NDArray, fold_rest: NDArray, fold_law: HingeLaw, bends: NDArray,
-    bend_rest: NDArray, plates: dict[str, NDArray],
+    bend_rest: NDArray, plates: EdgePlates,
 ) -> BarsPlates:  # fmt: skip
     """Arrays of the model: bars with the stiffness E A / L, folds, and what `edge_plates` gives."""
     length = lengths(nodes, bars)
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
-        rotations=int((plates["fold_rotations"] >= 0).sum()),
+        rotations=int((plates.fold_rotations >= 0).sum()),
         per_reach=1.0 / float(np.sqrt((length**2).mean())),
         hinges=np.concatenate([folds, bends]).astype(np.int64),
         fold_stiffness=np.array(fold_stiffness, float),
@@ -100,16 +111,16 @@ def plates_model(
         code=int(fold_law.code),
         addresses=np.array(fold_law.addresses or (0, 0, 0), np.int64),
         bend_rest=np.array(bend_rest, float),
-        **plates,
+        **plates._asdict(),
     )
 
 
-def spoke_stiffness(plates: dict[str, NDArray], folds: int, bends: int) -> NDArray:
+def spoke_stiffness(plates: EdgePlates, folds: int, bends: int) -> NDArray:
     """Stiffness (nb,), N m/rad, of each spoke if no other angle of its panel turns."""
     out = np.zeros(bends)
-    for p, first in enumerate(plates["start"][:-1]):
-        count = plates["start"][p + 1] - first
-        own = plates["angle"][first : first + count]
-        diagonal = plates["stiffness"][plates["entry"][p] : plates["entry"][p + 1]][:: count + 1]
+    for p, first in enumerate(plates.start[:-1]):
+        count = plates.start[p + 1] - first
+        own = plates.angle[first : first + count]
+        diagonal = plates.stiffness[plates.entry[p] : plates.entry[p + 1]][:: count + 1]
         out[own[own >= 0] - folds] = diagonal[own >= 0]
     return out

@@ -7,12 +7,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from foldyn import mechanics
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, LinearHinge, Superlinear
-from foldyn.mechanics.body import Body, FoldHinges, SoftHinges, Unstrained, largest_turn
+from foldyn.mechanics.body import (
+    Body,
+    FoldHinges,
+    SoftHinges,
+    Unstrained,
+    hidden_in_balance,
+    largest_turn,
+)
 from foldyn.mechanics.plates import (
     BarsPlates,
     PlatesWork,
@@ -24,10 +30,6 @@ from foldyn.mechanics.plates_tangent import PlatesPattern, add_plates_tangent, p
 from foldyn.mechanics.step_tangent import FLOOR as STEP_FLOOR
 from foldyn.mechanics.step_tangent import SparseBlocks
 from foldyn.structures.body import GROUPS, BarsHingesBody, stretch
-
-ITERATIONS = 50
-BALANCED = 1e-13  # rad, of the last step of Newton's method
-FLOOR = 1e-3  # of a fold's stiffness: its least slope in these steps
 
 
 class BarsPlatesBody(Body):
@@ -78,27 +80,8 @@ class BarsPlatesBody(Body):
         return isinstance(self._laws[0], LinearHinge)
 
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """See `Body`: rotations by Newton's method.
-
-        Raises
-        ------
-        ComputationError
-            There are none near zero.
-        """
-        q = np.append(np.asarray(displacement, float).ravel(), np.zeros(len(self.hidden)))
-        if not len(self.hidden):
-            return q
-        work, pushed = plates_work(self.model), 0.0 if push is None else push[self.hidden]
-        for _ in range(ITERATIONS):
-            couple = self.internal(q, work)[self.hidden] - pushed
-            if not couple.any():
-                return q
-            stiffness = self.tangent(q, FLOOR)[self._nodal :][:, self._nodal :]
-            step = splu(sparse.csc_array(stiffness)).solve(-couple)
-            q[self.hidden] += step
-            if self.model.per_reach * np.abs(step).max() <= BALANCED:
-                return q
-        raise ComputationError("the edges of the panels do not balance at this displacement")
+        """See `Body`."""
+        return hidden_in_balance(self, displacement, push, self.model.per_reach)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""

@@ -33,7 +33,7 @@ from foldyn.structures.clamps import clamps
 from foldyn.structures.condensed_body import CondensedBody, balanced
 from foldyn.structures.creases import PerCrease, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
-from foldyn.structures.edge_angles import edge_plates, plates_model
+from foldyn.structures.edge_angles import EdgePlates, plates_model
 from foldyn.structures.mass import MASS_RULES, lumped
 from foldyn.structures.mesh import hinge_angles
 from foldyn.structures.plates_body import BarsPlatesBody
@@ -100,8 +100,10 @@ class Structure(Discretized):
         Node number of each panel's center, -1 without one.
     clamps, clamp_stiffness : (c, 3), (c,)
         Triangles at clamped edges, from the edge's first end; stiffness (N m/rad).
+    edge_plates : EdgePlates or None
+        Panels as plates, of the scheme n5b8e.
     without_edge_angles : bool
-        Whether those of the scheme n5b8e are no dofs but stay in balance.
+        Whether its edge angles are no dofs but stay in balance.
     pattern, sheet, options
         What it was made from.
     """
@@ -125,6 +127,7 @@ class Structure(Discretized):
     node_mass: NDArray | None = None
     clamps: NDArray = field(default_factory=lambda: _none(3))
     clamp_stiffness: NDArray = field(default_factory=lambda: _none(1, float))
+    edge_plates: EdgePlates | None = None
     without_edge_angles: bool = False
 
     def __repr__(self) -> str:
@@ -171,8 +174,8 @@ class Structure(Discretized):
     @cached_property
     def body(self) -> Body:
         """What solvers take."""
-        if self.has_edge_angles:
-            return self._plates_body()
+        if self.edge_plates is not None:
+            return self._plates_body(self.edge_plates)
         rows = [self._rows(group, kind.nodes) for group, kind in enumerate(self.hinge_kinds)]
         laws = tuple((kind.law, len(kind.nodes)) for kind in self.hinge_kinds)
         body = BarsHingesBody(self.model, np.concatenate(rows), laws)
@@ -182,23 +185,12 @@ class Structure(Discretized):
         return attached(body, clamps(self.nodes, self.clamps, self.clamp_stiffness, bends))
 
     @property
-    def has_edge_angles(self) -> bool:
-        """Whether the edges of its panels turn against the facets: scheme n5b8e."""
-        return self.options.scheme == "n5b8e"
-
-    @property
     def massless(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Its dofs without mass, in words."""
-        there = self.has_edge_angles and not self.without_edge_angles
+        there = self.edge_plates is not None and not self.without_edge_angles
         return "the edge angles of the scheme n5b8e" if there else ""
 
-    def _plates_body(self) -> Body:
-        assert self.pattern is not None
-        rigid = self.options.rigid or ()
-        plates = edge_plates(
-            self.nodes, self.centers, self.folds, self.pattern, self.sheet, self.options.straight,
-            range(len(self.pattern.faces)) if isinstance(rigid, str) else rigid,
-        )  # fmt: skip
+    def _plates_body(self, plates: EdgePlates) -> Body:
         stiffness = self.sheet.youngs_modulus * self.bar_area / self.bar_length
         model = plates_model(
             self.nodes, self.bars, stiffness, self.bar_law, self.folds, self.fold_stiffness,
@@ -207,7 +199,7 @@ class Structure(Discretized):
         body = BarsPlatesBody(model, (self.fold_law, self.bend_law))
         return CondensedBody(body) if self.without_edge_angles else body
 
-    @property
+    @cached_property
     def condensed(self) -> Structure | None:
         """See `Discretized`."""
         if not self.massless:
@@ -263,7 +255,7 @@ class Structure(Discretized):
 
     def swollen(self, strain: NDArray, curvature: NDArray) -> Swelling:
         """See `Discretized`; a bar between panels takes their mean strain."""
-        if self.has_edge_angles and np.any(curvature):
+        if self.edge_plates is not None and np.any(curvature):
             raise InputError(
                 ' = "n5b8e": panels that curl need edge angles at rest, which it does not have; '
                 'take "n5b8"',

@@ -24,6 +24,7 @@ from foldyn.dynamics import simulate
 from foldyn.errors import ComputationError, FoldynWarning, InstabilityError, PenetrationError
 from foldyn.linear import mac, modes
 from foldyn.linear.reference import DIVISIONS, elastic, modes_at_rest
+from foldyn.linear.refinement import extrapolated
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.shells import Shell, shell
@@ -204,7 +205,7 @@ def pulsed(name: str, divisions: int = DIVISIONS[0]) -> Started:
     meshes = (made[SHELL], shell(pattern, sheet, DIVISIONS[1], mass="consistent"))
     free = replace(given, loads=())
     coarse, fine = (modes(replace(free, structure=s), 1).frequency.values[0] for s in meshes)
-    extrapolated = fine + (fine - coarse) / ((DIVISIONS[1] / divisions) ** 2 - 1.0)
+    limit = extrapolated(coarse, fine, DIVISIONS[1] / divisions)
     skipped = round(PULSE_END / PULSE_STEP)
 
     def move(structure: Any) -> Motion:
@@ -216,7 +217,7 @@ def pulsed(name: str, divisions: int = DIVISIONS[0]) -> Started:
 
     motions = {model: lambda s=s: move(s) for model, s in made.items()}
     band = PULSE_BAND[0] * coarse, PULSE_BAND[1] * coarse
-    return Started(name, "pulse", pattern, float(coarse / extrapolated), band, False, motions)
+    return Started(name, "pulse", pattern, float(coarse / limit), band, False, motions)
 
 
 def _motion(case: Case, duration: float, dt: float, start: State | None = None) -> Any:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from foldyn.analyses import read_case
 from foldyn.cases import Case, Fix, Force
 from foldyn.linear import modes
+from foldyn.linear.fidelity import MODELS
 from foldyn.linear.refinement import extrapolated
 from foldyn.linear.small_loads import small_loads
 from foldyn.patterns.generators import miura
@@ -20,11 +21,6 @@ from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
 
-MODELS: Mapping[str, Mapping[str, Any]] = {
-    "standard": {"calibration": "standard", "mass": "mixed_voronoi"},
-    "plate": {"calibration": "plate", "mass": "consistent"},
-    "n5b8e": {"calibration": "plate", "mass": "condensed", "scheme": "n5b8e"},
-}
 STUDIES = ("case1", "case2", "case3", "case4")
 STEEL = Sheet(2e11, 0.3, 1e-4, density=7850.0)
 MESHES = {"studies": (8, 16), "steel": (4, 8)}  # divisions of the shells
@@ -60,7 +56,7 @@ def study(name: str) -> Softness:
         return small_loads(replace(given, structure=structure)).displacement
 
     true = float(_extrapolated(lambda n: of(shell(pattern, sheet, n)), MESHES["studies"]))
-    bars = {m: of(discretize(pattern, sheet, bend_law="linear", **o)) for m, o in MODELS.items()}
+    bars = {m: of(discretize(pattern, sheet, **o)) for m, o in MODELS.items()}
     return Softness(name, true, {model: found / true - 1.0 for model, found in bars.items()})
 
 
@@ -89,7 +85,7 @@ def steel() -> tuple[Softness, NDArray, Mapping[str, NDArray]]:
         )
 
     fine = _extrapolated(lambda n: of(shell(pattern, STEEL, n, mass="consistent")), MESHES["steel"])
-    bars = {m: of(discretize(pattern, STEEL, bend_law="linear", **o)) for m, o in MODELS.items()}
+    bars = {m: of(discretize(pattern, STEEL, **o)) for m, o in MODELS.items()}
     error = {model: float(found[0] / fine[0] - 1.0) for model, found in bars.items()}
     frequency = {model: found[1:] for model, found in bars.items()}
     return Softness("steel", float(fine[0]), error), fine[1:], frequency
