@@ -270,7 +270,7 @@ def hidden_in_balance(
     for _ in range(ITERATIONS):
         couple = body.internal(q, work)[first:]
         if push is not None:
-            couple -= push[first:]
+            couple -= push[body.hidden]
         if not couple.any():
             return q
         stiffness = body.tangent(q, LEAST_SLOPE)[first:][:, first:]

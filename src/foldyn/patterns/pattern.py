@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
+from foldyn.patterns import crease_data
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.crease_data import vertex_pair
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
-from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup, edge_of
+from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup
 from foldyn.values import LONGEST, SHORTEST
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
@@ -43,11 +44,23 @@ class Pattern:
         What to call the pattern.
     boards : Boards, optional
         The boards that thick panels stand for; see `thicken`.
+    fold_angles : mapping, sequence or None
+        The state to fold to: an angle (rad) from -pi to pi for each crease in the order of
+        `creases`, positive on valleys, 0 where flat, NaN or None where none is wanted, or a
+        mapping from vertex pairs.
+    families : mapping, optional
+        Names for groups of creases, each with vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
+    custom : mapping, optional
+        Further data of a file that Foldyn does not read, kept to be written again.
 
     Attributes
     ----------
     assignments : tuple of str
         The letter of each crease.
+    fold_angles : ndarray, shape (nc,)
+        Angle to fold each crease to (rad, pi less the dihedral), NaN where none is given.
+    families : mapping
+        Rows of `creases`, by the name of their family.
     flipped : tuple of bool
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
@@ -93,6 +106,9 @@ class Pattern:
     assignments: tuple[str, ...]
     name: str
     boards: Boards | None
+    fold_angles: NDArray[np.float64]
+    families: Mapping[str, NDArray[np.int64]]
+    custom: Mapping[str, Any]
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
@@ -112,6 +128,9 @@ class Pattern:
         assignments: Mapping[tuple[int, int], str] | Sequence[str] | None = None,
         name: str = "",
         boards: Boards | None = None,
+        fold_angles: Mapping[tuple[int, int], float] | ArrayLike | None = None,
+        families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
+        custom: Mapping[str, Any] | None = None,
     ) -> None:
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
@@ -138,6 +157,9 @@ class Pattern:
             "assignments": tuple(np.where(given == "", _letters(apart), given).tolist()),
             "name": name,
             "boards": boards,
+            "fold_angles": crease_data.fold_angles(fold_angles, topology.creases),
+            "families": crease_data.families(families, topology.creases),
+            "custom": dict(custom or {}),
             "dihedrals": dihedrals,
             "flat_dihedrals": flat,
             "size": float(np.linalg.norm(np.ptp(points, axis=0))),
@@ -205,7 +227,7 @@ def _given_letters(
         row, rim = edge_lookup(creases), edge_lookup(boundary)
         before: dict[Edge, Any] = {}
         for key, letter in assignments.items():
-            pair = _vertex_pair(key)
+            pair = vertex_pair("assignments", key)
             if before.setdefault(pair, letter) != letter:
                 raise InputError(
                     f"assignments: edge {pair} is given both {before[pair]!r} and {letter!r}; "
@@ -239,18 +261,6 @@ def _given_letters(
     for k, letter in enumerate(assignments):
         given[k] = _checked_letter(letter, (int(creases[k, 0]), int(creases[k, 1])))
     return given, boundary_edges
-
-
-def _vertex_pair(key: Any) -> Edge:
-    try:
-        if isinstance(key, str):
-            raise TypeError
-        a, b = (operator.index(v) for v in key)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"assignments: key {key!r} is not a pair of vertex numbers; write {{(0, 1): 'M'}}."
-        ) from None
-    return edge_of(a, b)
 
 
 def _checked_letter(letter: Any, pair: Edge) -> str:

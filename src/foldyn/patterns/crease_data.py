@@ -1,0 +1,98 @@
+"""What a pattern may say of its creases beside their letters: angles to fold to, families."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns.topology import Edge, edge_lookup, edge_of
+
+RESERVED = ("all", "mountain", "valley", "flat", "unassigned")
+"""Words that stand for creases of every pattern."""
+
+
+def vertex_pair(field: str, key: Any) -> Edge:
+    """Edge (low, high) that a pair of vertex numbers names."""
+    try:
+        if isinstance(key, str):
+            raise TypeError
+        a, b = (operator.index(v) for v in key)
+    except (TypeError, ValueError):
+        raise InputError(
+            f": key {key!r} is not a pair of vertex numbers; write (0, 1)", field
+        ) from None
+    return edge_of(a, b)
+
+
+def fold_angles(given: Any, creases: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Angles (nc,), rad, valleys positive, NaN where none is given; `given` as `Pattern` takes."""
+    angles = np.full(len(creases), np.nan)
+    if given is None:
+        return angles
+    if isinstance(given, Mapping):
+        row = edge_lookup(creases)
+        for key, angle in given.items():
+            pair = vertex_pair("fold_angles", key)
+            if pair not in row:
+                raise InputError(f": {pair} is not a crease; name its two vertices", "fold_angles")
+            angles[row[pair]] = _angle(angle)
+        return angles
+    try:
+        entries = list(given)
+    except TypeError:
+        raise InputError(
+            f" = {given!r}: give an angle (rad) for each crease, a mapping from vertex pairs, or "
+            "None",
+            "fold_angles",
+        ) from None
+    if len(entries) != len(creases):
+        raise InputError(
+            f" has {len(entries)} angles for {len(creases)} creases: give one for each, NaN for "
+            "none, or a mapping from vertex pairs",
+            "fold_angles",
+        )
+    angles[:] = [_angle(angle) for angle in entries]
+    return angles
+
+
+def _angle(value: Any) -> float:
+    if value is None:
+        return np.nan
+    good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not good or np.isinf(value) or abs(value) > np.pi * (1.0 + 1e-12):
+        raise InputError(
+            f": {value!r}: give angles from -pi (a closed mountain) to pi (a closed valley), in "
+            "radians",
+            "fold_angles",
+        )
+    return float(value)
+
+
+def families(given: Any, creases: NDArray[np.int64]) -> Mapping[str, NDArray[np.int64]]:
+    """Rows of the creases of each family; `given` as `Pattern` takes it."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise InputError(f" = {given!r}: give a mapping from names to creases", "families")
+    row, rows = edge_lookup(creases), {}
+    for name, members in given.items():
+        if not isinstance(name, str) or not name or name in RESERVED:
+            raise InputError(
+                f": {name!r} is no name for a family: give text other than {', '.join(RESERVED)}",
+                "families",
+            )
+        pairs = [vertex_pair(f"families[{name!r}]", member) for member in members]
+        strange = [pair for pair in pairs if pair not in row]
+        if strange:
+            raise InputError(
+                f": {strange[0]} is not a crease; name the two vertices of each",
+                f"families[{name!r}]",
+            )
+        rows[name] = np.array(sorted({row[pair] for pair in pairs}), dtype=np.int64)
+        rows[name].setflags(write=False)
+    return rows
