@@ -1,0 +1,51 @@
+"""`Drawing`: a crease pattern as a file gives it, before it is repaired and has panels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Lines with letters; what readers of all formats give.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 2) or (n, 3)
+        Coordinates in the file's unit.
+    edges : ndarray of int, shape (m, 2)
+        Vertex numbers of each line.
+    letters : tuple of str
+        For each line "B", "M", "V", "F", "U", "C" (cut) or "J" (join), as FOLD has them.
+    fold_angles : ndarray, shape (m,)
+        Angle (degrees, positive on valleys) to fold each line to; NaN where none is given.
+    faces : tuple of tuple of int, optional
+        Panels; None where the file has lines alone and the panels are to be found from them.
+    meters : float, optional
+        Length of the file's unit (m); None where the file does not say it.
+    name : str
+        Title.
+    places : tuple of str
+        Where each line is in the file ("line 12", "path 3"), for messages; () where its number
+        says it.
+    repairs : tuple of str
+        What the reader put right, in words.
+    custom : mapping
+        Further data, kept.
+    """
+
+    vertices: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    letters: tuple[str, ...]
+    fold_angles: NDArray[np.float64]
+    faces: tuple[tuple[int, ...], ...] | None = None
+    meters: float | None = None
+    name: str = ""
+    places: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
+    custom: Mapping[str, Any] = field(default_factory=dict)
