@@ -40,7 +40,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
     modes = read(MODES)
     assert modes.analysis.kind == "modes"
     assert modes.analysis.arguments == {"count": 6, "state": None, "secant": None}
-    assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, "gif", None)
+    assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, None, None)
     assert not modes.output.named
     assert modes.initial() is None
     response = read(RESPONSE)

@@ -40,7 +40,7 @@ class ModesOutput(ShownSection):
     """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
 
     shapes: Annotated[int | tuple[int, ...], some_shapes("modes", "mode", least=1)] = 6
-    animation: Animation = "gif"
+    animation: Animation | None = None
 
 
 class ModesSchema(VibrationSchema):
@@ -111,12 +111,13 @@ class ModesAnalysis(Analysis):
             "mode has no amplitude of its own: each is drawn so that it can be read.",
             lambda: plots.draw_modes(case, modes, shown, names=names),
         )
-        together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
-        filmed = shown[: min(MOST_FILMED, together)]
-        film = album.folder / f"modes.{case_file.output.animation}"
-        plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
-        some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
-        yield Picture(film, f"The same modes{some} in motion, all at one pace.")
+        if case_file.output.animation:
+            together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
+            filmed = shown[: min(MOST_FILMED, together)]
+            film = album.folder / f"modes.{case_file.output.animation}"
+            plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
+            some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
+            yield Picture(film, f"The same modes{some} in motion, all at one pace.")
         same = {rule: mac(modes, other, case.mass) for rule, other in others}
         if same:
             yield album.figure(

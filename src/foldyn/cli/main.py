@@ -17,7 +17,7 @@ from typing import NoReturn
 from foldyn import __version__
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
-from foldyn.cli.options import add_results
+from foldyn.cli.options import add_film, add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
@@ -127,6 +127,7 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
 def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     """Add what commands on case files of either model take."""
     _add_case(command, results)
+    add_film(command)
     command.add_argument(
         "--model",
         metavar="bars_and_hinges|shell",
