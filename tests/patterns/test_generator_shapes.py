@@ -41,30 +41,33 @@ def test_an_arc_is_a_circle(line):
     assert steps[0] != pytest.approx(steps[1], abs=0.01)
 
 
-def test_a_waterbomb_lies_in_a_plane_where_its_middles_stand_upright():
-    # r = 90 degrees where the depth Z = b/2 cos(dihedral/2) is a/2
-    a, b = 1.0, 1.5
-    bomb = fd.patterns.waterbomb((3, 4), a, b, 2 * np.degrees(np.arccos(a / b)))
-    line = 7
-    levels = bomb.vertices[: 5 * line].reshape(5, line, 3)
-    corners = [levels[r, r % 2 :: 2, 2] for r in range(5)]
-    middles = [levels[r, 1 - r % 2 :: 2, 2] for r in range(5)]
-    for heights in zip(*corners, strict=False):
-        np.testing.assert_allclose(heights, heights[0], atol=1e-14)
-    for heights in zip(*middles, strict=False):
-        np.testing.assert_allclose(heights, heights[0], atol=1e-14)
+@pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (1.0, 1.4), (1.3, 1.0)])
+def test_a_waterbomb_rolls_up_to_a_cylinder(a, b):
+    bomb = fd.patterns.waterbomb((2, 3), a, b, 125)
+    line, rows = 5, 4
+    grid, centers = bomb.vertices[: rows * line].reshape(rows, line, 3), bomb.vertices[20:]
+    x, z = bomb.vertices[: rows * line, ::2].T
+    fit = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), x**2 + z**2, rcond=None)[0]
+    axis = fit[:2] / 2
+    radius = np.linalg.norm(grid[..., ::2] - axis, axis=-1)
+    assert np.ptp(radius) < 1e-12
+    rise = grid[0, 1, 1] - centers[0, 1]  # of the lower middle; its corners are below by a/2
+    assert grid[0, 0, 1] - centers[0, 1] == pytest.approx(-a / 2, abs=1e-13)
+    depth = radius[0, 0] - np.linalg.norm(centers[:, ::2] - axis, axis=1)
+    np.testing.assert_allclose(depth, np.sqrt((a / 2) ** 2 - rise**2), atol=1e-12)
+    # each row takes up the same length, and all columns the same angle
+    np.testing.assert_allclose(np.diff(grid[:, 0, 1])[::2], a, atol=1e-12)
+    np.testing.assert_allclose(np.diff(grid[::2, 0, 1]), a - 2 * rise, atol=1e-12)
+    angle = np.arctan2(grid[..., 0] - axis[0], grid[..., 2] - axis[1])
+    assert np.ptp(np.diff(angle, axis=1)) < 1e-12
 
 
-@pytest.mark.parametrize("dihedral", [30, 60, 85])
-def test_rows_of_a_waterbomb_turn_as_said(dihedral):
-    a, b = 1.0, 1.1
-    bomb = fd.patterns.waterbomb((1, 4), a, b, dihedral)
-    rise = 2 * np.arctan(b / a * np.cos(np.radians(dihedral) / 2))
-    centers = bomb.vertices[15:]  # one in even rows, two at the sides in odd ones
-    row = centers[[0, 1, 3, 4]]
-    way = np.diff(row[:, 1] + 1j * row[:, 2])
-    turned = np.angle(way[1:] / way[:-1])
-    np.testing.assert_allclose(np.abs(turned), abs(np.pi - 2 * rise), atol=1e-12)
+def test_a_waterbomb_of_wide_bases_closes_before_its_sides_do():
+    closed = 2 * np.degrees(np.arccos(1 / 1.5))
+    shut = fd.patterns.waterbomb((1, 1), 1.0, 1.5, closed + 1e-6)
+    assert np.ptp(shut.vertices[:, 1]) == pytest.approx(1.0, abs=1e-4)
+    with pytest.raises(InputError, match=r"dihedral = 90: must be between 96\.3794 and 180"):
+        fd.patterns.waterbomb((1, 1), 1.0, 1.5, 90)
 
 
 def test_a_full_turn_of_yoshimura_is_a_tower_of_antiprisms():
@@ -183,7 +186,7 @@ def test_tiles_of_resch_close_up():
         (lambda p: p.arc_miura((1, 40)), r"arc_miura: cells\[1\] = 40: each of the 40 cells"),
         (lambda p: p.arc_miura(a=0.1, b=2.0, second_angle=30), "arc_miura: a = 0.1: .*no length"),
         (lambda p: p.arc_miura(second_angle=90), "arc_miura: second_angle = 90: .*acute corner"),
-        (lambda p: p.waterbomb((2, 9), dihedral=120), r"cells\[1\] = 9: .*at most \d rows"),
+        (lambda p: p.waterbomb((9, 2), dihedral=100), r"cells\[0\] = 9: .*at most \d bases"),
         (lambda p: p.waterbomb(dihedral=0), "waterbomb: dihedral = 0: must be between 0 and 180"),
         (lambda p: p.waterbomb((2, 0)), r"waterbomb: cells\[1\] = 0"),
         (lambda p: p.yoshimura((9, 1), dihedral=120), r"yoshimura: cells\[0\] = 9: .* 9 bases"),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
-import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import cell_counts, check_turn, fold_dihedral, sizes
@@ -14,14 +14,14 @@ from foldyn.patterns.generators.assembly import assembled
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge
 
-LETTERS = {"diagonal": "V", "row": "V", "middle": "M", "side": "M"}
+LETTERS = {"diagonal": "V", "middle": "M", "side": "M", "row": "M"}
 
 
 def waterbomb(
     cells: Sequence[int] = (4, 5),
     a: float = 1.0,
     b: float = 1.0,
-    dihedral: float = 60.0,
+    dihedral: float = 120.0,
 ) -> Pattern:
     """Waterbomb tessellation: rows of waterbomb bases, each shifted by half a base to the last.
 
@@ -30,11 +30,13 @@ def waterbomb(
     1` a row from x = 0 at distances b/2, are numbered first, row by row along y, then the centers,
     row by row. Odd rows begin and end with half a base.
 
-    Symmetric folding has one degree of freedom. The middle of the side of a base is at the
-    distance X = b/2 sin(dihedral/2) along x from the center and at the height
-    Z = b/2 cos(dihedral/2) above it; the creases to the middles of the edges rise by the angle r,
-    tan(r/2) = 2 Z/a. Each row turns by 180 - 2 r degrees against the last, about x: the sheet
-    is a tube where r < 90, lies in a plane where r = 90, and curves the other way beyond.
+    It rolls up as it folds, alike in all rows, to a cylinder about an axis along y. With the half
+    lengths h = a/2 and w = b/2 and the height z of the middle of an edge above the center of its
+    base along the axis, h when flat: a row takes up h + z, half a base the angle p,
+    sin^2(p/2) = z^2 (h - z)/((h + z) k) with k = w^2 - (h - z)^2; grid points lie at the distance
+    R = sqrt(k)/(2 sin(p/2)) from the axis, centers at R - sqrt(h^2 - z^2). The dihedral d follows
+    from cos(d/2) = sqrt((h - z)/(h + z)) (h + z + q z)/w with q = (w^2 - h^2 + z^2)/k, which is
+    solved for z.
 
     Parameters
     ----------
@@ -43,16 +45,15 @@ def waterbomb(
     a, b : float
         Lengths of a base along y and along x (m).
     dihedral : float
-        Angle across the sides of bases, from row to row (degrees, above 0, 180 is flat). Close to
-        flat the rows fold back upon each other: no symmetric motion leads from the flat sheet to
-        the folded ones with all creases opening at once.
+        Angle across the sides of bases, from row to row (degrees, above 0, or for b > a above that
+        at which the sheet is closed, 2 arccos(a/b); 180 is flat).
 
     Returns
     -------
     Pattern
-        Front to +z in the first row. Families: "diagonal" and "row", the creases between rows
-        (valleys); "middle", from centers to the middles of edges, and "side", between the bases
-        of a row (mountains).
+        Front to +z in the middle, outside the cylinder. Families: "diagonal" (valleys);
+        "middle", from centers to the middles of edges, "side", between the bases of a row, and
+        "row", between rows (mountains).
 
     Raises
     ------
@@ -62,33 +63,43 @@ def waterbomb(
 
     Notes
     -----
+    Other states with the same symmetry of the bases have rows of another shape (R. Imada,
+    T. Tachi, Geometry and kinematics of cylindrical waterbomb tessellation, J. Mech. Robot. 14,
+    2022: this is their cylinder solution). The sheet as such has many degrees of freedom:
     Y. Chen, H. Feng, J. Ma, R. Peng, Z. You, Symmetric waterbomb origami, Proc. R. Soc. A 472,
-    2016; R. Imada, T. Tachi, Geometry and kinematics of cylindrical waterbomb tessellation,
-    J. Mech. Robot. 14, 2022.
+    2016.
     """
     with within("waterbomb: "):
         nx, ny = cell_counts(cells, 4)
         a, b = sizes(a, b)
-        dihedral = fold_dihedral(dihedral)
-        half = math.radians(dihedral) / 2
-        if dihedral == 180.0:
-            width, points, middles = b / 2, *_flat(ny, a)
-        else:
-            width = b / 2 * math.sin(half)
-            depth = b / 2 * math.cos(half)
-            rise = 2.0 * math.atan2(2.0 * depth, a)
-            turn = 180.0 - 2.0 * math.degrees(rise)
-            check_turn("cells[1]", ny, turn, ny, "rows")
-            points, middles = _folded(ny, a, depth, rise)
+        closed = 2.0 * math.degrees(math.acos(a / b)) if a < b else 0.0
+        dihedral = fold_dihedral(dihedral, least=closed)
+        height = a / 2 if dihedral == 180.0 else _height(math.radians(dihedral), a / 2, b / 2)
+        bent, radius, depth = _rolled(height, a / 2, b / 2)
+        check_turn("cells[0]", nx, 2.0 * math.degrees(bent), nx, "bases")
+
+    def place(column: int, y: float, inside: float) -> tuple[float, float, float]:
+        """Place of a point in its column, at some depth inside the cylinder of the grid points."""
+        if bent == 0.0:
+            return b / 2 * (column - nx), y, 0.0
+        angle = bent * (column - nx)
+        fall = 2.0 * radius * math.sin(angle / 2) ** 2
+        return (radius - inside) * math.sin(angle), y, -fall - inside * math.cos(angle)
+
+    row_length, rise = a / 2 + height, a / 2 - height
     line = 2 * nx + 1
-    vertices = [(width * k, *points[row, k % 2]) for row in range(ny + 1) for k in range(line)]
+    vertices = [
+        place(k, row * row_length + rise * ((row + k) % 2), 0.0)
+        for row in range(ny + 1)
+        for k in range(line)
+    ]
     faces: list[tuple[int, ...]] = []
     families: dict[str, list[Edge]] = {"diagonal": [], "middle": [], "side": [], "row": []}
-    for row, middle in enumerate(middles):
+    for row in range(ny):
         low, high = row * line, (row + 1) * line
         for column in range(1 - row % 2, line, 2):
             center = len(vertices)
-            vertices.append((width * column, *middle))
+            vertices.append(place(column, row * row_length + a / 2, depth))
             families["middle"] += [(low + column, center), (high + column, center)]
             if column > 0:
                 left = column - 1
@@ -112,31 +123,21 @@ def waterbomb(
     return assembled("waterbomb", vertices, faces, families, LETTERS)
 
 
-def _flat(rows: int, a: float) -> tuple[NDArray, NDArray]:
-    """Places (y, z), m, of points by line and parity (rows + 1, 2, 2), and of centers (rows, 2)."""
-    lines = a * np.arange(rows + 1)
-    points = np.stack([lines, 0.0 * lines], axis=1)
-    return np.stack([points, points], axis=1), np.stack([lines[:-1] + a / 2, 0.0 * lines[1:]], 1)
+def _height(dihedral: float, h: float, w: float) -> float:
+    """Height (m) of a middle above the center along the axis, from the dihedral (rad) of sides."""
+
+    def short(z: float) -> float:
+        q = (w * w - h * h + z * z) / (w * w - (h - z) ** 2) if z > 0.0 else 0.0
+        return math.sqrt((h - z) / (h + z)) * (h + z + q * z) / w - math.cos(dihedral / 2)
+
+    least = math.sqrt(max(h * h - w * w, 0.0))
+    return float(cast(float, brentq(short, least, h, xtol=1e-15 * h, rtol=1e-15)))
 
 
-def _folded(rows: int, a: float, depth: float, rise: float) -> tuple[NDArray, NDArray]:
-    """As `_flat`; a base's corners lie above its center by `depth`, its middles rise by `rise`."""
-    corner, middle = a / 2 + 1j * depth, a / 2 * np.exp(1j * rise)  # upper; y + i z
-    points = np.empty((rows + 1, 2), dtype=complex)
-    centers = np.empty(rows, dtype=complex)
-    place, turn = a / 2 - 1j * depth, 1.0 + 0j  # of the row: its center, its direction
-    for row in range(rows):
-        own = [corner, middle] if row % 2 == 0 else [middle, corner]  # of even and odd columns
-        lower = [-point.conjugate() for point in own]
-        if row:  # where this row has middles the last one has corners
-            turn = (points[row, 1] - points[row, 0]) / (lower[1] - lower[0])
-            place = points[row, 0] - turn * lower[0]
-        else:
-            points[0] = [place + turn * point for point in lower]
-        points[row + 1] = [place + turn * point for point in own]
-        centers[row] = place
-    return _planes(points), _planes(centers)
-
-
-def _planes(points: NDArray) -> NDArray[np.float64]:
-    return np.stack([points.real, points.imag], axis=-1)
+def _rolled(z: float, h: float, w: float) -> tuple[float, float, float]:
+    """Angle (rad) of half a base, radius of the grid points, depth (m) of centers inside it."""
+    k = w * w - (h - z) ** 2
+    half = z * math.sqrt((h - z) / ((h + z) * k))
+    if half == 0.0:
+        return 0.0, math.inf, 0.0
+    return 2.0 * math.asin(half), math.sqrt(k) / (2.0 * half), math.sqrt(h * h - z * z)
