@@ -23,6 +23,7 @@ BY_DIHEDRAL = {
     "curved_pleat": ({"pleats": 6}, (180, 130, 90)),
     "miura_tube": ({"cells": 3}, (30, 90, 140)),
     "zipper_tubes": ({"cells": 3}, (50, 90, 130)),
+    "resch": ({"cells": (4, 3)}, (180, 90, 0)),
     "square_twist": ({}, (180, 100, 30)),
 }
 """Arguments of each generator, and dihedrals (degrees) at which it is drawn."""
@@ -32,17 +33,16 @@ OTHERS = {
         "twist=20, alternating=True": P.kresling(twist=20, storeys=4, alternating=True),
         "sides=8, twist=-180/8": P.kresling(8, height=0.6, twist=-22.5, storeys=4),
     },
-    "resch": {"flat": P.resch(), "folded=True, from below": P.resch(folded=True)},
     "flasher": {"flat": P.flasher(), "folded=True": P.flasher(folded=True)},
 }
 """States that are not told by a dihedral, by caption."""
 VIEWS = {
-    "resch": (-50.0, -60.0),
-    "flasher": (38.0, -50.0),
-    "square_twist": (50.0, -65.0),
-    "yoshimura": (28.0, -58.0),
+    "flasher": [None, (38.0, -50.0)],
+    "resch": [None, (30.0, -70.0), (-40.0, -75.0)],
+    "square_twist": [None, (50.0, -65.0), (50.0, -65.0)],
+    "yoshimura": [None, (28.0, -58.0), (28.0, -58.0)],
 }
-"""Elevation and azimuth (degrees) of folded states, if not the usual ones."""
+"""Elevation and azimuth (degrees) of states, if not the usual ones."""
 
 
 def compute() -> tuple[dict, dict]:
@@ -74,9 +74,7 @@ def draw(results: dict, folder: Path) -> None:
     """One picture for each generator."""
     for name, states in results.items():
         patterns = list(states.values())
-        folded = [np.ptp(pattern.vertices[:, 2]) > 0 for pattern in patterns]
-        views = [VIEWS.get(name) if up else None for up in folded]
-        figure = fd.plots.draw_patterns(patterns, list(states), views)
+        figure = fd.plots.draw_patterns(patterns, list(states), VIEWS.get(name, ()))
         figure.savefig(folder / f"pattern-{name.replace('_', '-')}.png", dpi=90)
 
 

@@ -18,10 +18,11 @@ FOLDING = {
     "waterbomb": (100.0, 120.0, 150.0, 179.9),
     "yoshimura": (154.0, 160.0, 175.0, 179.9),
     "curved_pleat": (85.0, 110.0, 150.0, 179.0),
+    "resch": (3.0, 60.0, 120.0, 179.0),
     "square_twist": (2.0, 60.0, 100.0, 179.0),
 }
 """Dihedrals (degrees) of generators that are flat at 180."""
-WRAPPED = ("resch", "flasher")
+WRAPPED = ("flasher",)
 """Those with a flat and a folded state and nothing between."""
 NEVER_FLAT = ("eggbox", "kresling", "miura_tube", "zipper_tubes")
 OTHER = {

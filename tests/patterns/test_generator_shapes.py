@@ -169,15 +169,35 @@ def test_layers_of_a_flasher_stand_on_its_hub():
 
 
 def test_tiles_of_resch_close_up():
-    flat, folded = fd.patterns.resch((3, 2), 0.5), fd.patterns.resch((3, 2), 0.5, folded=True)
+    flat = fd.patterns.resch((3, 2), 0.5, 180)
+    closed = fd.patterns.resch((3, 2), 0.5, 0)
+    np.testing.assert_allclose(spans(closed), spans(flat), atol=1e-15)
     tiles = [f for f in range(len(flat.faces)) if flat.face_areas[f] > 0.3 * 0.5**2]
     assert len(tiles) == 2 * 6
     np.testing.assert_allclose(flat.face_areas[tiles], np.sqrt(3) / 4 * 0.5**2)
-    assert not folded.vertices[np.unique([folded.faces[f] for f in tiles]), 2].any()
-    np.testing.assert_allclose(folded.face_normals[tiles], [[0, 0, 1]] * len(tiles), atol=1e-15)
-    # stars hang upright below; a star and two tiles cover 6 small triangles flat, 2 folded
+    corners = np.unique([closed.faces[f] for f in tiles])
+    assert np.ptp(closed.vertices[corners, 2]) == 0.0
+    np.testing.assert_allclose(closed.face_normals[tiles], [[0, 0, 1]] * len(tiles), atol=1e-15)
+    # stars hang upright below
     others = np.setdiff1d(np.arange(len(flat.faces)), tiles)
-    assert np.abs(folded.face_normals[others, 2]).max() < 1e-14
+    assert np.abs(closed.face_normals[others, 2]).max() < 1e-14
+    np.testing.assert_allclose(np.pi - closed.dihedrals, flat.fold_angles, atol=1e-12)
+    # and the states before the last come to it
+    nearly = fd.patterns.resch((3, 2), 0.5, 0.01)
+    np.testing.assert_allclose(nearly.vertices, closed.vertices, atol=2e-3)
+
+
+def test_columns_of_resch_turn_alike_about_one_axis():
+    folded = fd.patterns.resch((4, 2), 1.0, 100)
+    star = folded.creases[folded.families["star"]]
+    centers = np.flatnonzero(np.bincount(star.ravel()) == 3)
+    assert len(centers) == 8
+    x, _, z = folded.vertices[centers].T
+    fit = np.linalg.lstsq(np.column_stack([x, z, np.ones(len(x))]), x**2 + z**2, rcond=None)[0]
+    assert np.ptp(np.hypot(x - fit[0] / 2, z - fit[1] / 2)) < 1e-12
+
+
+# ------------------------------------------------------------------------------ arguments
 
 
 @pytest.mark.parametrize(
@@ -201,7 +221,9 @@ def test_tiles_of_resch_close_up():
         (lambda p: p.zipper_tubes(b=2.5), "b = 2.5: walls .* do not overlap.*below 2 m"),
         (lambda p: p.square_twist(symmetric=True), "square_twist: dihedral = 100: a symmetric"),
         (lambda p: p.square_twist(symmetric=1), "square_twist: symmetric = 1: must be T"),
-        (lambda p: p.resch(folded="yes"), 'resch: folded = "yes": must be True or False'),
+        (lambda p: p.flasher(folded="yes"), 'flasher: folded = "yes": must be True or False'),
+        (lambda p: p.resch((10, 1)), r"resch: cells\[0\] = 10: .* columns of stars"),
+        (lambda p: p.resch(dihedral=-1), "resch: dihedral = -1: must be between 0 and 180"),
         (lambda p: p.resch((0, 1)), r"resch: cells\[0\] = 0"),
         (lambda p: p.flasher(sides=2), "flasher: sides = 2: must be a whole number, at least 3"),
         (lambda p: p.flasher(a="1"), 'flasher: a = "1"'),

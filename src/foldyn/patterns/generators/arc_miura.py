@@ -104,4 +104,5 @@ def arc_miura(
     i, _ = indices(2 * nx, 2 * ny)
     place = corner + np.where(i % 2, shift, 0.0)
     letters = miura_letters(2 * nx, 2 * ny) if flat else None
-    return sheet("arc miura", [s * i, place.real, place.imag], ("zigzag", "straight"), letters)
+    places = [s * i, np.real(place), np.imag(place)]
+    return sheet("arc miura", places, ("zigzag", "straight"), letters)
