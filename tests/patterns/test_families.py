@@ -116,6 +116,46 @@ steps = 1
         fd.read_case(path).case()
 
 
+INLINE = """
+[pattern]
+vertices = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
+faces = [[0, 1, 4, 3], [1, 2, 5, 4]]
+assignments = ["V"]
+families = { spine = [[1, 4]] }
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 2.0
+[[loads]]
+creases = "spine"
+fold_angle = 30
+[analysis]
+kind = "statics"
+inertia_relief = true
+steps = 2
+"""
+
+
+def test_families_of_a_pattern_in_a_case_file(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(INLINE)
+    case_file = fd.read_case(path)
+    assert case_file.pattern.families["spine"].tolist() == [0]
+    found = case_file.run()
+    structure = fd.discretize(case_file.pattern, case_file.sheet)
+    folds, _ = structure.dihedrals(found.displacement.values[-1])
+    assert np.degrees(folds) == pytest.approx([150])
+    for old, new, message in (
+        ("[[1, 4]]", "[[0, 4]]", r"families\['spine'\]: \(0, 4\) is not a crease"),
+        ("spine = [[", "valley = [[", "families: 'valley' is no name for a family"),
+        ("{ spine = [[1, 4]] }", "[1]", r"families = \[1\]: give a mapping"),
+    ):
+        path.write_text(INLINE.replace(old, new))
+        with pytest.raises(InputError, match=message):
+            fd.read_case(path).case()
+
+
 def test_words_of_a_pattern():
     assert crease_rows("creases", "all", MIURA).tolist() == list(range(len(LETTERS)))
     np.testing.assert_array_equal(crease_rows("c", "valley", MIURA), np.flatnonzero(LETTERS == "V"))

@@ -100,7 +100,7 @@ def _pattern(value: Any) -> dict[str, Any]:
         if not isinstance(value["file"], str) or not value["file"]:
             raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
     else:
-        check_keys(value, ["vertices", "faces", "assignments", HINGES])
+        check_keys(value, ["vertices", "faces", "assignments", "families", HINGES])
         if "faces" not in value:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
