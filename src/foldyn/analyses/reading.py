@@ -237,7 +237,12 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         with within(f'pattern.file = "{table["file"]}": '):
             return read_pattern(folder / table["file"])
     with within("pattern: "):
-        return Pattern(table["vertices"], table["faces"], table.get("assignments"))
+        return Pattern(
+            table["vertices"],
+            table["faces"],
+            table.get("assignments"),
+            families=table.get("families"),
+        )
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

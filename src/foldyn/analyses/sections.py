@@ -100,17 +100,19 @@ def _pattern(value: Any) -> dict[str, Any]:
         if not isinstance(value["file"], str) or not value["file"]:
             raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
     else:
-        check_keys(value, ["vertices", "faces", "assignments", HINGES])
+        check_keys(value, ["vertices", "faces", "assignments", "families", HINGES])
         if "faces" not in value:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
     if HINGES in value and value[HINGES] != FACES:
         if isinstance(value[HINGES], str):
             raise InputError(
-                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one or one per crease',
+                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one, one per crease '
+                "or by name",
                 f".{HINGES}",
             )
-        number_or_list(f".{HINGES}", value[HINGES], "crease")
+        if not isinstance(value[HINGES], Mapping):
+            number_or_list(f".{HINGES}", value[HINGES], "crease")
     return dict(value)
 
 
@@ -187,7 +189,7 @@ def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
 
 
 def _per_crease(value: Any) -> Any:
-    """Accept a number for all creases, one for each, or a table by assignment."""
+    """Accept a number for all creases, one for each, or a table by name."""
     return per_crease(
         "", value if isinstance(value, Mapping) else number_or_list("", value, "crease")
     )
