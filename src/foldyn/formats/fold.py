@@ -7,6 +7,7 @@ what other programs have put in (keys with a colon).
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -16,8 +17,13 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
+from foldyn.formats.frames import Frame, fold_angles
 from foldyn.formats.units import METERS
+from foldyn.formats.writers import is_plane, warn_of_boards
 from foldyn.input_files import from_json
+from foldyn.patterns import Pattern
+from foldyn.patterns.geometry import seams
+from foldyn.patterns.topology import edge_lookup
 from foldyn.values import choice, show
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
@@ -67,10 +73,10 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
         repairs.append(f"frame_unit = {show(unit)} is unknown, and left out")
         unit = "unit"
     title = fields.get("frame_title") or document.get("file_title") or ""
+    places = tuple(f"edges_vertices[{e}]" for e in range(len(letters)))
     return Drawing(
-        vertices, edges, letters, angles, faces, METERS.get(unit), str(title),
-        tuple(f"edges_vertices[{e}]" for e in range(len(letters))) if faces is None else (),
-        tuple(repairs), custom,
+        vertices, edges, letters, angles, faces, METERS.get(unit), name=str(title),
+        places=places if faces is None else (), repairs=tuple(repairs), custom=custom,
     )  # fmt: skip
 
 
@@ -263,3 +269,87 @@ def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     keys = [key for key in fields if ":" in key]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
     return {key: fields[key] for key in keys if key not in dropped}, dropped
+
+
+def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
+    """Text of a FOLD file (1.2); reading it gives the same pattern to the last digit.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        What to write: the key frame. Its fold angles are those to fold to, where they are given,
+        or else those at which a folded pattern is; a flat one without angles has none.
+    frames : sequence of Frame, optional
+        Further states, which inherit all but coordinates and fold angles from the key frame.
+
+    Returns
+    -------
+    str
+        JSON with vertices (two coordinates when all z are 0), faces, edges, their assignment
+        and fold angle (degrees, valleys positive; 0 on the boundary), in meters.
+    """
+    warn_of_boards(pattern)
+    flat = is_plane(pattern)
+    folded = not flat or bool(np.any(np.abs(pattern.flat_dihedrals - pattern.dihedrals) > 1e-6))
+    row = edge_lookup(pattern.creases)
+    pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
+    cuts = {edge for pair in pairs for edge in pair}
+    edges = [(a, b) for a, b in pattern.edges.tolist()]
+    rows = [row.get(edge) for edge in edges]
+    wanted = pattern.fold_angles
+    angles = fold_angles(pattern) if np.isnan(wanted).all() and folded else wanted
+    fields: dict[str, Any] = {
+        "file_spec": 1.2,
+        "file_creator": "Foldyn",
+        "file_classes": ["animation" if frames else "singleModel"],
+        **({"frame_title": pattern.name} if pattern.name else {}),
+        "frame_classes": ["foldedForm" if folded else "creasePattern"],
+        "frame_attributes": ["2D" if flat else "3D"],
+        "frame_unit": "m",
+        "vertices_coords": pattern.vertices[:, : 2 if flat else 3].tolist(),
+        "faces_vertices": [list(face) for face in pattern.faces],
+        "edges_vertices": pattern.edges.tolist(),
+        "edges_assignment": [
+            pattern.assignments[k] if k is not None else "C" if edge in cuts else "B"
+            for k, edge in zip(rows, edges, strict=True)
+        ],
+        **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
+        **({FAMILIES: _named(pattern)} if pattern.families else {}),
+        **pattern.custom,
+    }
+    lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in fields.items()]
+    if frames:
+        inside = ",\n".join(f"    {json.dumps(_state(pattern, f, rows))}" for f in frames)
+        lines.append(f'  "file_frames": [\n{inside}\n  ]')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _state(pattern: Pattern, frame: Frame, rows: Sequence[int | None]) -> dict[str, Any]:
+    """Fields of a frame that inherits the rest from the key frame."""
+    return {
+        "frame_title": frame.title,
+        "frame_classes": ["foldedForm"],
+        "frame_attributes": ["3D"],
+        "frame_parent": 0,
+        "frame_inherit": True,
+        "vertices_coords": frame.vertices.tolist(),
+        "edges_foldAngle": _degrees(fold_angles(pattern, frame.vertices), rows),
+    }
+
+
+def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
+    """Angles of all edges, given those of the creases; 0 on the boundary, None where unknown."""
+    found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
+    return [None if np.isnan(angle) else angle for angle in found]
+
+
+def _named(pattern: Pattern) -> dict[str, list[list[int]]]:
+    """Vertex pairs of the creases of each family."""
+    return {name: pattern.creases[rows].tolist() for name, rows in pattern.families.items()}
+
+
+def _json(value: Any) -> str:
+    """JSON with one line for each row of a table."""
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n" + ",\n".join(f"    {json.dumps(row)}" for row in value) + "\n  ]"
+    return json.dumps(value)
