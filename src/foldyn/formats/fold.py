@@ -19,10 +19,9 @@ from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.frames import Frame, fold_angles
 from foldyn.formats.units import METERS
-from foldyn.formats.writers import is_plane, warn_of_boards
+from foldyn.formats.writers import is_plane, letters, warn_of_boards
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
-from foldyn.patterns.geometry import seams
 from foldyn.patterns.topology import edge_lookup
 from foldyn.values import choice, show
 
@@ -64,7 +63,7 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
             raise InputError(f"{field} is missing: {_with_field(document, field, what)}.")
     vertices = _vertices(_list(fields, "vertices_coords"))
     faces = _faces(fields, len(vertices))
-    edges, letters, angles = _edges(fields, len(vertices), faces is not None)
+    edges, assignments, angles = _edges(fields, len(vertices), faces is not None)
     custom, dropped = _custom(fields)
     if dropped:
         repairs.append(f"{', '.join(dropped)} left out: they list elements by number")
@@ -73,9 +72,9 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
         repairs.append(f"frame_unit = {show(unit)} is unknown, and left out")
         unit = "unit"
     title = fields.get("frame_title") or document.get("file_title") or ""
-    places = tuple(f"edges_vertices[{e}]" for e in range(len(letters)))
+    places = tuple(f"edges_vertices[{e}]" for e in range(len(assignments)))
     return Drawing(
-        vertices, edges, letters, angles, faces, METERS.get(unit), name=str(title),
+        vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
         places=places if faces is None else (), repairs=tuple(repairs), custom=custom,
     )  # fmt: skip
 
@@ -222,7 +221,7 @@ def _edges(
             )
     given_letters = fields.get("edges_assignment", [None] * len(edges))
     given_angles = fields.get("edges_foldAngle", [None] * len(edges))
-    pairs, letters, angles = [], [], []
+    pairs, assignments, angles = [], [], []
     for e, edge in enumerate(edges):
         pair, angle = _pair(e, edge, count), _angle(e, given_angles[e])
         letter = given_letters[e]
@@ -234,9 +233,9 @@ def _edges(
             letter = "U"
         if letter is not None:
             pairs.append(pair)
-            letters.append(letter)
+            assignments.append(letter)
             angles.append(angle)
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(letters), np.array(angles)
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(assignments), np.array(angles)
 
 
 def _pair(e: int, edge: Any, count: int) -> tuple[int, int]:
@@ -292,10 +291,8 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
     flat = is_plane(pattern)
     folded = not flat or bool(np.any(np.abs(pattern.flat_dihedrals - pattern.dihedrals) > 1e-6))
     row = edge_lookup(pattern.creases)
-    pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
-    cuts = {edge for pair in pairs for edge in pair}
-    edges = [(a, b) for a, b in pattern.edges.tolist()]
-    rows = [row.get(edge) for edge in edges]
+    edges = letters(pattern)
+    rows = [row.get(edge) for edge, *_ in edges]
     wanted = pattern.fold_angles
     angles = fold_angles(pattern) if np.isnan(wanted).all() and folded else wanted
     fields: dict[str, Any] = {
@@ -309,10 +306,7 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
         "vertices_coords": pattern.vertices[:, : 2 if flat else 3].tolist(),
         "faces_vertices": [list(face) for face in pattern.faces],
         "edges_vertices": pattern.edges.tolist(),
-        "edges_assignment": [
-            pattern.assignments[k] if k is not None else "C" if edge in cuts else "B"
-            for k, edge in zip(rows, edges, strict=True)
-        ],
+        "edges_assignment": [letter for _, letter, _ in edges],
         **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
         **({FAMILIES: _named(pattern)} if pattern.families else {}),
         **pattern.custom,

@@ -11,6 +11,7 @@ called: "mountain", "valley", "boundary", "facet", "cut".
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +20,8 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.units import METERS
-from foldyn.formats.writers import warn_of_boards
+from foldyn.formats.writers import letters, warn_of_boards
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import edge_lookup
 from foldyn.values import show
 
 FREEFORM = ("B", "F", "V", "M", "U")
@@ -78,11 +78,7 @@ def read(text: str) -> Drawing:
             creases.append(_crease(rest, known, place, ORIPA if oripa else FREEFORM))
         elif word == "l":
             chain = _corners(rest, known, place)
-            lines += [
-                _Crease((a, b), letter, np.nan, place)
-                for a, b in zip(chain, chain[1:], strict=False)
-                if a != b
-            ]
+            lines += [_Crease((a, b), letter, np.nan, place) for a, b in pairwise(chain) if a != b]
         elif word in ("g", "o", "usemtl"):
             letter = _letter_of(" ".join(rest)) or letter
             name = " ".join(rest) if word == "o" and not name else name
@@ -169,8 +165,11 @@ def _crease(
     if a == b:
         raise InputError(f": #e joins vertex {words[0]} with itself", place)
     kind = words[2] if len(words) > 2 else "4"
-    letters = {**{str(k): letter for k, letter in enumerate(kinds)}, **{k: k for k in "BMVFUCJ"}}
-    if kind not in letters:
+    known_kinds = {
+        **{str(k): letter for k, letter in enumerate(kinds)},
+        **{k: k for k in "BMVFUCJ"},
+    }
+    if kind not in known_kinds:
         raise InputError(f": {show(kind)} is no kind of edge: give 0 to {len(kinds) - 1}", place)
     try:
         angle = float(words[3]) if len(words) > 3 else np.nan
@@ -178,8 +177,8 @@ def _crease(
         angle = np.inf
     if not np.isnan(angle) and abs(angle) > 180.0 + 1e-9:
         raise InputError(f": {show(words[3])}: give an angle from -180 to 180 degrees", place)
-    angle = -abs(angle) if letters[kind] == "M" else angle  # some write its size alone
-    return _Crease((a, b), letters[kind], float(np.clip(angle, -180.0, 180.0)), place)
+    angle = -abs(angle) if known_kinds[kind] == "M" else angle  # some write its size alone
+    return _Crease((a, b), known_kinds[kind], float(np.clip(angle, -180.0, 180.0)), place)
 
 
 def _angles(creases: list[_Crease]) -> NDArray[np.float64]:
@@ -225,16 +224,14 @@ def write(pattern: Pattern) -> str:
     str
     """
     warn_of_boards(pattern)
-    row = edge_lookup(pattern.creases)
     lines = ["# Foldyn", "# unit: m", "# edges: #e vertex vertex kind angle; kinds: "
              "0 boundary, 1 flat, 2 valley, 3 mountain, 4 unassigned"]  # fmt: skip
     if pattern.name:
         lines.append(f"o {' '.join(pattern.name.split())}")
     lines += ["v " + " ".join(map(repr, point)) for point in pattern.vertices.tolist()]
     lines += ["f " + " ".join(str(v + 1) for v in face) for face in pattern.faces]
-    for a, b in pattern.edges.tolist():
-        k = row.get((a, b))
-        kind = 0 if k is None else FREEFORM.index(pattern.assignments[k])
-        angle = np.nan if k is None else float(np.degrees(pattern.fold_angles[k]))
-        lines.append(f"#e {a + 1} {b + 1} {kind}" + ("" if np.isnan(angle) else f" {angle!r}"))
+    for (a, b), letter, angle in letters(pattern):
+        kind = FREEFORM.index("B" if letter == "C" else letter)
+        told = "" if np.isnan(angle) else f" {float(np.degrees(angle))!r}"
+        lines.append(f"#e {a + 1} {b + 1} {kind}{told}")
     return "\n".join(lines) + "\n"

@@ -68,3 +68,14 @@ def warn_of_boards(pattern: Pattern) -> None:
             FoldynWarning,
             stacklevel=5,
         )
+
+
+def warn_of_angles(pattern: Pattern, kind: str) -> None:
+    """Say that a file has no place for the angles to fold to."""
+    if not np.isnan(pattern.fold_angles).all():
+        warnings.warn(
+            f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "
+            "to keep them",
+            FoldynWarning,
+            stacklevel=5,
+        )
