@@ -54,21 +54,23 @@ def write(pattern: Pattern) -> str:
     """
     warn_of_boards(pattern)
     points = PER_METER * flat_points(pattern, "SVG")
-    low, high = points.min(axis=0), points.max(axis=0)
-    points = np.stack([points[:, 0] - low[0], high[1] - points[:, 1]], axis=1)
-    width, height = (high - low).tolist()
+    points = np.stack([points[:, 0], 0.0 - points[:, 1]], axis=1)
+    left, top = points.min(axis=0).tolist()
+    width, height = np.ptp(points, axis=0).tolist()
     size = max(width, height)
+    margin, pen = 0.03 * size, size / 500.0
+    page = width + 2.0 * margin
+    type_size = min(0.03 * size, page / 35.0)  # the longest line of the legend has 33 em
     edges = letters(pattern)
-    margin, pen, type_size = 0.03 * size, size / 500.0, 0.03 * size
     words = _legend(pattern, edges)
     line_height = 1.4 * type_size
-    total = (width + 2.0 * margin, height + 2.0 * margin + (len(words) + 0.5) * line_height)
+    total = height + 2.0 * margin + (len(words) + 0.5) * line_height
     # boundary last, over the ends of the creases
     edges.sort(key=lambda edge: "FUVMCB".index(edge[1]))
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{total[0]!r}mm" height="{total[1]!r}mm" '
-        f'viewBox="{-margin!r} {-margin!r} {total[0]!r} {total[1]!r}">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{page!r}mm" height="{total!r}mm" '
+        f'viewBox="{left - margin!r} {top - margin!r} {page!r} {total!r}">',
         *([f"<title>{escape(pattern.name)}</title>"] if pattern.name else []),
         f'<g id="creases" fill="none" stroke-width="{pen:.4g}" stroke-linecap="round">',
     ]
@@ -81,8 +83,8 @@ def write(pattern: Pattern) -> str:
         )
     lines += ["</g>", f'<g id="legend" font-family="sans-serif" font-size="{type_size:.4g}">']
     for k, text in enumerate(words):
-        y = height + margin + (k + 1) * line_height
-        lines.append(f'<text x="0" y="{y:.6g}">{text}</text>')
+        y = top + height + margin + (k + 1) * line_height
+        lines.append(f'<text x="{left:.6g}" y="{y:.6g}">{text}</text>')
     return "\n".join([*lines, "</g>", "</svg>"]) + "\n"
 
 
