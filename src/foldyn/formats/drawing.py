@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +39,8 @@ class Drawing:
         says it.
     repairs, assumptions, doubts : tuple of str
         What the reader put right, took for granted, and is not sure of, in words.
+    families : mapping
+        Names for groups of lines, each with pairs of vertex numbers.
     custom : mapping
         Further data, kept.
     """
@@ -56,4 +58,5 @@ class Drawing:
     repairs: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    families: Mapping[str, Sequence[tuple[int, int]]] = field(default_factory=dict)
     custom: Mapping[str, Any] = field(default_factory=dict)

@@ -14,6 +14,7 @@ from foldyn.formats import cp_writer, dxf_writer, fold, obj, stl, svg_writer
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.frames import Frame
+from foldyn.formats.kept import with_families, without_repetition
 from foldyn.formats.units import METERS
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
@@ -105,9 +106,8 @@ def read_pattern(
     """
     pattern, diagnosis = diagnose(path, scale, unit, frame)
     size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
-    remedy = 'if it is not, give unit = "mm" (or another) or scale'
     for told in (
-        diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}: it is {size} m; {remedy}",
+        diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",
         diagnosis.repairs and f"repaired: {'; '.join(diagnosis.repairs)}",
         *diagnosis.doubts,
     ):
@@ -144,7 +144,9 @@ def diagnose(
         raise InputError(f": {fmt.name} files have no frames; leave it out", "frame", file)
     text = read_text(file, f"a {fmt.name} file", MOST, "leave out all but the pattern")
     with within("", file):
-        return built(fmt.read(text, *((frame,) if fmt.frames else ())), meters=meters, scale=factor)
+        drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
+        made = built(drawing, meters=meters, scale=factor)
+        return with_families(without_repetition(made), drawing)
 
 
 def write_pattern(

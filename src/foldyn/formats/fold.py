@@ -75,7 +75,8 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
     places = tuple(f"edges_vertices[{e}]" for e in range(len(assignments)))
     return Drawing(
         vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
-        places=places if faces is None else (), repairs=tuple(repairs), custom=custom,
+        places=places, repairs=tuple(repairs),
+        families=_families(fields.get(FAMILIES, {}), len(vertices)), custom=custom,
     )  # fmt: skip
 
 
@@ -223,7 +224,7 @@ def _edges(
     given_angles = fields.get("edges_foldAngle", [None] * len(edges))
     pairs, assignments, angles = [], [], []
     for e, edge in enumerate(edges):
-        pair, angle = _pair(e, edge, count), _angle(e, given_angles[e])
+        pair, angle = _pair(f"edges_vertices[{e}]", edge, count), _angle(e, given_angles[e])
         letter = given_letters[e]
         if "edges_assignment" in fields:
             letter = _letter(e, letter)
@@ -238,12 +239,11 @@ def _edges(
     return np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(assignments), np.array(angles)
 
 
-def _pair(e: int, edge: Any, count: int) -> tuple[int, int]:
+def _pair(field: str, edge: Any, count: int) -> tuple[int, int]:
     pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
     if not pair or not all(type(v) is int and 0 <= v < count for v in edge):
         raise InputError(
-            f"edges_vertices[{e}] = {show(edge)}: give two different vertex numbers from 0 to "
-            f"{count - 1}."
+            f"{field} = {show(edge)}: give two different vertex numbers from 0 to {count - 1}."
         )
     return edge[0], edge[1]
 
@@ -265,9 +265,19 @@ def _angle(e: int, angle: Any) -> float:
 
 def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Data of other programs, and the keys of those that would not fit a repaired pattern."""
-    keys = [key for key in fields if ":" in key]
+    keys = [key for key in fields if ":" in key and key != FAMILIES]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
     return {key: fields[key] for key in keys if key not in dropped}, dropped
+
+
+def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
+    """Vertex pairs of the creases of each family."""
+    if not isinstance(given, dict) or not all(isinstance(pairs, list) for pairs in given.values()):
+        raise InputError(f"{FAMILIES}: give a list of vertex pairs for each name.")
+    return {
+        name: [_pair(f"{FAMILIES}[{show(name)}][{k}]", pair, count) for k, pair in enumerate(pairs)]
+        for name, pairs in given.items()
+    }
 
 
 def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
