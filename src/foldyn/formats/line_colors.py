@@ -7,6 +7,9 @@ computation, Origami 7 (2018), and the notes on SVG of origamisimulator.org.
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Mapping
+
+from foldyn.formats.notes import count
 
 RGB = tuple[int, int, int]
 
@@ -30,6 +33,7 @@ _HUES = (  # degrees up to which a hue is taken for a color
 )
 _GRAY = 0.15  # range of the components below which a color has no hue
 _DARK, _WHITE = 0.4, 0.95
+_MOST_COLORS = 10  # told one by one
 
 
 def nearest(rgb: RGB) -> RGB | None:
@@ -45,3 +49,17 @@ def nearest(rgb: RGB) -> RGB | None:
         return (0, 0, 0) if gray < _DARK else (255, 255, 0) if gray < _WHITE else None
     hue = 360 * colorsys.rgb_to_hsv(red, green, blue)[0]
     return next(color for most, color in _HUES if hue <= most)
+
+
+def color_doubts(taken: Mapping[tuple[RGB, RGB | None], int]) -> list[str]:
+    """Sentences about colors not of `COLORS`, from how many lines each was taken for what."""
+    doubts = []
+    for (color, to), number in taken.items():
+        if color != to:
+            name = "white, not drawn" if to is None else COLORS[to][1]
+            doubts.append(
+                f"color #{color[0]:02x}{color[1]:02x}{color[2]:02x} of {count(number, 'line')} is "
+                f"taken for {name}"
+            )
+    left = len(doubts) - _MOST_COLORS
+    return [*doubts[:_MOST_COLORS], f"{left} more colors"] if left > 0 else doubts

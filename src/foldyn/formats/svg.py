@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.formats.curves import CHORD
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.line_colors import COLORS, RGB, nearest
+from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.notes import count
 from foldyn.formats.planar import MOST_LINES, too_many
 from foldyn.formats.svg_shapes import (
@@ -38,7 +38,6 @@ from foldyn.values import LONGEST
 
 _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
-_MOST_COLORS = 10  # told one by one
 _STATED = ("mm", "cm", "in", "pt", "pc")
 
 
@@ -125,12 +124,12 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     if depth > DEEPEST:
         raise InputError(f": elements are used within each other more than {DEEPEST} deep", "use")
     name = local(element)
-    if name in _NOT_DRAWN:
-        lines.counts[name] += 1
-    if name not in (*_GROUPS, *SHAPES, "use") or (name in _NOT_DRAWN):
+    identity = element.get("id", "")[:40]
+    if identity == "legend" or name not in (*_GROUPS, *SHAPES, *_NOT_DRAWN, "use"):
         return
     lines.counts[name] += 1
-    identity = element.get("id", "")[:40]
+    if name in _NOT_DRAWN:
+        return
     place = f'{name} "{identity}"' if identity else f"{name} {lines.counts[name]}"
     style = styled(element, lines.rules, inherited, place)
     if style is None:
@@ -215,9 +214,9 @@ def _drawing(lines: _Lines, frame: _Frame, doubts: list[str], title: str) -> Dra
         unit="px" if frame.pixels == 1.0 else "unit",
         name=title,
         places=tuple(places),
-        repairs=tuple(repairs if curved else ()),
+        repairs=(*repairs[:curved], *_skipped(lines.counts)),
         assumptions=said,
-        doubts=(*doubts, *_color_doubts(taken), *_skipped(lines.counts)),
+        doubts=(*doubts, *color_doubts(taken)),
     )
 
 
@@ -241,19 +240,6 @@ def _fold_angles(letters: NDArray, opacities: NDArray) -> tuple[NDArray, tuple[s
     return np.where(letters == "M", -angles, angles), (
         "opacities are fold angles over 180 degrees",
     )
-
-
-def _color_doubts(taken: Counter[tuple[RGB, RGB | None]]) -> list[str]:
-    doubts = []
-    for (color, to), number in taken.items():
-        if color != to:
-            name = "white, not drawn" if to is None else COLORS[to][1]
-            doubts.append(
-                f"color #{color[0]:02x}{color[1]:02x}{color[2]:02x} of {count(number, 'line')} is "
-                f"taken for {name}"
-            )
-    left = len(doubts) - _MOST_COLORS
-    return [*doubts[:_MOST_COLORS], f"{left} more colors"] if left > 0 else doubts
 
 
 def _skipped(counts: Counter[str]) -> list[str]:
