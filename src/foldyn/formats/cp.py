@@ -1,8 +1,8 @@
 """CP, the crease patterns of ORIPA, Oriedita and Orihime: a line of text for each line.
 
 Each has five numbers, ``type x1 y1 x2 y2``: type 1 the outline or a cut, 2 a mountain, 3 a valley,
-4 (and 0) an auxiliary line, which is flat. Coordinates are taken as they are; the paper of these
-programs is 400 units wide, taken as millimeters.
+4 (and 0) an auxiliary line, which is flat. y points down, as on the screen of these programs
+(Oriedita's DxfExporter.java turns it over); their paper is 400 units wide, taken as millimeters.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def read(text: str) -> Drawing:
     Returns
     -------
     Drawing
-        In the file's unit.
+        In the file's unit, with y up.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def read(text: str) -> Drawing:
         if not all(map(math.isfinite, (x1, y1, x2, y2))):
             raise InputError(f" = {show(line)}: coordinates must be finite numbers", place)
         letters.append(LETTERS[words[0]])
-        points += [(x1, y1), (x2, y2)]
+        points += [(x1, -y1), (x2, -y2)]
         places.append(place)
     if not letters:
         raise InputError(": there are none; give a file with a crease pattern", "lines")

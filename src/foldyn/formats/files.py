@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.formats import cp_writer, dxf_writer, fold, obj, stl, svg_writer
+from foldyn.formats import cp, cp_writer, dxf, dxf_writer, fold, obj, opx, stl, svg, svg_writer
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.frames import Frame
@@ -58,9 +58,10 @@ class Format:
 _FORMATS = (
     Format("FOLD", (".fold",), read=fold.read, write=fold.write, frames=True),
     Format("OBJ", (".obj",), read=obj.read, write=obj.write),
-    Format("SVG", (".svg",), write=svg_writer.write),
-    Format("CP", (".cp",), write=cp_writer.write),
-    Format("DXF", (".dxf",), write=dxf_writer.write),
+    Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
+    Format("CP", (".cp",), read=cp.read, write=cp_writer.write),
+    Format("OPX", (".opx",), read=opx.read),
+    Format("DXF", (".dxf",), read=dxf.read, write=dxf_writer.write),
     Format("STL", (".stl",), write=stl.write),
 )
 

@@ -167,11 +167,9 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
 
 def areas(panels: Panels) -> NDArray[np.float64]:
     """Area of each panel of a flat drawing."""
-    found = np.empty(len(panels.faces))
-    for number, face in enumerate(panels.faces):
-        x, y = (panels.points[list(face), :2] - panels.points[face[0], :2]).T
-        found[number] = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
-    return found
+    corners = panels.points[[point for face in panels.faces for point in face], :2]
+    number = np.repeat(np.arange(len(panels.faces)), [len(face) for face in panels.faces])
+    return shapely.area(shapely.polygons(shapely.linearrings(corners, indices=number)))
 
 
 def parts(panels: Panels) -> NDArray[np.int64]:

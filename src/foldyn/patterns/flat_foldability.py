@@ -108,16 +108,19 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
 
 def _corners(pattern: Pattern) -> dict[int, dict[int, tuple[int, float]]]:
     """For each vertex, by the vertex after it in a face: the vertex before it, and the angle."""
+    faces = pattern.faces
+    vertex = np.array([v for face in faces for v in face])
+    following = np.array([v for face in faces for v in (*face[1:], face[0])])
+    previous = np.array([v for face in faces for v in (face[-1], *face[:-1])])
+    normal = np.repeat(pattern.face_normals, [len(face) for face in faces], axis=0)
+    after = pattern.vertices[following] - pattern.vertices[vertex]
+    before = pattern.vertices[previous] - pattern.vertices[vertex]
+    sine = np.einsum("ij,ij->i", np.cross(after, before), normal)
+    angle = np.arctan2(sine, np.einsum("ij,ij->i", after, before)) % (2 * np.pi)
     corners: dict[int, dict[int, tuple[int, float]]] = {}
-    for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
-        points = pattern.vertices[list(face)]
-        after = np.roll(points, -1, axis=0) - points
-        before = np.roll(points, 1, axis=0) - points
-        sine = np.cross(after, before) @ normal
-        angles = np.arctan2(sine, np.einsum("ij,ij->i", after, before)) % (2 * np.pi)
-        names = zip(face, (*face[1:], face[0]), (face[-1], *face[:-1]), strict=True)
-        for (vertex, following, previous), angle in zip(names, angles.tolist(), strict=True):
-            corners.setdefault(vertex, {})[following] = (previous, angle)
+    rows = zip(vertex.tolist(), following.tolist(), previous.tolist(), angle.tolist(), strict=True)
+    for v, after_v, before_v, angle_v in rows:
+        corners.setdefault(v, {})[after_v] = (before_v, angle_v)
     return corners
 
 
