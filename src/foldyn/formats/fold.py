@@ -86,7 +86,7 @@ def _document(text: str) -> tuple[dict[str, Any], list[str]]:
     try:
         document = from_json(text)
     except InputError as error:
-        mended, count = _COMMA.subn(lambda found: found[1] or "", text), 0
+        mended = _COMMA.sub(lambda found: found[1] or "", text)
         count = len(text) - len(mended)
         try:
             document = from_json(mended if count else text)
@@ -141,7 +141,9 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
             return found[0]
         has = f"{len(found)} frames" if found else "no frame"
         known = ", ".join(show(title) for title in titles[:12] if title) or "none"
-        raise InputError(f"has {has} of the title {show(chosen)}: titles are {known}", "frame")
+        raise InputError(
+            f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
+        )
     if isinstance(chosen, bool) or not isinstance(chosen, int) or not 0 <= chosen < len(frames):
         raise InputError(
             f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
@@ -200,7 +202,7 @@ def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | 
                 f"faces_vertices[{f}] = {show(face)}: give vertex numbers from 0 to {count - 1}."
             )
         faces.append(tuple(face))
-    return tuple(faces)
+    return tuple(faces) or None  # some programs write an empty list
 
 
 def _edges(
