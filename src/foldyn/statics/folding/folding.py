@@ -47,6 +47,9 @@ class Folding:
         The folded state, free of stress: its shape is the shape at rest. Vertices, assignments,
         families, fold angles to reach and further data are those of the pattern that was folded.
         Panels that have bent are cut along their bends, which are flat creases ("F").
+    assignments : tuple of str
+        Letters of the creases that the path, the targets and the angles have, which are those of
+        the pattern that was folded.
     path : xarray.Dataset
         The states on the way, with dimensions step, node, axis and crease: `position` (m),
         `fold_angle` (rad, valleys positive), `strain` and `bend` (rad), the largest of a bar and of
@@ -70,6 +73,7 @@ class Folding:
     """
 
     pattern: Pattern
+    assignments: tuple[str, ...]
     path: xarray.Dataset
     targets: NDArray[np.float64]
     angles: NDArray[np.float64]
@@ -105,8 +109,7 @@ class Folding:
 
     @property
     def _turned(self) -> str:
-        letters = self.pattern.assignments
-        total = sum(letter in "MV" for letter in letters)
+        total = sum(letter in "MV" for letter in self.assignments)
         return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
 
     def report(self) -> str:
@@ -169,9 +172,10 @@ def fold(
         Fold angles (degrees, 0 flat, 180 closed). One number is the size for all mountains and
         valleys, each its own way. A mapping gives creases by assignment ("mountain", "valley",
         "all") or family, by size, and by pairs of vertices, valleys positive: {"zigzag": 90, (3,
-        4): -60}. A sequence has one for each crease, valleys positive. Creases that are left out,
-        or None, are free: mountains and valleys turn their way as far as the others make them, flat
-        ones belong to the panels.
+        4): -60}. A sequence has one for each crease, valleys positive. A pattern with the same
+        creases, such as another frame of a file, gives the angles of its state. Creases that are
+        left out, or None, are free: mountains and valleys turn their way as far as the others make
+        them, flat ones belong to the panels.
     fraction : float or str, optional
         Instead, 0.8 or "80%" of `pattern.fold_angles`, and of 180 degrees for mountains and valleys
         that have none. Without either the pattern is folded to its own fold angles.
@@ -304,6 +308,7 @@ def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) ->
     last = way.shapes[-1]
     return Folding(
         pattern=folded_pattern(pattern, energy, last, path["position"].values[-1]),
+        assignments=pattern.assignments,
         path=path,
         targets=targets,
         angles=energy.creases(last.turns).copy(),

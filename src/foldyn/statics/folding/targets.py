@@ -70,6 +70,14 @@ def fold_targets(pattern: Pattern, angles: Any, fraction: Any) -> NDArray[np.flo
 def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
     """Targets (nc,), rad, from angles in degrees."""
     count = len(pattern.creases)
+    if isinstance(angles, Pattern):
+        if not np.array_equal(angles.creases, pattern.creases):
+            raise InputError(
+                f": has other creases ({angles!r}) than the pattern to fold ({pattern!r}); give a "
+                "state of the same pattern",
+                "angles",
+            )
+        return angles.flat_dihedrals - angles.dihedrals
     if isinstance(angles, Mapping):
         if not angles:
             raise InputError(": is empty; name creases and their angles", "angles")
