@@ -25,6 +25,7 @@ from foldyn.statics.folding.ways import (
     Way,
     from_folded,
     from_pattern,
+    largest_strain,
     wrong_ways,
 )
 from foldyn.values import choice, whole
@@ -289,7 +290,7 @@ def _wrong(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
 
 
 def _strain(way: Way) -> float:
-    return float(np.abs(way.shapes[-1].strains).max(initial=0.0))
+    return largest_strain(way.shapes[-1])
 
 
 def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:

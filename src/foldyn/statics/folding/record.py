@@ -12,7 +12,7 @@ from foldyn import __version__
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.patterns import Pattern
 from foldyn.statics.folding.energy import FoldEnergy, Shape
-from foldyn.statics.folding.ways import PLANE, Way
+from foldyn.statics.folding.ways import PLANE, Way, largest_strain
 
 if TYPE_CHECKING:
     import xarray
@@ -28,7 +28,7 @@ def path_of(pattern: Pattern, energy: FoldEnergy, way: Way) -> xarray.Dataset:
     for shape in way.shapes:
         place = placed(energy.place(shape.x), place)
         positions.append(place)
-    strain = [np.abs(shape.strains).max(initial=0.0) for shape in way.shapes]
+    strain = [largest_strain(shape) for shape in way.shapes]
     bend = [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes]
     turns = [energy.creases(shape.turns) for shape in way.shapes]
     return xr.Dataset(
