@@ -8,10 +8,11 @@ fold angle of a hinge (pi less its dihedral) and all lengths in units of the mea
       + 1/2 s sum L (shortfall^2 + excess^2)                     mountains and valleys,
 
 where a mountain or valley falls short if it has turned its own way by less than a margin, and
-exceeds if it has turned by more than 180 degrees, so that its panels have passed each other. This
-is the energy of bars and hinges with linear laws; s is a law that pushes back from one side. It is
-a sum of squares, so that the Gauss-Newton matrix is positive semidefinite everywhere. The tangent
-stiffness is not: at the flat state it is singular in every direction that folds.
+exceeds if it has turned by more than is allowed, at most 180 degrees: beyond, its panels have
+passed each other. This is the energy of bars and hinges with linear laws; s is a law that pushes
+back from one side. It is a sum of squares, so that the Gauss-Newton matrix is positive semidefinite
+everywhere. The tangent stiffness is not: at the flat state it is singular in every direction that
+folds.
 """
 
 from __future__ import annotations
@@ -40,10 +41,11 @@ class Stiffness(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """What the creases are to do: rest angles (nc,), nan where free, and least turns (nc,), rad."""
+    """Rest angles (nc,) of creases, nan where free, and their least and most turns (nc,), rad."""
 
     angles: NDArray
-    margins: NDArray
+    least: NDArray
+    most: NDArray
 
 
 class Shape(NamedTuple):
@@ -134,7 +136,7 @@ class FoldEnergy:
         rest = self.rest.copy()
         rest[self.bends :][driven] = aim.angles[driven]
         own = self.signs * self.creases(turns)
-        beyond = np.minimum(own - aim.margins, 0.0) + np.maximum(own - math.pi, 0.0)
+        beyond = np.minimum(own - aim.least, 0.0) + np.maximum(own - aim.most, 0.0)
         beyond = np.where(self.signs != 0.0, beyond, 0.0)
         offset = turns - rest
         pull, slope = weight * offset, weight

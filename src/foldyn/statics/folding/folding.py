@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
 MOST_SHOWN = 8  # creases and pairs of panels that a text names
+SHUT = 1e-3  # rad from 180 degrees: a crease counts as closed
 CRUMPLED = 0.1  # strain beyond which a state is taken only where there is no other
 STARTS = ("auto", "pattern", "folded")
 
@@ -109,6 +110,11 @@ class Folding:
         return not (strained | (self.path["bend"].values > PLANE)).any()
 
     @property
+    def closed(self) -> NDArray[np.int64]:
+        """Creases (k,) that are closed, so that panels lie upon each other."""
+        return np.flatnonzero(np.abs(self.angles) > math.pi - SHUT)
+
+    @property
     def _turned(self) -> str:
         total = sum(letter in "MV" for letter in self.assignments)
         return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
@@ -137,6 +143,13 @@ class Folding:
             lines[-1] += " degrees"
         if self.started_from == "folded":
             lines.append("the path opens from the folded state, which rotations of the panels give")
+        if len(self.closed):
+            order = "in the order in which they have come"
+            if self.first_crossings:
+                order = "in an order that is not known, since panels cross"
+            lines.append(
+                f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
+            )
         if self.first_crossings:
             step, pairs = min(self.first_crossings.items())
             shown = _listed([f"{a} and {b}" for a, b in pairs.tolist()])

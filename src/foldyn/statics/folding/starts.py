@@ -35,15 +35,17 @@ def opened(energy: FoldEnergy, stiffness: Stiffness) -> Shape:
         return energy.start
     wish = np.where(energy.signs * turned < least, energy.signs * least, turned)
     wish = np.where(energy.signs == 0.0, np.nan, wish)
-    perturbed = minimum(energy, energy.start, Aim(wish, least), PERTURBED, iterations=3)
-    free = Aim(np.full(len(least), np.nan), least)
+    most = np.full(len(least), math.pi)
+    perturbed = minimum(energy, energy.start, Aim(wish, least, most), PERTURBED, iterations=3)
+    free = Aim(np.full(len(least), np.nan), least, most)
     return minimum(energy, perturbed, free, stiffness, iterations=300)
 
 
 def ajar(energy: FoldEnergy, folded: Shape) -> Shape:
     """Shape near a folded one, whose creases have begun to open."""
     turns = energy.creases(folded.turns)
-    aim = Aim(turns - FIRST_TURN * np.sign(turns), np.zeros_like(turns))
+    none, most = np.zeros_like(turns), np.full(len(turns), math.pi)
+    aim = Aim(turns - FIRST_TURN * np.sign(turns), none, most)
     return minimum(energy, folded, aim, PERTURBED, iterations=3)
 
 

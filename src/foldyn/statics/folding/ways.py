@@ -17,6 +17,7 @@ from foldyn.statics.folding.starts import FIRST_TURN, ajar, composed, opened
 PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels that hardly bend
 PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # and some that do, driven harder
 CLOSED = Stiffness(bends=0.3, creases=1e-3, sides=10.0)  # so that closed creases stay within 180
+AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
 WEAKER = (1e-3, 1e-6, 1e-9)  # springs of the creases, while what they held is let go
 HELD = 0.2  # of what creases have turned: change by which a state counts as kept
@@ -69,13 +70,16 @@ def from_folded(
     x = (vertices - vertices.mean(axis=0)) / energy.size
     shape = energy.moved(energy.start._replace(turns=turns), x)
     start = ajar(energy, shape)
-    states, shares = _followed(energy, CLOSED, shape, start, (folded, targets), steps, progress)
+    states, shares = _followed(
+        energy, CLOSED, shape, start, (folded, targets), steps, progress, AJAR
+    )
     return Way(states, shares, "folded")
 
 
 def _followed(
     energy: FoldEnergy, stiffness: Stiffness, first: Shape, shape: Shape,
     angles: tuple[NDArray, NDArray], steps: int, progress: Callable[[int], None],
+    most: float = math.pi,
 ) -> tuple[list[Shape], list[float]]:  # fmt: skip
     """Follow the least energy from `shape` while the rest angles go from the first to the second.
 
@@ -85,10 +89,9 @@ def _followed(
     for k in range(1, steps + 1):
         aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
         last = k == steps
-        shape = minimum(
-            energy, shape, _aim(energy, aimed), stiffness, settled=1e-10 if last else 1e-4
-        )
-        kept = relaxed(energy, stiffness, shape, aimed, angles[0]) if lets_go or last else None
+        aim = _aim(energy, aimed, most)
+        shape = minimum(energy, shape, aim, stiffness, settled=1e-10 if last else 1e-4)
+        kept = relaxed(energy, stiffness, shape, aim, angles[0]) if lets_go or last else None
         lets_go = kept is not None
         shapes.append(shape if kept is None else kept)
         shares.append(k / steps)
@@ -97,7 +100,7 @@ def _followed(
 
 
 def relaxed(
-    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, angles: NDArray, first: NDArray
+    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray
 ) -> Shape | None:
     """The shape without the springs of its creases, if it stays near.
 
@@ -106,9 +109,9 @@ def relaxed(
     First panels stay as stiff as they are, so that they end plane if the pattern can be folded
     rigidly; failing that they bend as they like, as thin paper does.
     """
-    wrong = len(wrong_ways(energy, shape.turns, angles))
+    wrong = len(wrong_ways(energy, shape.turns, aim.angles))
     turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
-    aim = Aim(angles, np.zeros_like(energy.signs))
+    aim = aim._replace(least=np.zeros_like(energy.signs))
     for thin in (False, True):
         kept = shape
         for weaker in WEAKER:
@@ -123,7 +126,7 @@ def relaxed(
             if moved > HELD * turned or largest_strain(kept) > max(ISOMETRIC, 0.3 * before):
                 break  # elsewhere, or strained by more than the springs
         else:
-            if len(wrong_ways(energy, kept.turns, angles)) <= wrong:
+            if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
                 return kept
     return None
 
@@ -133,7 +136,8 @@ def largest_strain(shape: Shape) -> float:
     return float(np.abs(shape.strains).max(initial=0.0))
 
 
-def _aim(energy: FoldEnergy, angles: NDArray) -> Aim:
-    """Angles with the least turns of mountains and valleys on their way there."""
+def _aim(energy: FoldEnergy, angles: NDArray, most: float) -> Aim:
+    """Angles with the least and the most turns of mountains and valleys on their way there."""
     least = np.where(np.isnan(angles), FREE_MARGIN, np.minimum(FIRST_TURN, 0.5 * np.abs(angles)))
-    return Aim(angles, np.where(energy.signs == 0.0, 0.0, least))
+    turned = np.abs(np.nan_to_num(angles))
+    return Aim(angles, np.where(energy.signs == 0.0, 0.0, least), np.maximum(most, turned))
