@@ -23,6 +23,7 @@ from foldyn.plots.path import (
     plot_reaction as plot_reaction,
     total_reaction as total_reaction,
 )
+from foldyn.plots.patterns import draw_patterns as draw_patterns
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.tracks import (
     draw_overlay as draw_overlay,

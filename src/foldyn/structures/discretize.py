@@ -70,8 +70,9 @@ def discretize(
         small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float, sequence or mapping, optional
         Stiffness per length (N m/rad per m) of all creases, of each in the order of
-        `pattern.creases`, or by assignment, as {"mountain": 0.1, "valley": 0.2}, instead of the
-        calibration, which creases of an assignment that is not named ("flat") keep. With "plate"
+        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern),
+        as {"mountain": 0.1, "valley": 0.2}, instead of the calibration, which creases that are
+        not named keep. With "plate"
         the panels beside a crease still give way to its moment.
     crease_rest : float, sequence or mapping, optional
         Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
