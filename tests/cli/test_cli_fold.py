@@ -96,3 +96,16 @@ def test_bad_input_has_status_2_and_writes_nothing(workplace, flap, arguments, m
     told = workplace.call("fold", *arguments)
     assert told.status == 2 and message in told.err and told.err.count("\n") == 1
     assert workplace.contents() == before
+
+
+def test_a_folded_pattern_has_modes(workplace, flap) -> None:
+    assert workplace.call("fold", flap, "--to", "50%", "--steps", "2", "--no-figures").status == 0
+    workplace.write(
+        '[pattern]\nfile = "flap-folded.fold"\n[sheet]\nyoungs_modulus = 1e9\n'
+        "poissons_ratio = 0.2\nthickness = 1e-3\ndensity = 700\n"
+        '[[supports]]\nnodes = [0, 1, 2]\naxes = "xyz"\n[analysis]\nkind = "modes"\ncount = 1\n'
+    )
+    told = workplace.call("modes", "case.toml", "--no-figures")
+    assert told.status == 0
+    pattern = fd.load("case-modes/result.nc")
+    assert float(pattern.frequency[0]) > 0.0

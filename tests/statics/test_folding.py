@@ -111,6 +111,25 @@ def test_fraction_0_gives_the_same_pattern():
     assert not folding.wrong and folding.strain < 1e-12
 
 
+STATES = {
+    "square_twist": (fd.patterns.square_twist(dihedral=180), fd.patterns.square_twist()),
+    "waterbomb": (fd.patterns.waterbomb((3, 2), dihedral=180), fd.patterns.waterbomb((3, 2))),
+    "arc_miura": (fd.patterns.arc_miura(dihedral=180), fd.patterns.arc_miura()),
+    "resch": (fd.patterns.resch((2, 2)), fd.patterns.resch((2, 2), folded=True)),
+}
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_flat_patterns_reach_the_states_of_their_generators(name):
+    flat, folded = STATES[name]
+    folding = fd.fold(flat, folded, steps=8)
+    assert folding.kind == "rigid" and not folding.wrong and not len(folding.crossings)
+    np.testing.assert_allclose(
+        distances(folding.pattern.vertices), distances(folded.vertices), atol=1e-6
+    )
+    assert folding.pattern.families.keys() == flat.families.keys()
+
+
 def test_a_partly_folded_pattern_goes_on_from_where_it_is():
     half = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=65, dihedral=100)
     exact = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.2, panel_angle=65, dihedral=40)
@@ -261,10 +280,11 @@ def test_the_path_can_be_watched():
         ({"angles": [1, 2, 3]}, "has 3 angles for 1 creases"),
         ({"angles": {}}, "angles: is empty"),
         ({"angles": {(0, 1): 30}}, r"angles: \(0, 1\) is not a crease"),
-        ({"angles": {"montain": 30}}, "did you mean 'mountain'"),
-        ({"angles": {"valley": 30}}, 'no crease of "valley"'),
+        ({"angles": {"montain": 30}}, "angles.montain: did you mean 'mountain'"),
+        ({"angles": {"valley": 30}}, "angles.valley: this pattern has no crease assigned valley"),
         ({"angles": {(0, 2): 30}}, r"crease \(0, 2\) is a mountain, and 30 degrees"),
         ({"angles": {(0, 2): [30]}}, "give one number"),
+        ({"angles": fd.patterns.miura()}, "angles: has other creases"),
         ({"angles": 30, "steps": 0}, "steps = 0"),
         ({"angles": 30, "start": "flat"}, 'start = "flat"'),
     ],

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from foldyn.cases.folding import check_fold_angles, check_fraction
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
-from foldyn.patterns.crease_data import vertex_pair
+from foldyn.patterns.crease_data import crease_rows, vertex_pair
 from foldyn.patterns.topology import edge_lookup
 from foldyn.statics.folding.energy import SIGNS
-from foldyn.values import show, suggest
+from foldyn.values import show
 
-WORDS: Mapping[str, str] = {"all": "MV", "mountain": "M", "valley": "V"}
-"""Words for creases, and the assignments that each means."""
 _NAMES = {"M": "mountain", "V": "valley"}
 
 
@@ -84,8 +82,8 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
         targets, row = np.full(count, np.nan), edge_lookup(pattern.creases)
         words = [key for key in angles if isinstance(key, str)]
         for word in words:  # pairs after words, which they refine
-            rows = _rows(pattern, word)
-            targets[rows] = _sized(pattern, rows, angles[word], f"angles[{show(word)}]")
+            rows = crease_rows(f"angles.{word}", word, pattern, is_key=True)
+            targets[rows] = _sized(pattern, rows, angles[word], f"angles.{word}")
         for key in (key for key in angles if not isinstance(key, str)):
             pair = vertex_pair("angles", key)
             if pair not in row:
@@ -107,7 +105,7 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
 
 def _sized_all(pattern: Pattern, angle: Any) -> NDArray[np.float64]:
     targets = np.full(len(pattern.creases), np.nan)
-    rows = _rows(pattern, "all")
+    rows = crease_rows("angles", "all", pattern, is_key=True)
     targets[rows] = _sized(pattern, rows, angle, "angles")
     return targets
 
@@ -117,24 +115,6 @@ def _angle(field: str, value: Any) -> float:
     if isinstance(checked, tuple):
         raise InputError(f" = {show(value)}: give one number (degrees)", field)
     return checked
-
-
-def _rows(pattern: Pattern, word: str) -> NDArray[np.int64]:
-    """Creases of a family or an assignment."""
-    if word in pattern.families:
-        return pattern.families[word]
-    known = [*WORDS, *pattern.families]
-    if word not in WORDS:
-        raise InputError(
-            f": {suggest(word, known)}{show(word)} names no creases; give one of "
-            f"{', '.join(known)}, or pairs of vertices",
-            "angles",
-        )
-    letters = np.array(pattern.assignments)
-    rows = np.flatnonzero([letter in WORDS[word] for letter in letters])
-    if not rows.size:
-        raise InputError(f": this pattern has no crease of {show(word)}", "angles")
-    return rows
 
 
 def _sized(pattern: Pattern, rows: NDArray, value: Any, field: str) -> NDArray[np.float64]:
