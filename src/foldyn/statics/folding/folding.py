@@ -240,7 +240,7 @@ def fold(
     if not len(pattern.creases):
         raise InputError(": has no creases to fold", "pattern")
     steps = whole("steps", steps, least=1, most=1000)
-    start = choice("start", start, STARTS)
+    choice("start", start, STARTS)
     targets = fold_targets(pattern, angles, fraction)
     letters = np.array(pattern.assignments)
     energy = FoldEnergy(pattern, (letters == "F") & (np.nan_to_num(targets) == 0.0))
@@ -277,8 +277,9 @@ def _best_way(
             return best
     way = from_folded(energy, pattern, full_angles(pattern), targets, steps, tell)
     if best is not None:
-        near = way is not None and _off(energy, way, targets) < _off(energy, best, targets)
-        return min(best, way, key=cost) if near else best
+        if way is None or _off(energy, way, targets) >= _off(energy, best, targets):
+            return best
+        return min(best, way, key=cost)
     if way is None:
         raise InputError(
             ' = "folded": the panels do not close when they are rotated by the full angles about '

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import SingularTangentError
+from foldyn.algebra.superlu import Factorizer, SingularTangentError
 from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
 
 LARGEST_TURN = 0.5  # rad, of a hinge in a step
@@ -52,7 +52,7 @@ def minimum(
     return now.shape
 
 
-def _step(solver: type, matrix: sparse.csc_array, gradient: NDArray) -> NDArray | None:
+def _step(solver: Factorizer, matrix: sparse.csc_array, gradient: NDArray) -> NDArray | None:
     """Step (m,) of a damped matrix; None where it is singular to rounding."""
     try:
         step = solver(sparse.csc_array(matrix)).solve(-gradient)
