@@ -17,8 +17,8 @@ from typing import NoReturn
 from foldyn import __version__
 from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
-from foldyn.cli.fold import add_fold, run_fold
 from foldyn.cli.folder import reason
+from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.options import add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
