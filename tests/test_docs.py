@@ -135,6 +135,14 @@ def test_compress_release_vibrate_of_the_quasi_static_page():
     assert top.min() < -0.002  # it springs back beyond its height
 
 
+def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
+    (block,) = blocks("folding.md", "python")
+    names: dict = {}
+    exec(compile(block, "folding.md", "exec"), names)
+    assert names["folding"].kind == "rigid"
+    assert (names["modes"].frequency > 0.0).all()
+
+
 def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():
     script = runpy.run_path(str(DOCS.parent / "examples" / "quasi_static.py"))
     page = (DOCS / "quasi-static.md").read_text("utf-8")

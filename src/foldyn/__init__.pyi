@@ -59,7 +59,11 @@ from foldyn.dynamics import (
     simulate as simulate,
 )
 from foldyn.experiment import fit as fit
-from foldyn.formats import read_pattern as read_pattern, write_pattern as write_pattern
+from foldyn.formats import (
+    diagnose as diagnose,
+    read_pattern as read_pattern,
+    write_pattern as write_pattern,
+)
 from foldyn.linear import (
     Fidelity as Fidelity,
     fidelity as fidelity,
@@ -83,7 +87,13 @@ from foldyn.results import (
     save as save,
 )
 from foldyn.shells import Shell as Shell, shell as shell
-from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
+from foldyn.statics import (
+    Folding as Folding,
+    fold as fold,
+    landscape as landscape,
+    switch_branch as switch_branch,
+    trace as trace,
+)
 from foldyn.structures import (
     Laminate as Laminate,
     PanelSheet as PanelSheet,

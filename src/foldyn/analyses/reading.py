@@ -16,7 +16,7 @@ from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.analyses.sections import FACES, HINGES
+from foldyn.analyses.sections import FACES, HINGES, READING
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
@@ -235,14 +235,13 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
             return call_from(GENERATORS[table["kind"]], arguments)
     if "file" in table:
         with within(f'pattern.file = "{table["file"]}": '):
-            return read_pattern(folder / table["file"])
+            return read_pattern(folder / table["file"], *(table.get(key) for key in READING))
     with within("pattern: "):
         return Pattern(
-            table["vertices"],
-            table["faces"],
-            table.get("assignments"),
+            table["vertices"], table["faces"], table.get("assignments"),
+            fold_angles=np.radians(table["fold_angles"]) if "fold_angles" in table else None,
             families=table.get("families"),
-        )
+        )  # fmt: skip
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

@@ -43,6 +43,10 @@ from foldyn.values import MOST, choice, indices, nearest, number_or_list, number
 
 HINGES, FACES = "hinge_offset", "faces"
 """Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
+READING = ("scale", "unit", "frame")
+"""Keys of [pattern] beside `file`: arguments of `read_pattern`."""
+INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
+"""Keys of [pattern] for a pattern that the case file holds."""
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
@@ -96,11 +100,11 @@ def _pattern(value: Any) -> dict[str, Any]:
     if "kind" in value:
         _check_generator(value)
     elif "file" in value:
-        check_keys(value, ["file", HINGES])
+        check_keys(value, ["file", *READING, HINGES])
         if not isinstance(value["file"], str) or not value["file"]:
             raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
     else:
-        check_keys(value, ["vertices", "faces", "assignments", "families", HINGES])
+        check_keys(value, [*INLINE, HINGES])
         if "faces" not in value:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
@@ -143,6 +147,18 @@ def _inline(value: Mapping[str, Any]) -> None:
         raise InputError(
             f'.assignments = {show(letters)}: must be a list of letters "M", "V", "F", "U", one '
             "per crease"
+        )
+    angles = value.get("fold_angles", [])
+    if not isinstance(angles, list) or any(type(angle) not in (int, float) for angle in angles):
+        raise InputError(
+            f".fold_angles = {show(angles)}: must be a list of angles (degrees, valleys positive, "
+            "nan for none), one per crease"
+        )
+    families = value.get("families", {})
+    if not isinstance(families, Mapping) or not all(isinstance(f, list) for f in families.values()):
+        raise InputError(
+            f".families = {show(families)}: must be a table of lists of vertex pairs, as in "
+            "{ zigzag = [[0, 1], [1, 2]] }"
         )
 
 

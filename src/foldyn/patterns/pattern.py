@@ -16,6 +16,7 @@ from foldyn.patterns.boards import Boards
 from foldyn.patterns.crease_data import vertex_pair
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
 from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup
+from foldyn.patterns.transforms import Transforms
 from foldyn.values import LONGEST, SHORTEST
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
@@ -24,7 +25,7 @@ _LETTERS = ("M", "V", "F", "U")
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Pattern:
+class Pattern(Transforms):
     """Vertices, panels and creases of an origami structure at rest, flat or folded.
 
     Parameters

@@ -103,11 +103,7 @@ def thicken(
             vertices[vertex], placed[vertex] = place, True
     starts = np.concatenate([[0], np.cumsum([len(face) for face in pattern.faces])])
     boards = Boards(starts, np.concatenate(middles), sizes)
-    return Pattern(
-        vertices, pattern.faces, pattern.assignments, pattern.name, boards, pattern.fold_angles,
-        {name: pattern.creases[rows].tolist() for name, rows in pattern.families.items()},
-        pattern.custom,
-    )  # fmt: skip
+    return pattern.changed(vertices=vertices, boards=boards)
 
 
 def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
