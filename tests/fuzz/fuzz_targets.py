@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fuzz_of_cases
+import fuzz_of_drawings
 import fuzz_of_fits
 import fuzz_of_patterns
 import fuzz_of_results
@@ -14,6 +15,7 @@ TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
         fuzz_of_cases.TARGET,
+        *fuzz_of_drawings.TARGETS,
         fuzz_of_fits.TARGET,
         fuzz_of_patterns.TARGET,
         *fuzz_of_results.TARGETS,

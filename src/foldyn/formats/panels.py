@@ -157,7 +157,7 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
     if not inner:
         return Panels(panels.points, panels.faces, letters, panels.angles), 0, 0
     plain = set(letters.values()) == {"B"}
-    part = components(list(sides), len(panels.points))
+    part = components(list(letters), len(panels.points))  # as drawn, without what was divided
     rim = {part[edge[0]] for edge, at in sides.items() if len(at) == 1}
     folds = [edge for edge in inner if plain and part[edge[0]] in rim]
     letters |= dict.fromkeys(inner, "C") | dict.fromkeys(folds, "U")
@@ -169,7 +169,7 @@ def areas(panels: Panels) -> NDArray[np.float64]:
     """Area of each panel of a flat drawing."""
     corners = panels.points[[point for face in panels.faces for point in face], :2]
     number = np.repeat(np.arange(len(panels.faces)), [len(face) for face in panels.faces])
-    return shapely.area(shapely.polygons(shapely.linearrings(corners, indices=number)))
+    return np.asarray(shapely.area(shapely.polygons(shapely.linearrings(corners, indices=number))))
 
 
 def parts(panels: Panels) -> NDArray[np.int64]:

@@ -88,12 +88,15 @@ def read(text: str) -> Drawing:
     frame = _frame(root)
     rules, left = rules_of("".join(e.text or "" for e in root.iter() if local(e) == "style"))
     lines = _Lines(rules, {e.get("id", ""): e for e in root.iter()}, frame.view)
-    _walk(root, np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]]), Style(), lines, 0)
+    upward = np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]])
+    with np.errstate(over="ignore", invalid="ignore"):  # where everything is, is checked at the end
+        _walk(root, upward, Style(), lines, 0)
+        boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
     doubts = []
     if left:
         doubts.append(f"{count(left, 'style rule')} with selectors other than tag, class and id")
     titles = [e.text or "" for e in root if local(e) == "title"]
-    return _drawing(lines, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
+    return _drawing(lines, boxes, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
 
 
 def _frame(root: Element) -> _Frame:
@@ -161,14 +164,19 @@ def _link(element: Element) -> str:
     return element.get("href") or element.get("{http://www.w3.org/1999/xlink}href") or ""
 
 
-def _drawing(lines: _Lines, frame: _Frame, doubts: list[str], title: str) -> Drawing:
+def _drawing(
+    lines: _Lines,
+    boxes: list[NDArray[np.float64]],
+    frame: _Frame,
+    doubts: list[str],
+    title: str,
+) -> Drawing:
     if not lines.curves:
         raise InputError(
             ": there are none to be seen; give crease lines a stroke (red mountains, blue valleys, "
             "a black outline)",
             "lines",
         )
-    boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
     for box, (*_, place) in zip(boxes, lines.curves, strict=True):
         if not (np.abs(box) <= LONGEST).all():
             raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", place)
