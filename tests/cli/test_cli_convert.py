@@ -103,8 +103,8 @@ def test_a_result_with_its_states(result) -> None:
     assert (told.status, told.new) == (0, ["run.fold"])
     assert told.out.endswith(f"4 creases, {count} frames\n")
     assert len(written("run.fold")["file_frames"]) == count
-    workplace.call("convert", "run.nc", "run.fold", "--every", "4")
-    assert len(written("run.fold")["file_frames"]) == len({*range(0, count, 4), count - 1})
+    workplace.call("convert", "run.nc", "some.fold", "--every", "4")
+    assert len(written("some.fold")["file_frames"]) == len({*range(0, count, 4), count - 1})
 
 
 def test_a_result_in_one_state(result) -> None:

@@ -137,6 +137,7 @@ def test_units(comment, meters, tmp_path):
         (SQUARES + "f 1 2 0\n", 'line 8: "0" is no vertex'),
         (SQUARES + "f 1 2 -7\n", 'line 8: "-7" is no vertex'),
         (SQUARES + "f 1 2 x\n", 'line 8: "x" is no vertex'),
+        (SQUARES + "f 1 2\n", "line 8: a face needs at least three corners"),
         (SQUARES + PANELS + "#e 2\n", "line 10: #e needs two vertices"),
         (SQUARES + PANELS + "#e 2 2 1\n", "line 10: #e joins vertex 2 with itself"),
         (SQUARES + PANELS + "#e 2 5 9\n", 'line 10: "9" is no kind of edge: give 0 to 4'),

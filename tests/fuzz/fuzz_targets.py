@@ -17,7 +17,7 @@ TARGETS: dict[str, Target] = {
         fuzz_of_cases.TARGET,
         *fuzz_of_drawings.TARGETS,
         fuzz_of_fits.TARGET,
-        fuzz_of_patterns.TARGET,
+        *fuzz_of_patterns.TARGETS,
         *fuzz_of_results.TARGETS,
         fuzz_of_selections.TARGET,
         fuzz_of_tables.TARGET,

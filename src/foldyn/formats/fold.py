@@ -197,9 +197,11 @@ def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | 
         return None
     faces = []
     for f, face in enumerate(_list(fields, "faces_vertices")):
-        if not isinstance(face, list) or not all(type(v) is int and 0 <= v < count for v in face):
+        known = isinstance(face, list) and all(type(v) is int and 0 <= v < count for v in face)
+        if not known or len(face) < 3:
             raise InputError(
-                f"faces_vertices[{f}] = {show(face)}: give vertex numbers from 0 to {count - 1}."
+                f"faces_vertices[{f}] = {show(face)}: give at least three vertex numbers from 0 to "
+                f"{count - 1}."
             )
         faces.append(tuple(face))
     return tuple(faces) or None  # some programs write an empty list

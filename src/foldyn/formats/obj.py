@@ -74,6 +74,8 @@ def read(text: str) -> Drawing:
             vertices.append(_coordinates(rest, place))
         elif word == "f":
             faces.append(_corners(rest, known, place))
+            if len(rest) < 3:
+                raise InputError(": a face needs at least three corners", place)
         elif word == "#e":
             creases.append(_crease(rest, known, place, ORIPA if oripa else FREEFORM))
         elif word == "l":
