@@ -137,7 +137,9 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     style = styled(element, lines.rules, inherited, place)
     if style is None:
         return
-    here = after(outer, placing(element.get("transform"), place))
+    here = outer
+    if "transform" in element.attrib:
+        here = after(outer, placing(element.get("transform"), place))
     if name in SHAPES:
         if style.shown:
             found = curves(element, lines.view, place)
@@ -149,7 +151,8 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     if name == "use" or (name == "svg" and depth):
         x = length(element.get("x"), lines.view[0], f"{place}.x")
         y = length(element.get("y"), lines.view[1], f"{place}.y")
-        here = after(here, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        if x or y:
+            here = after(here, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
     if name == "use":
         target = lines.names.get(_link(element)[1:]) if _link(element)[:1] == "#" else None
         if target is None:
