@@ -155,7 +155,7 @@ def test_cuts_survive(tmp_path):
         points, [(0, 1, 6, 5), (5, 6, 4), (7, 2, 3, 6), (6, 3, 4)],
         {(1, 6): "B", (6, 7): "B", (5, 6): "V", (4, 6): "M", (3, 6): "V"},
     )  # fmt: skip
-    for extension in (".fold", ".svg", ".dxf"):
+    for extension in (".fold", ".obj", ".svg", ".dxf"):
         write_pattern(tmp_path / f"x{extension}", p)
         q = diagnose(tmp_path / f"x{extension}").pattern
         assert (len(q.vertices), len(q.faces), len(q.creases)) == (8, 4, 3), extension
