@@ -17,8 +17,6 @@ _SUBSET = re.compile(r"<!DOCTYPE[^\[>]{0,500}\[([^\]]*)\]\s{0,9}>")
 _ENTITY = re.compile(
     r"<!ENTITY\s{1,9}([A-Za-z_][\w.-]{0,50})\s{1,9}([\"'])([^\"'<>]{0,200})\2\s{0,9}>"
 )
-    r"""<!ENTITY\s{1,9}([A-Za-z_][\w.-]{0,50})\s{1,9}(["'])([^"'<>]{0,200})\2\s{0,9}>"""
-)
 
 
 def from_xml(text: str, what: str) -> Element:
