@@ -70,6 +70,17 @@ def test_lines_in_general_position():
     assert len(p.vertices) == 4 + 6 + 3
 
 
+@pytest.mark.parametrize("count", [3, 4, 7, 12])
+def test_lines_through_one_point(count):
+    # diameters of a polygon: pairs of opposite sectors
+    turned = np.pi * np.arange(2 * count) / count
+    rim = 3.0 + np.column_stack((np.cos(turned), np.sin(turned)))
+    border = [("B", rim[k - 1], rim[k]) for k in range(2 * count)]
+    lines = [("M", rim[k], rim[k + count]) for k in range(count)]
+    p = built(drawn(*border, *lines)).pattern
+    assert (len(p.faces), len(p.vertices)) == (2 * count, 2 * count + 1)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.randoms(use_true_random=False), st.integers(2, 9))
 def test_the_order_of_lines_does_not_matter(random, count):
