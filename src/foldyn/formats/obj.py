@@ -1,8 +1,9 @@
 """OBJ: meshes of polygons, with the creases that origami programs put into it.
 
 Creases are comment lines ``#e a b kind angle``: two vertices counted from 1, what the edge is, and
-a fold angle in degrees. Freeform Origami (T. Tachi) defined them, and MERLIN2 and Origami Simulator
-(js/saveSTL.js) write its kinds: 0 boundary, 1 flat, 2 valley, 3 mountain. ORIPA has numbers of its
+a fold angle in degrees. They come from Freeform Origami (T. Tachi), and other programs (MERLIN2)
+share them; its kinds, as Origami Simulator writes them for it (js/saveSTL.js), are 0 boundary, 1
+flat, 2 valley, 3 mountain. ORIPA (doc/exporter/ExporterOBJ.java) has numbers of its
 own (1 cut, 2 mountain, 3 valley) and coordinates of the screen, whose y runs down. Lines without
 faces (``l a b c``) are creases that are unassigned, or what their group, object or material is
 called: "mountain", "valley", "boundary", "facet", "cut".
