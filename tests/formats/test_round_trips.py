@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats import FORMATS, diagnose, read_pattern, write_pattern
 from foldyn.patterns import GENERATORS, Pattern, miura, simple_fold, thicken
 
+SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "patterns"
 BOTH = sorted(end for end, fmt in FORMATS.items() if fmt.read and fmt.write)
 FOLDED = [".fold", ".obj"]
 ANGLED = [".fold", ".obj", ".svg"]
@@ -55,17 +57,27 @@ def planar(seed, letters="MVFU", angles=False):
 
 
 def assert_alike(p, q):
-    """The same lines with the same letters and angles, whatever their numbers."""
+    """The same panels, and lines with letters and angles, in the same places; cuts too."""
     assert (len(p.vertices), len(p.faces)) == (len(q.vertices), len(q.faces))
-    where = [np.argmin(np.linalg.norm(q.vertices - x, axis=1)) for x in p.vertices]
-    assert np.abs(q.vertices[where] - p.vertices).max() < NEAR * p.size
-    row = {tuple(pair): k for k, pair in enumerate(q.creases.tolist())}
-    for k, (a, b) in enumerate(p.creases.tolist()):
-        other = row[tuple(sorted((int(where[a]), int(where[b]))))]
-        assert q.assignments[other] == p.assignments[k]
-        np.testing.assert_allclose(q.fold_angles[other], p.fold_angles[k], atol=1e-9)
-    panels = {frozenset(where[v] for v in face) for face in p.faces}
-    assert panels == {frozenset(face) for face in q.faces}
+
+    def place(vertex):
+        """First vertex of p in that place."""
+        distance = np.linalg.norm(p.vertices - vertex, axis=1)
+        assert distance.min() < NEAR * p.size
+        return int(np.argmax(distance < NEAR * p.size))
+
+    told = []
+    for pattern in (p, q):
+        where = np.array([place(vertex) for vertex in pattern.vertices])
+        ends = np.sort(where[pattern.creases], axis=1).tolist()
+        panels = sorted(sorted(where[list(face)].tolist()) for face in pattern.faces)
+        angles = np.nan_to_num(pattern.fold_angles, nan=9.0).tolist()
+        lines = sorted(zip(ends, pattern.assignments, angles, strict=True))
+        rim = sorted(np.sort(where[pattern.boundary], axis=1).tolist())
+        told.append((panels, rim, [line[:2] for line in lines], [line[2] for line in lines]))
+    (*one, angles), (*other, found) = told
+    assert one == other
+    np.testing.assert_allclose(found, angles, atol=1e-9)
 
 
 @pytest.mark.parametrize("extension", BOTH)
@@ -143,8 +155,23 @@ def test_cuts_survive(tmp_path):
         points, [(0, 1, 6, 5), (5, 6, 4), (7, 2, 3, 6), (6, 3, 4)],
         {(1, 6): "B", (6, 7): "B", (5, 6): "V", (4, 6): "M", (3, 6): "V"},
     )  # fmt: skip
-    for extension in (".fold", ".svg", ".dxf"):
+    for extension in (".fold", ".obj", ".svg", ".dxf"):
         write_pattern(tmp_path / f"x{extension}", p)
         q = diagnose(tmp_path / f"x{extension}").pattern
         assert (len(q.vertices), len(q.faces), len(q.creases)) == (8, 4, 3), extension
         assert sorted(q.assignments) == ["M", "V", "V"]
+
+
+@pytest.mark.parametrize("path", sorted(SAMPLES.glob("*.*")) or [None], ids=str)
+def test_real_files_in_every_suitable_format(path, tmp_path):
+    """Flat ones in all formats, folded ones in those of panels."""
+    if path is None or path.suffix not in FORMATS:
+        pytest.skip("no file of a pattern")
+    p = diagnose(path, unit="mm").pattern
+    is_flat = not p.vertices[:, 2].any() and (np.abs(p.dihedrals - np.pi) < 1e-6).all()
+    for extension in BOTH if is_flat else FOLDED:
+        if not set(p.assignments) <= set(LETTERS.get(extension, "MVFU")):
+            continue
+        q = p if extension in ANGLED else p.changed(fold_angles=None)
+        write_pattern(tmp_path / f"x{extension}", q)
+        assert_alike(q, diagnose(tmp_path / f"x{extension}").pattern)

@@ -117,7 +117,7 @@ def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]
                 "its frame_parent."
             )
         seen.add(number)
-        own = {_OLD.get(key, key): value for key, value in frames[number].items()}
+        own = {_OLD.get(key) or key: value for key, value in frames[number].items()}
         fields = {**own, **fields}
         if number == 0 or own.get("frame_inherit") is not True:
             return fields
