@@ -22,8 +22,9 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.condensed_panel import outline, panel_stiffness
+from foldyn.structures.condensed_panel import panel_stiffness
 from foldyn.structures.mesh import hinge_angles, lengths
+from foldyn.structures.panel_plate import outline
 from foldyn.structures.sheet import Sheet
 
 STRAIGHT = 3.0

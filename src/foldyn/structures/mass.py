@@ -16,7 +16,8 @@ from scipy import sparse
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import around, edge_of
-from foldyn.structures.condensed_panel import outline, panel_mass
+from foldyn.structures.condensed_panel import panel_mass
+from foldyn.structures.panel_plate import outline
 
 LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
 
