@@ -112,6 +112,17 @@ class PanelPlate:
         found[others, :count] -= moved
         return found, found.T @ (self.stiffness @ found)
 
+    @property
+    def mass(self) -> sparse.csr_array:
+        """Mass matrix of the unknowns, of a panel of mass 1; slopes have none."""
+        corners = self.points[self.triangles]
+        area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+        element = (np.ones((3, 3)) + np.eye(3)) / 12.0
+        block = (area / area.sum())[:, None, None] * element
+        rows, columns = np.repeat(self.triangles, 3, axis=1), np.tile(self.triangles, (1, 3))
+        entries = (block.ravel(), (rows.ravel(), columns.ravel()))
+        return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
+
 
 def _rows(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
     """Rows (k, size) of linear functions, given by their coefficients."""
