@@ -40,10 +40,16 @@ class Amplitudes(NamedTuple):
         N/m.
     mass : (m + k, m + k)
         What comes to the mass of the nodes, kg.
+    points : (q, 3)
+        Middles of the edges and of the spokes of all panels at rest, one after the other, m.
+    between : (3 q, m + k)
+        Their displacements by all dofs.
     """
 
     stiffness: NDArray
     mass: sparse.csr_array
+    points: NDArray
+    between: sparse.csr_array
 
     @property
     def dofs(self) -> NDArray[np.int64]:
@@ -115,13 +121,14 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
         makes two alike.
     """
     if not count:
-        return Amplitudes(np.zeros(0), sparse.csr_array((size, size)))
+        none = np.zeros((0, 3))
+        return Amplitudes(none[:, 0], _matrix([], size, size), none, _matrix([], 0, size))
     plates, surface, sheet = structure.edge_plates, structure.surface, structure.sheet
     assert plates is not None
     kinds, kind = sheet.kinds(len(surface.faces))
     rule, total = condensed_panels(surface), surface.panel_mass
     per_hidden = structure.body.fold_hinges().per_hidden
-    first, stiffness, entries = size, [np.zeros(0)], [np.zeros((3, 0))]
+    first, stiffness, masses, points, between = size, [np.zeros(0)], [], [np.zeros((0, 3))], []
     for p, panel in enumerate(_outlines(structure)):
         if panel is None:
             continue
@@ -130,23 +137,43 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
         length2 = float(np.linalg.norm(_double_area(structure.nodes[corners])))  # an outline's is 1
         stiffness.append(own.bending_modulus / length2 * modes.stiffness)
         normal = _double_area(structure.nodes[corners] + displacement[corners])
+        normal = normal / np.linalg.norm(normal)
         nodes = np.array(surface.nodes_of(p))
         angle = plates.angle[plates.start[p] : plates.start[p + 1]]
         turns = structure.nodes.size - 1 - angle[angle < 0]
         inner = np.arange(first, first + len(modes.stiffness))
         first += len(inner)
         # heights of the nodes, turns of the edges and amplitudes by the dofs
-        height = np.kron(np.eye(len(nodes)), normal / np.linalg.norm(normal))
+        height = np.kron(np.eye(len(nodes)), normal)
         turned = np.sqrt(length2) * per_hidden * np.eye(len(turns))
         by = block_diag(height, turned, np.eye(len(inner)))
         mass = total[p] * modes.mass
         mass[: len(nodes), : len(nodes)] -= rule.get(p, total[p] * TRIANGLE)
         dofs = np.concatenate([(3 * nodes[:, None] + np.arange(3)).ravel(), turns, inner])
-        entries.append(_entries(dofs, by.T @ mass @ by))
-    value, row, column = np.concatenate(entries, axis=1)
-    places = (row.astype(np.int64), column.astype(np.int64))
-    change = sparse.coo_array((value, places), shape=(first, first))
-    return Amplitudes(np.concatenate(stiffness), sparse.csr_array(change))
+        masses.append(_entries(dofs, dofs, by.T @ mass @ by))
+        ends = _ends(nodes, len(corners))
+        along = np.kron(0.5 * ends, np.eye(3) - np.outer(normal, normal))
+        across = np.kron(modes.between @ by, normal[:, None])
+        across[:, : along.shape[1]] += along
+        row = 3 * sum(map(len, points)) + np.arange(len(across))
+        between.append(_entries(row, dofs, across))
+        points.append(0.5 * ends @ structure.nodes[nodes])
+    middle = np.concatenate(points)
+    return Amplitudes(
+        np.concatenate(stiffness),
+        _matrix(masses, first, first),
+        middle,
+        _matrix(between, middle.size, first),
+    )
+
+
+def _ends(nodes: NDArray, corners: int) -> NDArray:
+    """Which nodes (q, k) end the edges and the spokes of a panel: ones."""
+    edges = np.eye(corners) + np.roll(np.eye(corners), 1, axis=1)
+    if len(nodes) == corners:
+        return edges
+    spokes = np.column_stack([np.eye(corners), np.ones(corners)])
+    return np.concatenate([np.pad(edges, ((0, 0), (0, 1))), spokes])
 
 
 def _outlines(structure: Structure) -> list[Outline | None]:
@@ -166,7 +193,14 @@ def _double_area(x: NDArray) -> NDArray:
     return np.cross(arm, np.roll(arm, -1, axis=0)).sum(axis=0)
 
 
-def _entries(dofs: NDArray, matrix: NDArray) -> NDArray:
-    """Values, rows and columns (3, k * k) of a matrix (k, k) of some dofs."""
-    count = len(dofs)
-    return np.stack([matrix.ravel(), np.repeat(dofs, count), np.tile(dofs, count)])
+def _entries(rows: NDArray, columns: NDArray, matrix: NDArray) -> NDArray:
+    """Values, rows and columns (3, r * c) of a matrix (r, c)."""
+    r, c = matrix.shape
+    return np.stack([matrix.ravel(), np.repeat(rows, c), np.tile(columns, r)])
+
+
+def _matrix(entries: list[NDArray], rows: int, columns: int) -> sparse.csr_array:
+    """Sum of matrices given by their entries."""
+    value, row, column = np.concatenate([np.zeros((3, 0)), *entries], axis=1)
+    places = (row.astype(np.int64), column.astype(np.int64))
+    return sparse.csr_array(sparse.coo_array((value, places), shape=(rows, columns)))

@@ -84,6 +84,8 @@ class Linearized:
         The same in N.
     internal : int
         Internal amplitudes of each panel.
+    inner : Amplitudes
+        All of them.
     """
 
     case: Case
@@ -97,9 +99,10 @@ class Linearized:
     inertia: NDArray
     soft: int
     secant: float | None
-    residual: float = 0.0
-    unbalanced: float = 0.0
-    internal: int = 0
+    residual: float
+    unbalanced: float
+    internal: int
+    inner: Amplitudes
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
@@ -108,6 +111,12 @@ class Linearized:
         full = np.zeros((size, motions.shape[1]), motions.dtype)
         full[self.free[on_nodes]] = motions[on_nodes]
         return self.case.constraints.displacement(full)
+
+    def between(self, motions: NDArray) -> NDArray:
+        """Displacements (3q, k) of the points `inner.points` in motions (nf, k)."""
+        full = np.zeros((self.inner.between.shape[1], motions.shape[1]), motions.dtype)
+        full[self.free] = motions
+        return self.inner.between @ self.case.constraints.displacement(full)
 
     def projected(self, force: NDArray) -> NDArray:
         """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
@@ -203,6 +212,7 @@ def linearize(
         residual=point.relative,
         unbalanced=point.balance.residual,
         internal=internal,
+        inner=inner,
     )
 
 

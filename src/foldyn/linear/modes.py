@@ -87,8 +87,10 @@ def modes(
         (phi' M phi = 1 kg m2, the entry of largest size positive), `rigid`, `rigid_share` (of the
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan where
         the frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the
-        state. Attributes: `free_mass` (kg along x, y, z), `complete` (how many of the lowest modes
-        are proven to be all there are), `soft_hinges`, `residual` of the state, `rounding` (a
+        state; with internal amplitudes also `internal_share`, their share of the strain energy,
+        which shapes at nodes do not show. Attributes: `free_mass` (kg along x, y, z), `complete`
+        (how many of the lowest modes are proven to be all there are), `soft_hinges`, `residual` of
+        the state, `rounding` (a
         bound on that of the eigenvalues, as a fraction) and facts about the computation.
 
     Raises
@@ -119,7 +121,7 @@ def modes(
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
-        "internal": linear.internal,
+        "internal": linear.internal or None,
         "free_dofs": pencil.finite,
         "free_mass": np.einsum("ia,ia->a", along, linear.mass @ along),
         "residual": linear.residual,
@@ -149,6 +151,7 @@ def _variables(
     factors = shapes.T @ (linear.mass @ along)
     full = linear.expanded(shapes).T
     return {
+        **(_internal(linear, shapes) if linear.internal else {}),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
         "shape": full.reshape(-1, *linear.displacement.shape),
@@ -158,6 +161,20 @@ def _variables(
         "participation": factors,
         "effective_mass": factors**2,
         "displacement": linear.displacement,
+    }
+
+
+def _internal(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
+    """What shapes (nf, k) do between the nodes of panels with internal amplitudes."""
+    inner = linear.free >= linear.case.body.size
+    strain = shapes * (linear.stiffness @ shapes)
+    whole, part = strain.sum(axis=0), strain[inner].sum(axis=0)
+    share = np.divide(part, whole, out=np.zeros_like(whole), where=np.abs(whole) > part)
+    points = linear.inner.points
+    return {
+        "internal_share": share,
+        "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),
+        "between_position": points,
     }
 
 

@@ -40,10 +40,13 @@ class PanelModes(NamedTuple):
     mass : (b + k, b + k)
         Of all its heights w: the heights of corners and center, the turns of creased edges, the
         amplitudes.
+    between : (q, b + k)
+        Heights by these in the middles of the edges, then of the spokes.
     """
 
     stiffness: NDArray
     mass: NDArray
+    between: NDArray
 
 
 @lru_cache(maxsize=4096)
@@ -66,10 +69,18 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     static = fine.solved([*fine.heights, *fine.slopes])[0] @ heights_and_slopes(panel)
     heights = np.column_stack([static, shapes[:, :count]])
     mass = heights.T @ (fine.mass @ heights)
-    out = PanelModes(value[:count].copy(), 0.5 * (mass + mass.T))
+    _, middle = cKDTree(fine.points).query(middles(panel))
+    out = PanelModes(value[:count].copy(), 0.5 * (mass + mass.T), heights[middle])
     for array in out:
         array.setflags(write=False)
     return out
+
+
+def middles(panel: Outline) -> NDArray:
+    """Middles (q, 2) of the edges of a panel, then of its spokes."""
+    x = np.array(panel.corners)
+    edges = 0.5 * (x + np.roll(x, -1, axis=0))
+    return np.concatenate([edges, 0.5 * (x + panel.center)]) if panel.center else edges
 
 
 def _partners(coarse: NDArray, fine: NDArray) -> NDArray:
