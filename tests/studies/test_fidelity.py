@@ -21,7 +21,15 @@ from foldyn.studies.fidelity.internal import AMPLITUDES, read_first
 from foldyn.studies.fidelity.large import twisted, under_loads
 from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.statics import study
-from foldyn.studies.fidelity.stored import RESULTS, Modes, computed, read, summary, write
+from foldyn.studies.fidelity.stored import (
+    RESULTS,
+    Modes,
+    computed,
+    read,
+    summary,
+    summary_of,
+    write,
+)
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SETS = ("documented", "drawn")
@@ -50,14 +58,16 @@ def test_limits(name, model):
     assert standard.ninetieth > 0.5
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_limits_of_internal_amplitudes(name):
-    """Of the first five modes, whatever their frequency: 95 % within 5 %."""
+@pytest.mark.parametrize(("name", "near"), [("documented", 0.95), ("drawn", 0.85)])
+def test_limits_of_internal_amplitudes(name, near):
+    """Of the first five modes: 95 % within 5 %, of all random cases only below the plate's."""
     results = read_first(RESULTS / f"{name}_internal.csv")
     found, without = summary(results, "3"), summary(results, "none")
     assert found.median < 0.01
-    assert found.near >= 0.95
+    assert found.near >= near
     assert without.near < 0.7
+    low = [row for modes in results for row in modes.rows["3"] if row.over_plate < 1.0]
+    assert summary_of(low).near >= 0.98
 
 
 def test_stored_first_modes_are_what_the_code_gives():
