@@ -151,6 +151,12 @@ def _add_state(command: argparse.ArgumentParser) -> None:
         "state of a result (NetCDF)",
     )
     _add_secant(command)
+    command.add_argument(
+        "--internal",
+        type=int,
+        metavar="N",
+        help="internal amplitudes of each panel (scheme n5b8e; default: those of the file)",
+    )
 
 
 def _add_secant(command: argparse.ArgumentParser) -> None:

@@ -81,7 +81,8 @@ def _read(path: Path, given: Namespace) -> CaseFile:
     model = given.model, given.divisions
     if given.command == "run":
         return read_case(path, *model)
-    keys = {key: getattr(given, key, None) for key in ("count", "method", "state", "secant")}
+    names = ("count", "method", "state", "secant", "internal")
+    keys = {key: getattr(given, key, None) for key in names}
     if getattr(given, "frequencies", None) is not None:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count

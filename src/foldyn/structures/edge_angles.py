@@ -22,8 +22,9 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.condensed_panel import outline, panel_stiffness
+from foldyn.structures.condensed_panel import panel_stiffness
 from foldyn.structures.mesh import hinge_angles, lengths
+from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
 STRAIGHT = 3.0
@@ -50,7 +51,7 @@ def edge_plates(
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     crease = edge_lookup(pattern.creases)
-    straight = _straight(nodes, folds, pattern, sheet)
+    panels = outlines(nodes, centers, folds, pattern, sheet, straight_edges, rigid)
     spokes = [len(face) if centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = len(folds) + np.concatenate([[0], np.cumsum(spokes)])
     rotations = np.full((len(folds), 2), -1)
@@ -58,22 +59,16 @@ def edge_plates(
     matrices: list[NDArray] = []
     count = 0
     for p, face in enumerate(pattern.faces):
-        if p in rigid:
+        panel = panels[p]
+        if panel is None:
             angles.append([])
             continue
-        edges = [crease.get(edge_of(a, b), -1) for a, b in around(face)]
         turned = list(range(first[p], first[p + 1]))
-        for k in (number for number in edges if number >= 0):
+        for k in (crease[edge_of(a, b)] for a, b in around(face) if edge_of(a, b) in crease):
             rotations[k, int(rotations[k, 0] >= 0)] = count
             turned.append(-1 - count)
             count += 1
         own = kinds[kind[p]]
-        center = nodes[centers[p]] if centers[p] >= 0 else None
-        held = [
-            bool(straight[k]) if k >= 0 else edge_of(a, b) in straight_edges
-            for k, (a, b) in zip(edges, around(face), strict=True)
-        ]
-        panel = outline(pattern.vertices[list(face)], center, [k >= 0 for k in edges], held)
         matrices.append(own.bending_modulus * panel_stiffness(panel, own.poissons_ratio))
         angles.append(turned)
     sizes = [len(turned) for turned in angles]
@@ -84,6 +79,29 @@ def edge_plates(
         entry=np.concatenate([[0], np.cumsum(np.square(sizes))]).astype(np.int64),
         stiffness=np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)]),
     )
+
+
+def outlines(
+    nodes: NDArray, centers: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet,
+    straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
+) -> list[Outline | None]:  # fmt: skip
+    """Outline of each panel; None of a rigid one. Arguments as of `edge_plates`."""
+    crease = edge_lookup(pattern.creases)
+    straight = _straight(nodes, folds, pattern, sheet)
+    found: list[Outline | None] = []
+    for p, face in enumerate(pattern.faces):
+        if p in rigid:
+            found.append(None)
+            continue
+        edges = [crease.get(edge_of(a, b), -1) for a, b in around(face)]
+        center = nodes[centers[p]] if centers[p] >= 0 else None
+        held = [
+            bool(straight[k]) if k >= 0 else edge_of(a, b) in straight_edges
+            for k, (a, b) in zip(edges, around(face), strict=True)
+        ]
+        x = pattern.vertices[list(face)]
+        found.append(outline(x, center, [k >= 0 for k in edges], held))
+    return found
 
 
 def _straight(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
