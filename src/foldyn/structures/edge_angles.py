@@ -50,7 +50,7 @@ def edge_plates(
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
     crease = edge_lookup(pattern.creases)
-    straight = _straight(nodes, folds, pattern, sheet)
+    straight = straight_creases(nodes, folds, pattern, sheet)
     spokes = [len(face) if centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = len(folds) + np.concatenate([[0], np.cumsum(spokes)])
     rotations = np.full((len(folds), 2), -1)
@@ -86,8 +86,8 @@ def edge_plates(
     )
 
 
-def _straight(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Which creases (nf,) stay straight."""
+def straight_creases(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Which creases (nf,) stay straight, for the hinges `folds` on them."""
     thickness = sheet.values("thickness", len(pattern.faces))[pattern.crease_faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, pattern.creases)
     return np.abs(np.sin(hinge_angles(nodes, folds))) > STRAIGHT * slender
