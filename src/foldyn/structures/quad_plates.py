@@ -10,8 +10,8 @@ Edges are straight, or free to bow. By Ritz: heights are polynomials in each of 
 eta of -1 to 1 that the corners span bilinearly (integrated Legendre polynomials, so that an edge
 without those of its own stays straight), and F is extrapolated from the two `DEGREES`. Between
 straight edges that meet at an angle alpha > pi/2 curvatures grow as r^(pi/alpha - 2), and errors
-fall with the power 4 (pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994); corners
-of free edges are about as bad as those of the angle `OBTUSE`.
+fall with the power 4 (pi/alpha - 1) of the degree (Babuska and Suri, SIAM Review 36, 1994), of the
+degree + 1 for low ones; corners of free edges are about as bad as those of the angle `OBTUSE`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> ND
     held = (own >= 0) & straight[:, own]
     coarse, fine = (_solved(energy, loads, held | (degree > d)) for d in DEGREES)
     power = 4.0 * (np.pi / np.maximum(_obtuse(x, straight), OBTUSE) - 1.0)
-    rest = 1.0 / ((DEGREES[1] / DEGREES[0]) ** power - 1.0)
+    rest = 1.0 / (((1 + DEGREES[1]) / (1 + DEGREES[0])) ** power - 1.0)
     return fine + rest[:, None, None] * (fine - coarse)
 
 
