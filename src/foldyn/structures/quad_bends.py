@@ -11,8 +11,10 @@ in which forces on the corners alone take the center to w0 = y w. With F the fle
 - forces alone twist both alike: kp, kq in proportion so that (1, y) H (1, y)^T = 1/F_ww;
 - in that twist the facets turn at the creases as the plate's edges do, s_k + y r_k = F_wk/F_ww, in
   the least squares of all creases: that sets y, and by y the ratio kp/kq, which `LARGEST` bounds;
-- a moment on a crease turns the edge it acts on by F_kk, of which F_ww (s_k + y r_k)^2 comes from
-  the twist and r_k^2/H_00 from the center; the rest is c.
+- moments on creases turn their edges as the plate's. Of the flexibility F_kl the twist gives
+  F_ww (s_k + y r_k) (s_l + y r_l) and the center r_k r_l/H_00; with R_kl the rest, c is R_kk, and
+  R_kk - R_kl where the opposite edge l is a crease too: in a folded sheet, which does not curl,
+  opposite creases of a panel have opposite moments.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ def quad_bends(
     turns, slopes = _facets(x, center)
     p, q = (np.einsum("nik,njk->nij", t, t) for t in (turns[:, :, ::2], turns[:, :, 1::2]))
     flexibility = flexibilities(x, straight, poissons_ratio)
-    twist, own = flexibility[:, 0, 0], np.diagonal(flexibility, axis1=1, axis2=2)[:, 1:]
+    twist = flexibility[:, 0, 0]
     rise = np.where(creased, slopes[:, 1], 0.0)  # r
     missing = flexibility[:, 0, 1:] / twist[:, None] - slopes[:, 0]
     square = (rise**2).sum(axis=1)
@@ -65,8 +67,12 @@ def quad_bends(
     bent = kp * _energy(p, y) + kq * _energy(q, y)
     kp, kq = kp / (bent * twist), kq / (bent * twist)
     lifted = np.where(hinged < 0, kp * p[:, 1, 1] + kq * q[:, 1, 1], np.inf)  # H_00
-    by_twist = twist[:, None] * (slopes[:, 0] + y[:, None] * slopes[:, 1]) ** 2
-    compliance = own - by_twist - slopes[:, 1] ** 2 / lifted[:, None]
+    by_twist = slopes[:, 0] + y[:, None] * slopes[:, 1]
+    rest = flexibility[:, 1:, 1:] - twist[:, None, None] * _products(by_twist)
+    rest -= _products(slopes[:, 1]) / lifted[:, None, None]
+    compliance = np.diagonal(rest, axis1=1, axis2=2).copy()
+    opposite = creased & np.roll(creased, 2, axis=1)
+    compliance -= np.where(opposite, rest[:, range(4), [2, 3, 0, 1]], 0.0)
     return np.stack([kp, kq, kp, kq], axis=1), np.where(creased, compliance.clip(0.0), 0.0)
 
 
@@ -92,6 +98,11 @@ def _shares(p: NDArray, q: NDArray, y: NDArray, hinged: NDArray) -> tuple[NDArra
     one = np.where(hinged == 1, 0.0, np.abs(push))
     other = np.where(hinged == 0, 0.0, np.abs(pull))
     return np.where(hinged == 0, 1.0, one), np.where(hinged == 1, 1.0, other)
+
+
+def _products(values: NDArray) -> NDArray:
+    """Products (n, 4, 4) of each two of the values (n, 4)."""
+    return values[:, :, None] * values[:, None, :]
 
 
 def _energy(matrix: NDArray, y: NDArray) -> NDArray:
