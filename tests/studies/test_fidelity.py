@@ -172,7 +172,7 @@ def test_large_loads():
     found = under_loads("case1", (0.1, 1.0))
     assert found["standard, superlinear"] == pytest.approx([0.085, -0.106], abs=2e-3)
     for law in ("plate, linear", "plate, plate_superlinear"):
-        assert abs(found[law]).max() < 5e-3
+        assert abs(found[law]).max() < 7e-3
     panel = twisted(60.0, 1.0, (1.0, 8.0))
     assert panel["plate, linear"] == pytest.approx([0.02, 0.20], abs=0.02)
     assert panel["standard, superlinear"] == pytest.approx([-0.13, 1.16], abs=0.02)

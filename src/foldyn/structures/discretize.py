@@ -14,11 +14,11 @@ from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
-from foldyn.structures import plate
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
+from foldyn.structures.plate import panel_plates
 from foldyn.structures.presets import resolved
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.sheet import Sheet
@@ -138,8 +138,8 @@ def discretize(
         )  # fmt: skip
         bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends))
     elif options.calibration == "plate":
-        folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
-        bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
+        plated = panel_plates(mesh, pattern, sheet, options.rigid)
+        folds, bends, large = plated.folds(folds), plated.bends, bends
         onset = plate_onset(bends, large)
 
     x = mesh.nodes

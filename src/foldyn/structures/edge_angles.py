@@ -87,7 +87,7 @@ def outlines(
 ) -> list[Outline | None]:  # fmt: skip
     """Outline of each panel; None of a rigid one. Arguments as of `edge_plates`."""
     crease = edge_lookup(pattern.creases)
-    straight = _straight(nodes, folds, pattern, sheet)
+    straight = straight_creases(nodes, folds, pattern, sheet)
     found: list[Outline | None] = []
     for p, face in enumerate(pattern.faces):
         if p in rigid:
@@ -104,8 +104,8 @@ def outlines(
     return found
 
 
-def _straight(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Which creases (nf,) stay straight."""
+def straight_creases(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Which creases (nf,) stay straight, for the hinges `folds` on them."""
     thickness = sheet.values("thickness", len(pattern.faces))[pattern.crease_faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, pattern.creases)
     return np.abs(np.sin(hinge_angles(nodes, folds))) > STRAIGHT * slender
