@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.generators import eggbox, kresling, miura, simple_fold
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.thick import thicken
@@ -17,6 +18,7 @@ GENERATORS: dict[str, Callable[..., Pattern]] = {
 __all__ = [
     "GENERATORS",
     "Boards",
+    "FlatFoldability",
     "Pattern",
     "eggbox",
     "kresling",
