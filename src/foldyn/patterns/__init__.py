@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.generators.arc_miura import arc_miura
 from foldyn.patterns.generators.curved_pleat import curved_pleat
 from foldyn.patterns.generators.eggbox import eggbox
@@ -44,6 +45,7 @@ GENERATORS: dict[str, Callable[..., Pattern]] = {
 __all__ = [
     "GENERATORS",
     "Boards",
+    "FlatFoldability",
     "Pattern",
     "arc_miura",
     "curved_pleat",
