@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.facets import welded
 from foldyn.patterns.generators import eggbox, kresling, miura, simple_fold
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.thick import thicken
@@ -23,4 +24,5 @@ __all__ = [
     "miura",
     "simple_fold",
     "thicken",
+    "welded",
 ]

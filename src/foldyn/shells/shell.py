@@ -185,7 +185,7 @@ class Shell(Discretized):
     @cached_property
     def edge_nodes(self) -> NDArray:
         """See `Discretized`; p is divisions + 1."""
-        ends = np.concatenate([self.pattern.creases, self.pattern.boundary]).reshape(-1, 2)
+        ends = self.pattern.lines
         count = self.options.divisions - 1
         inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)
         return read_only(np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1))

@@ -3,9 +3,11 @@
 The angles of a panel of m corners are the turns of its m spokes (none in a triangle) and, of each
 edge that is a crease, the turn beta of the sheet there against the facet of the spokes at that
 edge, averaged along the edge. Their energy 1/2 phi^T K phi is the least that a plate can have which
-goes through the corners and the center, keeps its creased edges straight and has these mean turns;
-other edges are free. The plate is made of triangles of constant curvature (Morley; in
-`mechanics.triangle`), twice, and K extrapolated in their size.
+goes through the corners and the center, keeps its straight edges straight and has these mean turns;
+other edges are free. An edge along which the sheet runs on into the next panel also has a bow: the
+mean distance of the sheet from the line between its ends, over its length. The plate is made of
+triangles of constant curvature (Morley; in `mechanics.triangle`), twice, and K extrapolated in
+their size.
 """
 
 from __future__ import annotations
@@ -36,12 +38,18 @@ class Outline(NamedTuple):
     center: tuple[float, float] | None  # m; None in a triangle
     creased: tuple[bool, ...]
     straight: tuple[bool, ...]
+    bowed: tuple[bool, ...]
 
 
 def outline(
-    x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool]
+    x: NDArray,
+    center: NDArray | None,
+    creased: list[bool],
+    straight: list[bool],
+    bowed: list[bool] | None = None,
 ) -> Outline:
     """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis."""
+    bowed = [False] * len(x) if bowed is None else bowed
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
     _, _, axes = np.linalg.svd(x - middle)
@@ -52,9 +60,8 @@ def outline(
     e = edge / np.linalg.norm(edge)
     flat = flat @ np.array([[e[0], -e[1]], [e[1], e[0]]]) / np.sqrt(np.linalg.norm(normal))
     rows = tuple((float(a), float(b)) for a, b in flat.round(DIGITS) + 0.0)
-    return Outline(
-        rows[: len(x)], None if center is None else rows[-1], tuple(creased), tuple(straight)
-    )
+    corners, middle = rows[: len(x)], None if center is None else rows[-1]
+    return Outline(corners, middle, tuple(creased), tuple(straight), tuple(bowed))
 
 
 @lru_cache(maxsize=4096)
@@ -62,7 +69,8 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     """Stiffness (q, q) of a panel's angles over its bending stiffness E t^3/(12 (1 - nu^2)).
 
     The angles: turns of the spokes, in the order of the corners (none in a triangle), then of the
-    creased edges, in their order. A turn is the increase of a dihedral, seen from the front.
+    creased edges, then the bows, in their order. A turn is the increase of a dihedral, seen from
+    the front, and a bow positive towards it.
     """
     coarse, fine = (_condensed(panel, poissons_ratio, n) for n in (COARSE, FINE))
     ratio = (FINE / COARSE) ** 2
@@ -71,16 +79,16 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     points = x if panel.center is None else np.concatenate([x, [panel.center]])
     corners = len(x)
     edges = np.flatnonzero(panel.creased)
-    held = np.zeros((len(stiffness), len(points) + len(edges)))  # of heights and turns beta
-    held[: len(points), : len(points)] = np.eye(len(points))
-    slope = _facet_slopes(points, corners)
-    held[len(points) :, : len(points)] = slope[edges]
-    held[len(points) :, len(points) :] = -np.eye(len(edges))
+    held = np.eye(len(stiffness))  # of heights, turns beta and bows
+    turning = slice(len(points), len(points) + len(edges))
+    held[turning, : len(points)] = _facet_slopes(points, corners)[edges]
+    held[turning, turning] *= -1.0
     stiffness = held.T @ stiffness @ held
     spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
-    turned = np.zeros((len(stiffness), len(spokes) + len(edges)))
+    others = len(stiffness) - len(points)
+    turned = np.zeros((len(stiffness), len(spokes) + others))
     turned[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
-    turned[len(points) :, len(spokes) :] = np.eye(len(edges))
+    turned[len(points) :, len(spokes) :] = np.eye(others)
     out = turned.T @ stiffness @ turned
     out = 0.5 * (out + out.T)
     out.setflags(write=False)
@@ -123,17 +131,17 @@ def _spoke_turns(points: NDArray, corners: int) -> NDArray:
 
 
 def _condensed(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
-    """Stiffness of the heights of corners and center and the mean outward slopes of creases."""
+    """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows."""
     plate = _Plate(panel, poissons_ratio, n)
-    return plate.solved([*plate.heights, *plate.slopes])[1]
+    return plate.solved([*plate.heights, *plate.slopes, *plate.bows])[1]
 
 
 class _Plate:
     """A panel as a plate of small triangles; n pieces of each edge, G = 1.
 
     Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
-    center), `slopes` (mean, outward, of creased edges) and `lines` (of points on straight edges off
-    the line between its ends) are linear functions of them: coefficients by number.
+    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (of points on straight
+    edges off the line between its ends) are linear functions of them: coefficients by number.
     """
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
@@ -143,7 +151,7 @@ class _Plate:
         self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
         number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
-        self.slopes, self.lines = [], []
+        self.slopes, self.bows, self.lines = [], [], []
         for k, nodes in enumerate(edge.tolist() for edge in edges):
             if panel.creased[k]:
                 mean = {
@@ -151,6 +159,11 @@ class _Plate:
                     for a, b in pairwise(nodes)
                 }
                 self.slopes.append(mean)
+            if panel.bowed[k]:
+                share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
+                ends = 0.5 * (1 - n) * share  # the line between them takes them off
+                inner = {node: share for node in nodes[1:-1]}
+                self.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
             if panel.straight[k]:
                 for step in range(1, n):
                     part = step / n

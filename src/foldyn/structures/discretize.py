@@ -123,31 +123,32 @@ def discretize(
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
-    outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
-    area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
+    area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
     bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
+    bends = np.concatenate([bends, calibrate.weld_stiffness(pattern, sheet)])
     plates = None
     if options.scheme == "n5b8e":
         every = range(len(pattern.faces))
         plates = edge_plates(
-            mesh.nodes, mesh.centers, mesh.folds, pattern, sheet, options.straight,
+            mesh, pattern, sheet, options.straight,
             every if isinstance(options.rigid, str) else options.rigid or (),
         )  # fmt: skip
-        bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends))
+        bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends) + len(mesh.welds))
     elif options.calibration == "plate":
         folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
-        bends, large = plate.bend_stiffness(mesh, pattern, sheet), bends
+        small = plate.bend_stiffness(mesh, pattern, sheet), plate.weld_stiffness(pattern, sheet)
+        bends, large = np.concatenate(small), bends
         onset = plate_onset(bends, large)
 
-    x = mesh.nodes
+    x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     structure = Structure(
         nodes=x,
-        bars=np.concatenate([mesh.inner, outer]),
+        bars=np.concatenate([mesh.inner, pattern.lines]),
         bar_area=area,
         sheet=sheet,
         options=options,
@@ -155,9 +156,9 @@ def discretize(
         folds=mesh.folds,
         fold_stiffness=folds,
         fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
-        bends=mesh.bends,
+        bends=hinges,
         bend_stiffness=bends,
-        bend_rest=hinge_angles(x, mesh.bends),
+        bend_rest=hinge_angles(x, hinges),
         bend_onset=onset,
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,

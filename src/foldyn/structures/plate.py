@@ -72,14 +72,24 @@ def fold_stiffness(
 
     Each fold acts in series with the two panels that its moment bends; rigid ones do not.
     """
-    free = _free_edges(pattern)
-    share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
+    share = _given_way(pattern, sheet)
     stiff = range(len(share)) if isinstance(rigid, str) else rigid or ()
     share[list(stiff)] = 0.0
     length = lengths(pattern.vertices, pattern.creases)
-    modulus = sheet.values("bending_modulus", len(pattern.faces))
-    panels = (share * pattern.face_areas / modulus)[pattern.crease_faces].sum(axis=1)
-    return crease / (1.0 + crease * panels / length**2)
+    return crease / (1.0 + crease * share[pattern.crease_faces].sum(axis=1) / length**2)
+
+
+def _given_way(pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Turn c A/G (np,), m2/(N m), of panels at an edge of length 1 under a moment of 1."""
+    free = _free_edges(pattern)
+    share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
+    return share * pattern.face_areas / sheet.values("bending_modulus", len(pattern.faces))
+
+
+def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole welds (nw,), N m/rad: that of a fold with a crease that does not turn."""
+    compliance, length = _given_way(pattern, sheet), lengths(pattern.vertices, pattern.welds)
+    return length**2 / compliance[pattern.weld_faces].sum(axis=1)
 
 
 def _free_edges(pattern: Pattern) -> set[tuple[int, ...]]:
