@@ -84,7 +84,7 @@ def test_shipped_cases_are_in_the_package():
         ("integrators.md", "dynamics.METHODS"),
         ("statics.md", "statics.METHODS"),
         ("statics.md", "statics.SOLVERS"),
-        ("formats.md", "formats.FORMATS"),
+        ("pattern-files.md", "formats.FORMATS"),
         ("histories.md", "cases.HISTORIES"),
     ],
 )

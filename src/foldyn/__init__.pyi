@@ -59,7 +59,11 @@ from foldyn.dynamics import (
     simulate as simulate,
 )
 from foldyn.experiment import fit as fit
-from foldyn.formats import read_pattern as read_pattern, write_pattern as write_pattern
+from foldyn.formats import (
+    diagnose as diagnose,
+    read_pattern as read_pattern,
+    write_pattern as write_pattern,
+)
 from foldyn.linear import (
     Fidelity as Fidelity,
     fidelity as fidelity,

@@ -8,11 +8,12 @@ histories. Numbers survive exactly.
 from __future__ import annotations
 
 import dataclasses
+import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ LAWS: Mapping[str, Mapping[str, type]] = {
     "fold_law": HINGE_LAWS,
     "bend_law": HINGE_LAWS,
 }
+T = TypeVar("T")
 PER_CREASE = ("crease_stiffness", "crease_rest")
 
 
@@ -84,8 +86,27 @@ def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) ->
     InputError
         The document is damaged.
     """
+    return _undamaged(_read, sections, arrays)
+
+
+def pattern_from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> Pattern:
+    """Pattern of a document, of which the rest may be what cannot be rebuilt.
+
+    Raises
+    ------
+    InputError
+        The document is damaged, or has no pattern.
+    """
+    if not sections.get("pattern"):
+        raise InputError("the stored case has no pattern")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        return _undamaged(_stored_pattern, sections["pattern"], arrays)
+
+
+def _undamaged(read: Callable[[Any], T], table: Any, arrays: Mapping[str, NDArray]) -> T:
     try:
-        return _read(_resolve(sections, arrays))
+        return read(_resolve(table, arrays))
     except InputError:
         raise
     except Exception as error:  # whatever a wrong number or table leads to
@@ -140,7 +161,27 @@ class _Writer:
             ),
             "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
             **self._boards(pattern.boards),
+            **self._more(pattern),
         }
+
+    def _more(self, pattern: Pattern) -> dict[str, Any]:
+        """What a pattern says of its creases beside their letters, where it says anything."""
+        table: dict[str, Any] = {}
+        if not np.isnan(pattern.fold_angles).all():
+            table["fold_angles"] = self._store("fold_angles", pattern.fold_angles)
+        if len(pattern.welds):
+            table["welds"] = self._store("welds", pattern.welds)
+        if pattern.families:
+            table["families"] = [
+                {"name": name, "creases": self._store(f"tables_family{i}_creases", rows)}
+                for i, (name, rows) in enumerate(pattern.families.items())
+            ]
+        if pattern.custom:
+            try:
+                table["custom"] = json.dumps(pattern.custom)
+            except (TypeError, ValueError):
+                self.obstacles.append("its pattern's custom data are not what JSON can hold")
+        return table
 
     def _boards(self, boards: Boards | None) -> dict[str, Any]:
         if boards is None:
@@ -243,10 +284,6 @@ def _read(sections: Mapping[str, Any]) -> Case:
 
 
 def _structure(sections: Mapping[str, Any]) -> Any:
-    table = sections["pattern"]
-    flat = table["faces"].tolist()
-    faces = [flat[start:end] for start, end in pairwise(table["face_offsets"].tolist())]
-    letters = [str(letter) for letter in table["assignments"]]
     model = dict(sections["model"])
     for name, laws in LAWS.items():
         if name in model:
@@ -254,10 +291,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
     nodes = sections["nodes"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
-        boards = None
-        if "board_corners" in table:
-            boards = Boards(table["face_offsets"], table["board_corners"], table["board_thickness"])
-        pattern = Pattern(table["vertices"], faces, letters, table["name"], boards)
+        pattern = _stored_pattern(sections["pattern"])
         sheet = sheet_from(sections["sheet"])
         kind = model.pop("kind", BARS_AND_HINGES)
         least = len(pattern.vertices) + len(pattern.edges) * (model.get("divisions", 1) - 1)
@@ -277,6 +311,23 @@ def _structure(sections: Mapping[str, Any]) -> Any:
             # panel centers given by hand, or computed to other last digits on another machine
             structure = discretize(pattern, sheet, **model, centers=centers)
     return structure
+
+
+def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
+    flat = table["faces"].tolist()
+    faces = [flat[start:end] for start, end in pairwise(table["face_offsets"].tolist())]
+    letters = [str(letter) for letter in table["assignments"]]
+    boards = None
+    if "board_corners" in table:
+        boards = Boards(table["face_offsets"], table["board_corners"], table["board_thickness"])
+    pattern = Pattern(
+        table["vertices"], faces, letters, table["name"], boards, table.get("fold_angles"),
+        custom=json.loads(table.get("custom", "{}")), welds=table.get("welds", ()),
+    )  # fmt: skip
+    if "families" not in table:
+        return pattern
+    named = {each["name"]: pattern.creases[each["creases"]] for each in table["families"]}
+    return pattern.changed(families=named)
 
 
 def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:

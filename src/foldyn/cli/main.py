@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from foldyn import __version__
+from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.options import add_results
@@ -26,7 +27,7 @@ from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-OTHERS = {"fit": run_fit, "track": track, "study": study}
+OTHERS = {"convert": convert, "fit": run_fit, "track": track, "study": study}
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
@@ -105,6 +106,7 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_secant(fidelity)
 
+    add_convert(commands)
     add_study(commands)
     add_fit(commands)
     add_track(commands)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from foldyn.formats.files import FORMATS, Format, read_pattern, write_pattern
+from foldyn.formats.files import FORMATS, Format, diagnose, read_pattern, write_pattern
+from foldyn.formats.frames import Frame
 
-__all__ = ["FORMATS", "Format", "read_pattern", "write_pattern"]
+__all__ = ["FORMATS", "Format", "Frame", "diagnose", "read_pattern", "write_pattern"]

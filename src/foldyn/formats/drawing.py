@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,13 +28,22 @@ class Drawing:
         Panels; None where the file has lines alone and the panels are to be found from them.
     meters : float, optional
         Length of the file's unit (m); None where the file does not say it.
+    assumed : float
+        Length (m) to take the unit for where neither the file nor the user says it.
+    unit : str
+        What the format calls its unit, for messages: "px".
     name : str
         Title.
     places : tuple of str
         Where each line is in the file ("line 12", "path 3"), for messages; () where its number
         says it.
-    repairs : tuple of str
-        What the reader put right, in words.
+    repairs, assumptions, doubts : tuple of str
+        What the reader put right, took for granted, and is not sure of, in words.
+    families : mapping
+        Names for groups of lines, each with pairs of vertex numbers.
+    welds : sequence, optional
+        Pairs of vertex numbers of the lines across which the sheet runs on, of a file that says
+        it of each of its flat lines.
     custom : mapping
         Further data, kept.
     """
@@ -45,7 +54,13 @@ class Drawing:
     fold_angles: NDArray[np.float64]
     faces: tuple[tuple[int, ...], ...] | None = None
     meters: float | None = None
+    assumed: float = 1.0
+    unit: str = "unit"
     name: str = ""
     places: tuple[str, ...] = ()
     repairs: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    families: Mapping[str, Sequence[tuple[int, int]]] = field(default_factory=dict)
+    welds: Sequence[tuple[int, int]] | None = None
     custom: Mapping[str, Any] = field(default_factory=dict)

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from foldyn.errors import InputError, within
-from foldyn.formats import fold
+from foldyn.errors import FoldynWarning, InputError, within
+from foldyn.formats import cp, cp_writer, dxf, dxf_writer, fold, obj, opx, stl, svg, svg_writer
+from foldyn.formats.building import Built, built
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.facets import with_facets
+from foldyn.formats.frames import Frame
+from foldyn.formats.kept import with_families, without_repetition
+from foldyn.formats.units import METERS
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
+from foldyn.values import choice, number
 from foldyn.writing import write_bytes
 
 MOST = 32
@@ -23,7 +31,7 @@ class Format:
     """A text format for patterns.
 
     Reading and writing work on text: opening, decoding and saving files, and naming the file
-    in messages, is done once for all formats.
+    in messages, is done once for all formats; so is all that makes a pattern of lines (`built`).
 
     Parameters
     ----------
@@ -32,31 +40,61 @@ class Format:
     extensions : tuple of str
         File extensions, lower case with the dot.
     read : callable or None
-        From the text of a file to a `Pattern`; raises `InputError` naming the field.
+        From the text of a file to a `Drawing`; raises `InputError` naming the place.
         None: the format is written only.
     write : callable or None
         From a `Pattern` to the text of a file. None: the format is read only.
+    frames : bool
+        Whether files hold several frames: `read` then takes the number or title of one as its
+        second argument, and `write` a sequence of `Frame`.
     """
 
     name: str
     extensions: tuple[str, ...]
-    read: Callable[[str], Pattern] | None = None
-    write: Callable[[Pattern], str] | None = None
+    read: Callable[..., Drawing] | None = None
+    write: Callable[..., str] | None = None
+    frames: bool = False
 
 
-_FORMATS = (Format("FOLD", (".fold",), read=fold.read, write=fold.write),)
+_FORMATS = (
+    Format("FOLD", (".fold",), read=fold.read, write=fold.write, frames=True),
+    Format("OBJ", (".obj",), read=obj.read, write=obj.write),
+    Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
+    Format("CP", (".cp",), read=cp.read, write=cp_writer.write),
+    Format("OPX", (".opx",), read=opx.read),
+    Format("DXF", (".dxf",), read=dxf.read, write=dxf_writer.write),
+    Format("STL", (".stl",), write=stl.write),
+)
 
 FORMATS: dict[str, Format] = {end: fmt for fmt in _FORMATS for end in fmt.extensions}
 """The format of each file extension."""
 
 
-def read_pattern(path: str | os.PathLike[str]) -> Pattern:
+def read_pattern(
+    path: str | os.PathLike[str],
+    scale: float | None = None,
+    unit: str | None = None,
+    frame: int | str | None = None,
+    facets: Literal["weld", "line", "hinge"] | None = None,
+) -> Pattern:
     """Read a pattern from a file; its extension determines the format.
 
     Parameters
     ----------
     path : path-like
         The file, for example "crane.fold"; `FORMATS` lists the extensions.
+    scale : float, optional
+        Factor on all lengths.
+    unit : str, optional
+        Unit of the file's coordinates, "mm" say, instead of what the file says of it. One that
+        says nothing is taken to be in meters.
+    frame : int or str, optional
+        Number or title of a frame, of a file that has several.
+    facets : {"weld", "line", "hinge"}, optional
+        What lines assigned "F" are. "weld": facets of a sheet that runs on across them; panels are
+        joined, as `welded` does. "line": facets, which stay as the `welds` of the pattern. "hinge":
+        creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
+        with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
 
     Returns
     -------
@@ -66,18 +104,64 @@ def read_pattern(path: str | os.PathLike[str]) -> Pattern:
     Raises
     ------
     InputError
-        No such file, an unknown extension, or content that is not a sound pattern; the message
-        names the file and the field.
+        No such file, an unknown extension, or content that is no pattern and cannot be repaired;
+        the message names the file and the place.
+
+    Warns
+    -----
+    FoldynWarning
+        What was assumed, with the pattern's size, what was repaired, and what may not be meant.
     """
+    pattern, diagnosis, _ = diagnose(path, scale, unit, frame, facets)
+    size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
+    for told in (
+        diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",
+        diagnosis.repairs and f"repaired: {'; '.join(diagnosis.repairs)}",
+        *diagnosis.doubts,
+    ):
+        if told:
+            warnings.warn(f"{path}: {told}", FoldynWarning, stacklevel=2)
+    return pattern
+
+
+def diagnose(
+    path: str | os.PathLike[str],
+    scale: float | None = None,
+    unit: str | None = None,
+    frame: int | str | None = None,
+    facets: Literal["weld", "line", "hinge"] | None = None,
+) -> Built:
+    """Read a pattern as `read_pattern` does, and return what it says of it instead of warning.
+
+    Returns
+    -------
+    Built
+        The `pattern`, and the `diagnosis`: what was assumed, repaired and doubted. Its text is
+        that of ``foldyn convert --check``.
+
+    Raises
+    ------
+    InputError
+        As `read_pattern`.
+    """
+    meters = None if unit is None else METERS[choice("unit", unit, METERS)]
+    factor = 1.0 if scale is None else number("scale", scale, above=0.0)
     file, fmt = _file_and_format(path)
     if fmt.read is None:
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
+    if frame is not None and not fmt.frames:
+        raise InputError(f": {fmt.name} files have no frames; leave it out", "frame", file)
     text = read_text(file, f"a {fmt.name} file", MOST, "leave out all but the pattern")
     with within("", file):
-        return fmt.read(text)
+        drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
+        made = built(drawing, meters=meters, scale=factor)
+        made = with_families(without_repetition(made), drawing)
+        return with_facets(made, drawing, facets)
 
 
-def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
+def write_pattern(
+    path: str | os.PathLike[str], pattern: Pattern, frames: Sequence[Frame] = ()
+) -> None:
     """Write a pattern to a file; its extension determines the format.
 
     The whole text is made first and the file put in place in one step, so that a failure
@@ -89,6 +173,9 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
         The file to make or to replace; its directory must exist.
     pattern : Pattern
         What to write.
+    frames : sequence of Frame, optional
+        States of the pattern, for formats that hold several; `fd.results.frames_of` makes them of
+        a result.
 
     Raises
     ------
@@ -100,7 +187,11 @@ def write_pattern(path: str | os.PathLike[str], pattern: Pattern) -> None:
         raise InputError(f"{file}: {fmt.name} files can be read but not written.")
     if not isinstance(pattern, Pattern):
         raise InputError(f"pattern = {pattern!r}: give a Pattern to write.")
-    content = fmt.write(pattern).encode()
+    if frames and not fmt.frames:
+        able = ", ".join(end for end, each in FORMATS.items() if each.frames)
+        raise InputError(f": {fmt.name} files hold one state; write {able}", "frames", file)
+    with within("", file):
+        content = fmt.write(pattern, *((frames,) if fmt.frames else ())).encode()
     try:
         write_bytes(file, content)
     except (OSError, ValueError) as error:

@@ -1,120 +1,326 @@
-"""FOLD (Flexible Origami List Datastructure), specification 1.x, with given faces.
+"""FOLD (Flexible Origami List Datastructure), specifications 1.0 to 1.2.
 
-Only the key frame is read: the fields at the top level of the file. The geometry comes from
-`vertices_coords` and `faces_vertices`, the letters of creases from `edges_assignment`;
-`edges_foldAngle` is written but not read: the vertices say how far a crease is folded.
-Source of the format: https://github.com/edemaine/fold (doc/spec.md).
+Source of the format: https://github.com/edemaine/fold (doc/spec.md). Read are, of one frame, the
+coordinates, edges with their assignments and fold angles, faces where they are given, the unit and
+what other programs have put in (keys with a colon).
 """
 
 from __future__ import annotations
 
 import json
 import re
-import warnings
-from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import InputError
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.frames import Frame, fold_angles
+from foldyn.formats.units import METERS
+from foldyn.formats.writers import is_plane, letters, warn_of_boards
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
-from foldyn.patterns.geometry import seams
-from foldyn.patterns.topology import Edge, edge_lookup, edge_of
+from foldyn.patterns.topology import edge_lookup
+from foldyn.values import choice, show
 
-_ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
-# Units per meter of `frame_unit`; "unit" means none, taken as meters.
-_PER_METER = {
-    "unit": 1.0,
-    "m": 1.0,
-    "cm": 1e2,
-    "mm": 1e3,
-    "um": 1e6,
-    "nm": 1e9,
-    "in": 1 / 0.0254,
-    "pt": 72 / 0.0254,
-}
-_FIELDS = {
-    "vertices": "vertices_coords",
-    "faces": "faces_vertices",
-    "assignments": "edges_assignment",
-}
+ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
+FAMILIES = "foldyn:families"
+"""Key of the families of creases, as lists of vertex pairs by name."""
+WELDS = "foldyn:welds"
+"""Key of the flat edges that are no hinges, as vertex pairs; the other flat ones are."""
+_OLD = {"edges_foldAngles": "edges_foldAngle", "edges_lengths": "edges_length"}  # spec 1.0
+_COMMA = re.compile(r'("(?:[^"\\]|\\.)*+")|,(?=\s*+[\]}])')
+_OF_ELEMENTS = re.compile(r"(?:vertices|edges|faces)_")
+_ANCESTORS = 1000
 
 
-def read(text: str) -> Pattern:
-    """Pattern of the key frame of a FOLD file.
+def read(text: str, frame: int | str | None = None) -> Drawing:
+    """Drawing of one frame of a FOLD file.
 
     Parameters
     ----------
     text : str
         The file's content.
+    frame : int or str, optional
+        Number of the frame (0 is the key frame, the top level of the file) or its title; by
+        default the key frame.
 
     Returns
     -------
-    Pattern
-        Coordinates in meters: `frame_unit` is converted; absent or "unit" counts as meters.
-        Creases that the file does not list get the letter of their dihedral.
+    Drawing
+        With faces where the file has them. Edges of faces without an assignment are left out:
+        they get the letter of their dihedral.
 
     Raises
     ------
     InputError
-        Not a FOLD file, or one without faces, or inconsistent; the message names the field.
-
-    Warns
-    -----
-    FoldynWarning
-        Parts of the file that a pattern cannot hold (edges of no face, a mountain or valley on
-        the boundary, an unknown unit) and letters that contradict the geometry.
+        Not a FOLD file, no such frame, or inconsistent; the message names the field.
     """
-    frame = _frame(text)
-    vertices = _vertices(frame) / _scale(frame.get("frame_unit", "unit"))
-    faces = _list(frame, "faces_vertices")
-    title = frame.get("frame_title") or frame.get("file_title") or ""
+    document, repairs = _document(text)
+    fields = _frame(document, frame)
+    for field, what in (("vertices_coords", "coordinates"), ("edges_vertices", "edges")):
+        if field not in fields and not (what == "edges" and "faces_vertices" in fields):
+            raise InputError(f"{field} is missing: {_with_field(document, field, what)}.")
+    vertices = _vertices(_list(fields, "vertices_coords"))
+    faces = _faces(fields, len(vertices))
+    edges, assignments, angles = _edges(fields, len(vertices), faces is not None)
+    custom, dropped = _custom(fields)
+    if dropped:
+        repairs.append(f"{', '.join(dropped)} left out: they list elements by number")
+    unit = fields.get("frame_unit", document.get("frame_unit", "unit"))
+    if unit != "unit" and not (isinstance(unit, str) and unit in METERS):
+        repairs.append(f"frame_unit = {show(unit)} is unknown, and left out")
+        unit = "unit"
+    title = fields.get("frame_title") or document.get("file_title") or ""
+    places = tuple(f"edges_vertices[{e}]" for e in range(len(assignments)))
+    return Drawing(
+        vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
+        places=places, repairs=tuple(repairs),
+        families=_families(fields.get(FAMILIES, {}), len(vertices)),
+        welds=_welds(fields, len(vertices)), custom=custom,
+    )  # fmt: skip
+
+
+def _document(text: str) -> tuple[dict[str, Any], list[str]]:
+    """Top level of the file, and what had to be repaired to read it."""
+    repairs = []
     try:
-        # Twice, as only sound faces tell which listed edges are creases.
-        with warnings.catch_warnings():  # what the second one says again
-            warnings.simplefilter("ignore", FoldynWarning)
-            bare = Pattern(vertices, faces)
-        letters = _letters(frame, bare)
-        return Pattern(vertices, faces, letters, name=str(title))
+        document = from_json(text)
     except InputError as error:
-        message = re.sub(r"^\w+", lambda m: _FIELDS.get(m[0], m[0]), str(error))
-        raise InputError(message) from None
+        mended = _COMMA.sub(lambda found: found[1] or "", text)
+        count = len(text) - len(mended)
+        try:
+            document = from_json(mended if count else text)
+        except InputError:
+            raise InputError(f"{error}, as a FOLD file must be.") from None
+        repairs.append(f"{count} comma{'s' if count > 1 else ''} before a closing bracket removed")
+    if not isinstance(document, dict):
+        raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
+    return document, repairs
 
 
-def write(pattern: Pattern) -> str:
-    """Text of a FOLD file; reading it gives the same pattern to the last digit.
+def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]:
+    """Fields of a frame, with those that it inherits."""
+    others = document.get("file_frames", [])
+    if not isinstance(others, list) or not all(isinstance(each, dict) for each in others):
+        raise InputError("file_frames must be a list of JSON objects, one for each frame.")
+    frames = [
+        {key: value for key, value in document.items() if key != "file_frames"},
+        *others,
+    ]
+    number = _number(frames, chosen)
+    fields: dict[str, Any] = {}
+    seen: set[int] = set()
+    while True:
+        if number in seen or len(seen) > _ANCESTORS:
+            raise InputError(
+                f"file_frames[{number - 1}].frame_parent: the frame inherits from itself; correct "
+                "its frame_parent."
+            )
+        seen.add(number)
+        own = {_OLD.get(key, key): value for key, value in frames[number].items()}
+        fields = {**own, **fields}
+        if number == 0 or own.get("frame_inherit") is not True:
+            return fields
+        parent = own.get("frame_parent", 0)
+        if type(parent) is not int or not 0 <= parent < len(frames):
+            raise InputError(
+                f"file_frames[{number - 1}].frame_parent = {show(parent)}: give the number of a "
+                f"frame, from 0 to {len(frames) - 1}."
+            )
+        number = parent
+
+
+def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
+    """Number of the frame that is asked for."""
+    if chosen is None:
+        return 0
+    titles = [each.get("frame_title", "") for each in frames]
+    if isinstance(chosen, str):
+        found = [k for k, title in enumerate(titles) if title == chosen]
+        if len(found) == 1:
+            return found[0]
+        has = f"{len(found)} frames" if found else "no frame"
+        known = ", ".join(show(title) for title in titles[:12] if title) or "none"
+        raise InputError(
+            f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
+        )
+    if isinstance(chosen, bool) or not isinstance(chosen, int) or not 0 <= chosen < len(frames):
+        raise InputError(
+            f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
+            "numbers or a title",
+            "frame",
+        )
+    return chosen
+
+
+def _with_field(document: dict[str, Any], field: str, what: str) -> str:
+    """Say which frames have a field, or how to get it."""
+    frames = document.get("file_frames") or []
+    having = [str(k) for k, each in enumerate(frames, 1) if field in each]
+    if not having:
+        return f"export the pattern with its {what}"
+    listed = ", ".join(having[:6]) + (", ..." if len(having) > 6 else "")
+    return f"only other frames have it; choose one by frame = {listed}"
+
+
+def _list(fields: dict[str, Any], name: str) -> list[Any]:
+    value = fields[name]
+    if not isinstance(value, list):
+        raise InputError(f"{name} must be a list, not {show(value)}.")
+    return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _vertices(rows: list[Any]) -> NDArray[np.float64]:
+    vertices = np.zeros((len(rows), 3))
+    for v, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) not in (2, 3) or not all(map(_is_number, row)):
+            raise InputError(
+                f"vertices_coords[{v}] = {show(row)}: give 2 or 3 numbers for each vertex."
+            )
+        try:
+            vertices[v, : len(row)] = row
+        except OverflowError:
+            vertices[v] = np.inf
+        if not np.isfinite(vertices[v]).all():
+            raise InputError(
+                f"vertices_coords[{v}] = {show(row)}: coordinates must be finite numbers."
+            )
+    return vertices
+
+
+def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | None:
+    if "faces_vertices" not in fields:
+        return None
+    faces = []
+    for f, face in enumerate(_list(fields, "faces_vertices")):
+        if not isinstance(face, list) or not all(type(v) is int and 0 <= v < count for v in face):
+            raise InputError(
+                f"faces_vertices[{f}] = {show(face)}: give vertex numbers from 0 to {count - 1}."
+            )
+        faces.append(tuple(face))
+    return tuple(faces) or None  # some programs write an empty list
+
+
+def _edges(
+    fields: dict[str, Any], count: int, with_faces: bool
+) -> tuple[NDArray[np.int64], tuple[str, ...], NDArray[np.float64]]:
+    """Edges with their letters and fold angles (degrees)."""
+    lists = {"edges_assignment": "U", "edges_foldAngle": None}
+    if "edges_vertices" not in fields:
+        orphan = next((name for name in lists if name in fields), None)
+        if orphan is not None:
+            raise InputError(f"edges_vertices is missing: {orphan} has nothing to refer to.")
+        return np.zeros((0, 2), dtype=np.int64), (), np.zeros(0)
+    edges = _list(fields, "edges_vertices")
+    for name in lists:
+        if name in fields and len(_list(fields, name)) != len(edges):
+            raise InputError(
+                f"{name} has {len(fields[name])} entries for {len(edges)} in edges_vertices: "
+                "give one for each edge."
+            )
+    given_letters = fields.get("edges_assignment", [None] * len(edges))
+    given_angles = fields.get("edges_foldAngle", [None] * len(edges))
+    pairs, assignments, angles = [], [], []
+    for e, edge in enumerate(edges):
+        pair, angle = _pair(f"edges_vertices[{e}]", edge, count), _angle(e, given_angles[e])
+        letter = given_letters[e]
+        if "edges_assignment" in fields:
+            letter = _letter(e, letter)
+        elif not np.isnan(angle) and angle != 0.0:
+            letter = "V" if angle > 0.0 else "M"
+        elif not with_faces:
+            letter = "U"
+        if letter is not None:
+            pairs.append(pair)
+            assignments.append(letter)
+            angles.append(angle)
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2), tuple(assignments), np.array(angles)
+
+
+def _pair(field: str, edge: Any, count: int) -> tuple[int, int]:
+    pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
+    if not pair or not all(type(v) is int and 0 <= v < count for v in edge):
+        raise InputError(
+            f"{field} = {show(edge)}: give two different vertex numbers from 0 to {count - 1}."
+        )
+    return edge[0], edge[1]
+
+
+def _letter(e: int, letter: Any) -> str:
+    return choice(f"edges_assignment[{e}]", letter, ASSIGNMENTS)
+
+
+def _angle(e: int, angle: Any) -> float:
+    if angle is None:
+        return np.nan
+    if not _is_number(angle) or not abs(angle) <= 180.0 + 1e-9:
+        raise InputError(
+            f"edges_foldAngle[{e}] = {show(angle)}: give degrees from -180 (a closed mountain) to "
+            "180 (a closed valley), or null."
+        )
+    return min(max(float(angle), -180.0), 180.0)
+
+
+def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Data of other programs, and the keys of those that would not fit a repaired pattern."""
+    keys = [key for key in fields if ":" in key and key not in (FAMILIES, WELDS)]
+    dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
+    return {key: fields[key] for key in keys if key not in dropped}, dropped
+
+
+def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
+    """Vertex pairs of the creases of each family."""
+    if not isinstance(given, dict) or not all(isinstance(pairs, list) for pairs in given.values()):
+        raise InputError(f"{FAMILIES}: give a list of vertex pairs for each name.")
+    return {
+        name: [_pair(f"{FAMILIES}[{show(name)}][{k}]", pair, count) for k, pair in enumerate(pairs)]
+        for name, pairs in given.items()
+    }
+
+
+def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
+    """Vertex pairs of the welds; None in a file that says nothing of them."""
+    if WELDS not in fields:
+        return None
+    return [_pair(f"{WELDS}[{k}]", pair, count) for k, pair in enumerate(_list(fields, WELDS))]
+
+
+def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
+    """Text of a FOLD file (1.2); reading it gives the same pattern to the last digit.
 
     Parameters
     ----------
     pattern : Pattern
-        What to write.
+        What to write: the key frame. Its fold angles are those to fold to, where they are given,
+        or else those at which a folded pattern is; a flat one without angles has none.
+    frames : sequence of Frame, optional
+        Further states, which inherit all but coordinates and fold angles from the key frame.
 
     Returns
     -------
     str
         JSON with vertices (two coordinates when all z are 0), faces, edges, their assignment
-        and fold angle (180 minus the dihedral, degrees; 0 on the boundary), in meters.
+        and fold angle (degrees, valleys positive; 0 on the boundary), in meters.
     """
-    if pattern.boards is not None:
-        warnings.warn(
-            "pattern: the file has no place for the thickness of its panels and holds the planes "
-            "through their hinge lines; write the thin pattern, and thicken what is read",
-            FoldynWarning,
-            stacklevel=4,
-        )
-    flat = not np.any(pattern.vertices[:, 2])
-    folded = bool(np.any(np.abs(pattern.dihedrals - np.pi) > 1e-6)) or not flat
+    warn_of_boards(pattern)
+    flat = is_plane(pattern)
+    folded = not flat or bool(np.any(np.abs(pattern.flat_dihedrals - pattern.dihedrals) > 1e-6))
     row = edge_lookup(pattern.creases)
-    pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
-    cuts = {edge for pair in pairs for edge in pair}
-    edges = [edge_of(a, b) for a, b in pattern.edges.tolist()]
-    rows = [row.get(edge) for edge in edges]
-    angles = 180.0 - np.degrees(pattern.dihedrals) + np.degrees(pattern.flat_dihedrals - np.pi)
+    edges = letters(pattern)
+    rows = [row.get(edge) for edge, *_ in edges]
+    wanted = pattern.fold_angles
+    angles = fold_angles(pattern) if np.isnan(wanted).all() and folded else wanted
     fields: dict[str, Any] = {
-        "file_spec": 1.1,
+        "file_spec": 1.2,
         "file_creator": "Foldyn",
-        "file_classes": ["singleModel"],
+        "file_classes": ["animation" if frames else "singleModel"],
         **({"frame_title": pattern.name} if pattern.name else {}),
         "frame_classes": ["foldedForm" if folded else "creasePattern"],
         "frame_attributes": ["2D" if flat else "3D"],
@@ -122,13 +328,41 @@ def write(pattern: Pattern) -> str:
         "vertices_coords": pattern.vertices[:, : 2 if flat else 3].tolist(),
         "faces_vertices": [list(face) for face in pattern.faces],
         "edges_vertices": pattern.edges.tolist(),
-        "edges_assignment": [
-            pattern.assignments[k] if k is not None else "C" if edge in cuts else "B"
-            for k, edge in zip(rows, edges, strict=True)
-        ],
-        "edges_foldAngle": [0.0 if k is None else float(angles[k]) for k in rows],
+        "edges_assignment": [letter for _, letter, _ in edges],
+        **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
+        **({FAMILIES: _named(pattern)} if pattern.families else {}),
+        **({WELDS: pattern.welds.tolist()} if any(letter == "F" for _, letter, _ in edges) else {}),
+        **pattern.custom,
     }
-    return "{\n" + ",\n".join(f"  {json.dumps(k)}: {_json(v)}" for k, v in fields.items()) + "\n}\n"
+    lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in fields.items()]
+    if frames:
+        inside = ",\n".join(f"    {json.dumps(_state(pattern, f, rows))}" for f in frames)
+        lines.append(f'  "file_frames": [\n{inside}\n  ]')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _state(pattern: Pattern, frame: Frame, rows: Sequence[int | None]) -> dict[str, Any]:
+    """Fields of a frame that inherits the rest from the key frame."""
+    return {
+        "frame_title": frame.title,
+        "frame_classes": ["foldedForm"],
+        "frame_attributes": ["3D"],
+        "frame_parent": 0,
+        "frame_inherit": True,
+        "vertices_coords": frame.vertices.tolist(),
+        "edges_foldAngle": _degrees(fold_angles(pattern, frame.vertices), rows),
+    }
+
+
+def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
+    """Angles of all edges, given those of the creases; 0 on the boundary, None where unknown."""
+    found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
+    return [None if np.isnan(angle) else angle for angle in found]
+
+
+def _named(pattern: Pattern) -> dict[str, list[list[int]]]:
+    """Vertex pairs of the creases of each family."""
+    return {name: pattern.creases[rows].tolist() for name, rows in pattern.families.items()}
 
 
 def _json(value: Any) -> str:
@@ -136,123 +370,3 @@ def _json(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], list):
         return "[\n" + ",\n".join(f"    {json.dumps(row)}" for row in value) + "\n  ]"
     return json.dumps(value)
-
-
-def _frame(text: str) -> dict[str, Any]:
-    try:
-        frame = from_json(text)
-    except InputError as error:
-        raise InputError(f"{error}, as a FOLD file must be.") from None
-    if not isinstance(frame, dict):
-        raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
-    for field, what in (("vertices_coords", "coordinates"), ("faces_vertices", "faces")):
-        if field not in frame:
-            hint = f"export the pattern with its {what}"
-            frames = frame.get("file_frames")
-            if isinstance(frames, list) and any(isinstance(f, dict) and field in f for f in frames):
-                hint = (
-                    "only other frames (file_frames) have it, and only the key frame is read: "
-                    "export the wanted frame as a file of its own"
-                )
-            raise InputError(f"{field} is missing: {hint}.")
-    return frame
-
-
-def _list(frame: dict[str, Any], field: str) -> list[Any]:
-    value = frame[field]
-    if not isinstance(value, list):
-        raise InputError(f"{field} must be a list, not {_short(value)}.")
-    return value
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _vertices(frame: dict[str, Any]) -> np.ndarray:
-    rows = _list(frame, "vertices_coords")
-    result = np.zeros((len(rows), 3))
-    for v, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) not in (2, 3) or not all(map(_is_number, row)):
-            raise InputError(
-                f"vertices_coords[{v}] = {_short(row)}: give 2 or 3 numbers for each vertex."
-            )
-        try:
-            result[v, : len(row)] = row
-        except OverflowError:
-            result[v] = np.inf
-        if not np.isfinite(result[v]).all():
-            raise InputError(
-                f"vertices_coords[{v}] = {_short(row)}: coordinates must be finite numbers."
-            )
-    return result
-
-
-def _scale(unit: Any) -> float:
-    if isinstance(unit, str) and unit in _PER_METER:
-        return _PER_METER[unit]
-    warnings.warn(
-        f"frame_unit = {_short(unit)} is unknown: coordinates are taken as meters; known units "
-        f"are {', '.join(_PER_METER)}.",
-        FoldynWarning,
-        stacklevel=5,
-    )
-    return 1.0
-
-
-def _letters(frame: dict[str, Any], bare: Pattern) -> dict[Edge, str]:
-    """Letters of the creases, and "B" for edges that meet others without being joined."""
-    if "edges_assignment" not in frame and "edges_vertices" not in frame:
-        return {}
-    if "edges_vertices" not in frame:
-        raise InputError("edges_vertices is missing: edges_assignment has nothing to refer to.")
-    edges = _list(frame, "edges_vertices")
-    for field in ("edges_assignment", "edges_foldAngle"):
-        if field in frame and len(_list(frame, field)) != len(edges):
-            raise InputError(
-                f"{field} has {len(frame[field])} entries for {len(edges)} in edges_vertices: "
-                "give one for each edge."
-            )
-    pairs = [_pair(e, edge, len(bare.vertices)) for e, edge in enumerate(edges)]
-    creases, boundary = edge_lookup(bare.creases), edge_lookup(bare.boundary)
-    letters: dict[Edge, str] = {}
-    ignored: Counter[str] = Counter()
-    for e, pair in enumerate(pairs):
-        letter = frame["edges_assignment"][e] if "edges_assignment" in frame else None
-        if letter is not None and letter not in _ASSIGNMENTS:
-            raise InputError(
-                f"edges_assignment[{e}] = {_short(letter)}: give one of {', '.join(_ASSIGNMENTS)}."
-            )
-        if pair in creases:
-            if letter is not None and letters.setdefault(pair, letter) != letter:
-                raise InputError(
-                    f"edges_assignment[{e}]: edge {pair} is given both {letters[pair]!r} and "
-                    f"{letter!r}; list it once."
-                )
-        elif pair not in boundary:
-            ignored["belong to no face"] += 1
-        elif letter == "C" or (letter == "B" and bare.vertices[:, 2].any()):
-            letters[pair] = "B"  # a cut, or edges that meet where the sheet is folded
-        elif letter in ("M", "V"):
-            ignored["are mountains or valleys although only one face has them"] += 1
-    for what, count in ignored.items():
-        warnings.warn(
-            f"edges_vertices: {count} edges {what}; they are ignored.", FoldynWarning, stacklevel=5
-        )
-    return letters
-
-
-def _pair(e: int, edge: Any, n_vertices: int) -> Edge:
-    known = range(n_vertices)
-    pair = isinstance(edge, list) and len(edge) == 2 and edge[0] != edge[1]
-    if not pair or not all(type(v) is int and v in known for v in edge):
-        raise InputError(
-            f"edges_vertices[{e}] = {_short(edge)}: give two different vertex numbers from 0 to "
-            f"{n_vertices - 1}."
-        )
-    return edge_of(*edge)

@@ -22,7 +22,9 @@ COPLANAR = 1e-3  # rad: panels that turn by less lie in one plane, as coordinate
 STRAIGHT = np.radians(15.0)  # corners that turn by less divide an edge
 
 
-def welded(pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None) -> Pattern:
+def welded(
+    pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None, join: bool = True
+) -> Pattern:
     """Pattern whose facets are no creases.
 
     Panels in one plane (within 1e-3 rad) are joined across a facet where that makes a convex
@@ -34,7 +36,10 @@ def welded(pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None) ->
     ----------
     pattern : Pattern
     facets : iterable of (vertex, vertex), optional
-        Creases that are facets; without it all that are assigned "F".
+        Creases that are facets; without it all that are assigned "F". Welds that are there already
+        are facets too.
+    join : bool
+        Whether to join panels; otherwise all facets become welds.
 
     Returns
     -------
@@ -56,32 +61,31 @@ def welded(pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None) ->
     if not isinstance(pattern, Pattern):
         raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
     rows = _rows(pattern, facets)
-    if pattern.boards is not None and len(rows):
+    edges = np.concatenate([pattern.creases[rows], pattern.welds])
+    if pattern.boards is not None and len(edges):
         raise InputError(
             ": thick panels are boards of their own; weld the thin pattern, then thicken it",
             "facets",
         )
-    flat = np.abs(pattern.dihedrals[rows] - np.pi) <= COPLANAR
-    length = np.linalg.norm(np.diff(pattern.vertices[pattern.creases], axis=1)[:, 0], axis=1)
-    order = rows[flat][np.lexsort((rows[flat], -length[rows[flat]].round(12)))]
-    joined = _joined(pattern, order.tolist())
-    faces = tuple(face for face in joined if face)
-    edges = {frozenset(edge) for face in faces for edge in around(face)}
-    left = [pair for pair in pattern.creases[rows].tolist() if frozenset(pair) in edges]
+    beside = np.concatenate([pattern.crease_faces[rows], pattern.weld_faces])
+    turned = np.concatenate([pattern.dihedrals[rows], pattern.weld_dihedrals]) - np.pi
+    length = np.linalg.norm(np.diff(pattern.vertices[edges], axis=1)[:, 0], axis=1)
+    order = np.lexsort((edges[:, 1], edges[:, 0], -length.round(12)))
+    flat = order[np.abs(turned[order]) <= COPLANAR] if join else order[:0]
+    faces = _joined(pattern, edges[flat].tolist(), beside[flat].tolist())
+    sides = {frozenset(side) for face in faces for side in around(face)}
     kept = np.setdiff1d(np.arange(len(pattern.creases)), rows)
-    return Pattern(
-        pattern.vertices,
-        faces,
-        {_pair(pattern.creases[k]): pattern.assignments[k] for k in kept.tolist()},
-        pattern.name,
-        pattern.boards,
-        {_pair(pattern.creases[k]): pattern.fold_angles[k] for k in kept.tolist()},
-        {
-            name: [_pair(pair) for pair in pattern.creases[np.intersect1d(members, kept)]]
-            for name, members in pattern.families.items()
-        },
-        pattern.custom,
-        [*map(_pair, pattern.welds), *map(_pair, left)],
+    creases = [_pair(pair) for pair in pattern.creases[kept].tolist()]
+    families = {
+        name: pattern.creases[np.intersect1d(members, kept)].tolist()
+        for name, members in pattern.families.items()
+    }
+    return pattern.changed(
+        faces=faces,
+        assignments=dict(zip(creases, np.array(pattern.assignments)[kept].tolist(), strict=True)),
+        fold_angles=dict(zip(creases, pattern.fold_angles[kept].tolist(), strict=True)),
+        families={name: members for name, members in families.items() if members},
+        welds=[pair for pair in edges.tolist() if frozenset(pair) in sides],
     )
 
 
@@ -109,8 +113,10 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     return np.array(sorted(rows), dtype=np.int64)
 
 
-def _joined(pattern: Pattern, order: Sequence[int]) -> list[tuple[int, ...]]:
-    """Faces, joined across creases in their order; () in the place of those that are part of one.
+def _joined(
+    pattern: Pattern, edges: Sequence[Sequence[int]], beside: Sequence[Sequence[int]]
+) -> list[tuple[int, ...]]:
+    """Faces, joined across edges in their order, given the two faces beside each.
 
     A joined face has the place, the first corner and the plane of the first of its parts.
     """
@@ -121,14 +127,14 @@ def _joined(pattern: Pattern, order: Sequence[int]) -> list[tuple[int, ...]]:
             face = part_of[face]
         return face
 
-    for k in order:
-        one, two = sorted(whole(face) for face in pattern.crease_faces[k].tolist())
+    for edge, both in zip(edges, beside, strict=True):
+        one, two = sorted(whole(face) for face in both)
         if one == two:
             continue
-        union = _union(faces[one], faces[two], _pair(pattern.creases[k]))
+        union = _union(faces[one], faces[two], _pair(edge))
         if union is not None and _convex(pattern.vertices, union, pattern.face_normals[one]):
             faces[one], faces[two], part_of[two] = union, (), one
-    return faces
+    return [face for face in faces if face]
 
 
 def _union(one: Sequence[int], two: Sequence[int], edge: Edge) -> tuple[int, ...] | None:

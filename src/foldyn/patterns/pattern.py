@@ -22,6 +22,7 @@ from foldyn.patterns.topology import (
     edge_lookup,
     vertex_pair,
 )
+from foldyn.patterns.transforms import Transforms
 from foldyn.values import LONGEST, SHORTEST
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
@@ -30,7 +31,7 @@ _LETTERS = ("M", "V", "F", "U")
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Pattern:
+class Pattern(Transforms):
     """Vertices, panels and creases of an origami structure at rest, flat or folded.
 
     Parameters
@@ -78,8 +79,8 @@ class Pattern:
         vertex pairs in lexicographic order.
     crease_faces : ndarray of int, shape (nc, 2)
         The face that runs along the crease from low to high, and the one from high to low.
-    welds, weld_faces : ndarray of int, shape (nw, 2)
-        The same of welds.
+    welds, weld_faces, weld_dihedrals
+        The same as `creases`, `crease_faces` and `dihedrals` of welds.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide the
@@ -128,6 +129,7 @@ class Pattern:
     crease_faces: NDArray[np.int64] = field(init=False)
     weld_faces: NDArray[np.int64] = field(init=False)
     dihedrals: NDArray[np.float64] = field(init=False)
+    weld_dihedrals: NDArray[np.float64] = field(init=False)
     flat_dihedrals: NDArray[np.float64] = field(init=False)
     face_areas: NDArray[np.float64] = field(init=False)
     face_normals: NDArray[np.float64] = field(init=False)
@@ -156,6 +158,13 @@ class Pattern:
         dihedrals, closed = crease_dihedrals(points, normals, *graph)
         given, open_edges = _given_letters(assignments, topology)
         dihedrals[closed & (given == "M")] = 2 * np.pi
+        bent, shut = crease_dihedrals(points, normals, topology.welds, topology.weld_faces)
+        if shut.any():
+            raise InputError(
+                f": the panels at {tuple(topology.welds[shut][0].tolist())} lie upon each other; "
+                "a sheet cannot run on there: make it a crease",
+                "welds",
+            )
         apart, flat = dihedrals, np.full(len(dihedrals), np.pi)
         if boards is not None:
             boards.check(topology.faces)
@@ -175,6 +184,7 @@ class Pattern:
             "families": crease_data.families(families, topology.creases),
             "custom": dict(custom or {}),
             "dihedrals": dihedrals,
+            "weld_dihedrals": bent,
             "flat_dihedrals": flat,
             "size": float(np.linalg.norm(np.ptp(points, axis=0))),
         }

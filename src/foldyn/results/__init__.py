@@ -8,18 +8,22 @@ from foldyn.results.dataset import (
     path_dataset,
     trajectory_dataset,
 )
+from foldyn.results.frames import States, frames_of, state_of
 from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
 
 __all__ = [
     "Quantity",
+    "States",
     "case_of",
     "check_result",
     "fidelity_dataset",
+    "frames_of",
     "frf_dataset",
     "load",
     "modes_dataset",
     "path_dataset",
     "save",
+    "state_of",
     "trajectory_dataset",
 ]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from foldyn.cases import Case
-from foldyn.cases.document import from_document
+from foldyn.cases.document import from_document, pattern_from_document
 from foldyn.errors import InputError
 from foldyn.input_files import from_toml
+from foldyn.patterns import Pattern
 
 NUMBERS, WHOLES, TEXTS = "iuf", "iu", "UOST"
 """Kinds of data types."""
@@ -70,12 +73,29 @@ def case_of(ds: xr.Dataset) -> Case:
         raise InputError(
             f"this result cannot be run again from itself: {reason}; make its case anew in Python"
         )
+    return from_document(*_document(ds))
+
+
+def pattern_of(ds: xr.Dataset) -> Pattern:
+    """Pattern of a result, also of one that cannot be run again from itself.
+
+    Raises
+    ------
+    InputError
+        Not a result, or a damaged one.
+    """
+    check_result(ds)
+    return pattern_from_document(*_document(ds))
+
+
+def _document(ds: xr.Dataset) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The case of a result: its sections, and what they may refer to."""
     try:
         sections = from_toml(str(ds["case"].values[()]))
     except InputError as error:
         raise InputError(f"the stored case is damaged: it {error}") from None
     names = [name for name in ds.variables if name != "case"]
-    return from_document(sections, {str(name): ds[name].values for name in names})
+    return sections, {str(name): ds[name].values for name in names}
 
 
 def check_result(ds: xr.Dataset, place: str = "") -> None:

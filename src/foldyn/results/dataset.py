@@ -37,7 +37,7 @@ AXIS = np.array(["x", "y", "z"])
 TAKEN = frozenset(
     {*MOTION, "time", "node", "axis", "support", "support_node", "support_axis", "case"}
     | {"rest_position", "vertices", "faces", "face_offsets", "assignments"}
-    | {"board_corners", "board_thickness"}
+    | {"board_corners", "board_thickness", "fold_angles"}
 )
 """Names that every motion has."""
 LENGTHS = ("rest_position", "vertices", "board_corners", "board_thickness")
@@ -313,6 +313,7 @@ def _case_variables(document: Document) -> dict[str, Any]:
         "faces": ("face_corner",),
         "face_offsets": ("face_bound",),
         "assignments": ("crease",),
+        "fold_angles": ("crease",),
         "board_corners": ("face_corner", "axis"),
         "board_thickness": ("face",),
         "tables_crease_stiffness": ("crease",),
@@ -324,7 +325,8 @@ def _case_variables(document: Document) -> dict[str, Any]:
     for name, array in document.arrays.items():
         # the times and values of one table share a dimension
         own = (f"{name.rsplit('_', 1)[0]}_point",)
-        attributes = {"units": "m"} if name in LENGTHS else {}
+        unit = "m" if name in LENGTHS else "rad" if name == "fold_angles" else ""
+        attributes = {"units": unit} if unit else {}
         variables[name] = (dimensions.get(name, own), array, attributes)
     return variables
 

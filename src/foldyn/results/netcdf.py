@@ -32,9 +32,9 @@ from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
 OTHERS = (
-    ".csv", ".dat", ".fold", ".gif", ".html", ".json", ".mat", ".mp4", ".npy", ".npz", ".obj",
-    ".parquet", ".pkl", ".png", ".toml", ".tsv", ".txt", ".vtk", ".vtkhdf", ".vtu", ".xlsx",
-    ".zarr",
+    ".cp", ".csv", ".dat", ".dxf", ".fold", ".gif", ".html", ".json", ".mat", ".mp4", ".npy",
+    ".npz", ".obj", ".opx", ".parquet", ".pkl", ".png", ".stl", ".svg", ".toml", ".tsv", ".txt",
+    ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
 )  # fmt: skip
 """Suffixes that promise another kind of file."""
 _PARTS = ("real", "imag")

@@ -31,7 +31,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
-from foldyn.structures.rigid_plates import Plate, checked_panels, rigid_plates
+from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
 
@@ -364,6 +364,7 @@ def shell(
     hinge_law(fold_law, "fold_law")
     edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
+    check_welds(plates, pattern)
     options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
     check_memory(

@@ -20,7 +20,7 @@ from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.presets import resolved
-from foldyn.structures.rigid_plates import checked_panels
+from foldyn.structures.rigid_plates import check_welds, checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import Structure
 from foldyn.values import vector
@@ -116,6 +116,7 @@ def discretize(
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
         straight=boundary_edges(straight, pattern, "straight"),
     )  # fmt: skip
+    check_welds(options.rigid, pattern)
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     calibrate.check_sheet(sheet, pattern)

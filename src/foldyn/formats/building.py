@@ -1,0 +1,195 @@
+"""From a `Drawing` to a `Pattern`, repaired, with a diagnosis of what was done."""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.formats.cuts import opened
+from foldyn.formats.diagnosis import Diagnosis
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.flat_drawings import flat_panels
+from foldyn.formats.listed_panels import listed_panels
+from foldyn.formats.notes import Notes, count
+from foldyn.formats.panels import Panels
+from foldyn.formats.planar import MOST_LINES, Lines, too_many
+from foldyn.patterns import Pattern
+from foldyn.patterns.flat_foldability import flat_foldability
+from foldyn.patterns.topology import Edge, Faces, edge_lookup
+from foldyn.values import LONGEST, SHORTEST, number
+
+_FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
+_TURNED = 1e-3  # rad from pi: what counts as folded
+
+
+class Built(NamedTuple):
+    """A pattern and what is to be said of it."""
+
+    pattern: Pattern
+    diagnosis: Diagnosis
+    facets: tuple[Edge, ...] = ()  # creases that the drawing itself assigns "F", not to be folded
+
+
+def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) -> Built:
+    """Build the pattern of a drawing: repaired where that can be done, refused where not.
+
+    Lines without faces, in the plane: ends that lie together are joined, lines are split where
+    they meet, the panels are the regions that they enclose; open ends are left out. With faces, in
+    the plane or in space: points that panels should share are merged. Cuts inside become two edges
+    of the boundary; joins ("J", FOLD 1.2: the panels are one) become flat creases.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What a reader gives, with or without faces.
+    meters : float, optional
+        Length of the drawing's unit (m), in place of the one that the file says or that is
+        assumed (`drawing.assumed`).
+    scale : float
+        Factor on all lengths, beside the unit.
+
+    Returns
+    -------
+    Built
+        The pattern (m), and the diagnosis: assumptions, repairs, doubts. Nothing is warned.
+
+    Raises
+    ------
+    InputError
+        What cannot be repaired; the message names the place and the reason.
+    """
+    unit, assumptions = drawing.meters or drawing.assumed, list(drawing.assumptions)
+    if meters is not None:
+        unit = number("meters", meters, above=0.0)
+    elif drawing.meters is None:
+        assumptions.insert(
+            0,
+            f"the file does not say its unit: 1 {drawing.unit} is taken as {1e3 * unit:.6g} mm "
+            "(`unit` or `scale` change it)",
+        )
+    unit *= number("scale", scale, above=0.0)
+    notes = Notes(drawing, unit)
+    lines = _lines(drawing, unit, notes)
+    if drawing.faces is None:
+        panels = flat_panels(lines, notes)
+    else:
+        panels = listed_panels(lines, drawing.faces, notes)
+    panels, cut = opened(panels)
+    if cut:
+        notes.repairs.append(f"opened {count(cut, 'cut edge')}: each is two boundary edges")
+    pattern = _pattern(panels, drawing, notes)
+    size = np.ptp(pattern.vertices, axis=0).tolist()
+    return Built(
+        pattern,
+        Diagnosis(
+            (size[0], size[1], size[2]),
+            tuple(assumptions),
+            tuple(notes.repairs),
+            tuple(notes.doubts),
+            flat_foldability(pattern),
+        ),
+        _facets(pattern, panels),
+    )
+
+
+def _facets(pattern: Pattern, panels: Panels) -> tuple[Edge, ...]:
+    """Creases that are drawn as flat, and to stay so."""
+    folded = edge_lookup(pattern.creases[np.nan_to_num(pattern.fold_angles) != 0.0])
+    drawn = [(a, b) for a, b in pattern.creases.tolist() if panels.letters.get((a, b)) == "F"]
+    return tuple(edge for edge in drawn if edge not in folded)
+
+
+def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:
+    """Lines of a drawing in meters, checked, fold angles with the signs of their letters."""
+    given = np.asarray(drawing.vertices, dtype=np.float64)
+    for k in np.flatnonzero(~(np.abs(given) * unit <= LONGEST).all(axis=1))[:1]:  # NaN too
+        raise InputError(
+            f" = {given[k].tolist()}: coordinates must be finite, and at most {LONGEST:g} m",
+            f"vertices[{k}]",
+        )
+    points = given * unit
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    if not size * _FARTHEST >= np.abs(points).max(initial=SHORTEST):
+        raise InputError(
+            f": they span {size:.3g} m, too little for where they are; draw the pattern larger, "
+            "or nearer to the origin",
+            "vertices",
+        )
+    ends = np.asarray(drawing.edges, dtype=np.int64).reshape(-1, 2)
+    for k in np.flatnonzero(((ends < 0) | (ends >= len(points))).any(axis=1))[:1]:
+        raise InputError(
+            f" = {ends[k].tolist()}: give vertex numbers from 0 to {len(points) - 1}", f"edges[{k}]"
+        )
+    if len(ends) > MOST_LINES:
+        raise too_many(count(len(ends), "line"))
+    letters = np.array(drawing.letters, dtype="<U1").reshape(len(ends))
+    angles = np.array(drawing.fold_angles, dtype=np.float64).reshape(len(ends))
+    for k in np.flatnonzero(np.abs(angles) > 180.0 + 1e-6)[:1]:
+        raise InputError(
+            f": a fold angle of {angles[k]:g} degrees; give angles from -180 (a closed mountain) "
+            "to 180",
+            notes.line(k),
+        )
+    against = np.where(letters == "M", angles > 0, (letters == "V") & (angles < 0))
+    along = np.where(letters == "M", angles < 0, (letters == "V") & (angles > 0))
+    if against.any() and not along.any():
+        angles = -angles
+        notes.repairs.append("turned the signs of all fold angles: mountains had positive ones")
+    elif against.any():
+        which = np.flatnonzero(against)
+        notes.doubts.append(
+            f"{count(len(which), 'fold angle')} of the other sign than the letter: "
+            f"{notes.lines(which.tolist())}"
+        )
+    return Lines(points, ends, letters, np.clip(angles, -180, 180), np.arange(len(ends)))
+
+
+def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
+    """Pattern of panels whose cuts are open."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        bare = Pattern(panels.points, panels.faces)
+    creases = {(a, b): k for k, (a, b) in enumerate(bare.creases.tolist())}
+    given = np.array([panels.letters.get(edge, "") for edge in creases], dtype="<U1")
+    faces = _turned(bare, given, notes)
+    letters: dict[Edge, str] = dict(zip(creases, given.tolist(), strict=True))
+    letters = {edge: letter for edge, letter in letters.items() if letter}
+    folds, trusted = 0, drawing.faces is None or bool(bare.vertices[:, 2].any())
+    for a, b in bare.boundary.tolist():
+        letter = panels.letters.get((a, b))
+        folds += letter in ("M", "V")
+        if letter == "C" or (letter == "B" and trusted):
+            letters[a, b] = "B"
+    if folds:
+        notes.repairs.append(
+            f"{count(folds, 'mountain or valley', 'mountains or valleys')} on the outline, of one "
+            "panel only, taken as the boundary"
+        )
+    angles = {
+        edge: float(np.radians(panels.angles[edge]))
+        for edge in creases
+        if np.isfinite(panels.angles.get(edge, np.nan))
+    }
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", FoldynWarning)
+        pattern = Pattern(
+            panels.points, faces, letters, drawing.name, fold_angles=angles, custom=drawing.custom
+        )
+    notes.doubts += [str(doubt.message) for doubt in doubts]
+    return pattern
+
+
+def _turned(bare: Pattern, letters: NDArray[np.str_], notes: Notes) -> Faces:
+    """Faces, turned over where every folded crease has the other letter."""
+    turn = bare.dihedrals - np.pi
+    right = ((letters == "M") & (turn > _TURNED)) | ((letters == "V") & (turn < -_TURNED))
+    wrong = ((letters == "M") & (turn < -_TURNED)) | ((letters == "V") & (turn > _TURNED))
+    wrong &= np.abs(turn) < np.pi - _TURNED  # panels that lie upon each other fit either letter
+    if right.any() or not wrong.any():
+        return bare.faces
+    notes.repairs.append("turned all panels over: seen from their front, every letter was wrong")
+    return tuple((face[0], *face[:0:-1]) for face in bare.faces)

@@ -1,0 +1,71 @@
+"""CP, the crease patterns of ORIPA, Oriedita and Orihime: a line of text for each line.
+
+Each has five numbers, ``type x1 y1 x2 y2``: type 1 the outline or a cut, 2 a mountain, 3 a valley,
+4 (and 0) an auxiliary line, which is flat. y points down, as on the screen of these programs
+(Oriedita's DxfExporter.java turns it over); their paper is 400 units wide, taken as millimeters.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.errors import InputError
+from foldyn.formats.drawing import Drawing
+from foldyn.values import show
+
+LETTERS = {"0": "F", "1": "B", "2": "M", "3": "V", "4": "F"}
+
+
+def read(text: str) -> Drawing:
+    """Lines of a CP file.
+
+    Parameters
+    ----------
+    text : str
+        The file's content. Empty lines, and what follows "#", do not count.
+
+    Returns
+    -------
+    Drawing
+        In the file's unit, with y up.
+
+    Raises
+    ------
+    InputError
+        A line that is no line of a crease pattern; the message names it.
+    """
+    letters: list[str] = []
+    points: list[tuple[float, float]] = []
+    places: list[str] = []
+    for row, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        place = f"line {row}"
+        if len(words) != 5 or words[0] not in LETTERS:
+            raise InputError(
+                f" = {show(line)}: give a type (1 outline, 2 mountain, 3 valley, 4 flat) and four "
+                "coordinates, as `2 0 0 100 50`",
+                place,
+            )
+        try:
+            x1, y1, x2, y2 = (float(word) for word in words[1:])
+        except ValueError:
+            raise InputError(f" = {show(line)}: coordinates must be numbers", place) from None
+        if not all(map(math.isfinite, (x1, y1, x2, y2))):
+            raise InputError(f" = {show(line)}: coordinates must be finite numbers", place)
+        letters.append(LETTERS[words[0]])
+        points += [(x1, -y1), (x2, -y2)]
+        places.append(place)
+    if not letters:
+        raise InputError(": there are none; give a file with a crease pattern", "lines")
+    return Drawing(
+        np.array(points),
+        np.arange(2 * len(letters)).reshape(-1, 2),
+        tuple(letters),
+        np.full(len(letters), np.nan),
+        assumed=1e-3,
+        places=tuple(places),
+    )

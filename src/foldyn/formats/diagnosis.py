@@ -1,0 +1,86 @@
+"""`Diagnosis`: what was assumed, repaired and doubted when a pattern was read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from foldyn.patterns.flat_foldability import FlatFoldability
+
+ROUNDING = np.radians(0.1)
+"""Departure of angles (rad) that the digits of a file leave."""
+MOST_ROWS = 30
+
+
+def _nothing() -> FlatFoldability:
+    none = np.empty(0, dtype=np.int64)
+    return FlatFoldability(none, none, none, none, np.empty(0), np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What a reader says of a pattern; `str` is the text of ``foldyn convert --check``.
+
+    Attributes
+    ----------
+    size : tuple of float
+        Extent of the sheet along x, y and z (m).
+    assumptions : tuple of str
+        What the file does not say: its unit, what its colors mean.
+    repairs : tuple of str
+        What was put right.
+    doubts : tuple of str
+        What may not be as intended.
+    vertices : FlatFoldability
+        Maekawa's and Kawasaki's conditions at the vertices inside.
+    """
+
+    size: tuple[float, float, float]
+    assumptions: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    vertices: FlatFoldability = field(default_factory=_nothing)
+
+    def __str__(self) -> str:
+        """Text of several lines."""
+        lines = ["size: " + " x ".join(f"{1e3 * length:.4g}" for length in self.size) + " mm"]
+        for title in ("assumptions", "repairs", "doubts"):
+            told = getattr(self, title)
+            lines += [f"{title}: none"] if not told else [f"{title}:", *(f"  {t}" for t in told)]
+        return "\n".join(lines + self._vertex_lines())
+
+    def _vertex_lines(self) -> list[str]:
+        """Table of the vertices inside, those first that cannot fold flat."""
+        v = self.vertices
+        maekawa, kawasaki = v.maekawa, v.kawasaki(ROUNDING)
+        developable = v.developable(ROUNDING)
+        good = maekawa & kawasaki & developable
+        lines = [
+            f"vertices inside: {len(good)}; Maekawa holds at {maekawa.sum()}, Kawasaki at "
+            f"{kawasaki.sum()}, developable {developable.sum()} (within "
+            f"{np.degrees(ROUNDING):g} degrees)"
+        ]
+        if not len(good):
+            return lines
+        lines.append("  vertex creases     M     V     U  Kawasaki   deficit  (sums, degrees)")
+        for k in np.argsort(good, kind="stable")[:MOST_ROWS].tolist():
+            faults = [
+                name
+                for name, holds in (
+                    ("Maekawa", maekawa[k]),
+                    ("Kawasaki", kawasaki[k]),
+                    ("not developable", developable[k]),
+                )
+                if not holds
+            ]
+            alternating = "odd" if v.degrees[k] % 2 else f"{np.degrees(v.alternating[k]):.3f}"
+            lines.append(
+                f"{v.vertices[k]:8d}{v.degrees[k]:8d}{v.mountains[k]:6d}{v.valleys[k]:6d}"
+                f"{v.unassigned[k]:6d}{alternating:>10}{np.degrees(v.deficits[k]):10.3f}"
+                + (f"  {', '.join(faults)}" if faults else "")
+            )
+        if len(good) > MOST_ROWS:
+            left = len(good) - MOST_ROWS
+            lines.append(f"  ... and {left} more, {good.sum()} in all without fault")
+        return lines

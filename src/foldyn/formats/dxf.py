@@ -1,0 +1,208 @@
+"""DXF crease patterns: lines whose layers say what they are, or else their colors.
+
+A layer counts by what its name contains: mountain, valley, cut, border (boundary, outline,
+contour), facet (flat, aux), fold (crease, hinge; without a letter); or by being M, V, C, B, F or U.
+The library ezdxf reads the format.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.formats.curves import CHORD
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.dxf_writer import ezdxf
+from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.notes import count
+from foldyn.formats.planar import MOST_LINES, too_many
+from foldyn.formats.units import METERS
+from foldyn.values import LONGEST, shortened
+
+_LAYERS = (
+    ("M", re.compile(r"mountain|^m$")),
+    ("V", re.compile(r"valley|^v$")),
+    ("C", re.compile(r"cut|^c$")),
+    ("B", re.compile(r"border|boundary|outline|contour|^b$")),
+    ("F", re.compile(r"facet|flat|aux|^f$")),
+    ("U", re.compile(r"fold|crease|hinge|^u$")),
+)
+_DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
+_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 12: "nm", 13: "um", 21: "ft"}
+"""Units by their number in $INSUNITS (DXF reference, header section)."""
+
+
+def read(text: str) -> Drawing:
+    """Lines of a DXF file (ASCII).
+
+    Parameters
+    ----------
+    text : str
+        The file's content.
+
+    Returns
+    -------
+    Drawing
+        In the file's unit ($INSUNITS), of the model space, blocks included. Curves are chords
+        within 1e-3 of the drawing's size. Layers that are off or frozen are left out.
+
+    Raises
+    ------
+    InputError
+        No DXF, one without lines, or ezdxf is not installed.
+    """
+    document = _document(ezdxf(), text)
+    entities, skipped = _entities(document)
+    paths = [(entity, path) for entity in entities for path in _paths(entity)]
+    controls = [np.array([(v.x, v.y, v.z) for v in path.control_vertices()]) for _, path in paths]
+    boxes = [box for box in controls if len(box)]
+    if not boxes:
+        raise InputError(": there are none that can be read; give a crease pattern", "lines")
+    every = np.concatenate(boxes)
+    if not (np.abs(every) <= LONGEST).all():
+        raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", "lines")
+    tolerance = CHORD * float(np.linalg.norm(np.ptp(every, axis=0)))
+    colors: Counter[tuple[RGB, RGB | None]] = Counter()
+    points: list[NDArray[np.float64]] = []
+    letters: list[str] = []
+    places: list[str] = []
+    total, curved = 0, 0
+    for entity, path in paths:
+        letter = _letter(entity, document, colors)
+        if letter is None or not len(path):
+            continue
+        along = _along(entity, path, tolerance)
+        pairs = np.stack((along[:-1], along[1:]), axis=1)
+        pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+        total, curved = total + len(pairs), curved + path.has_curves
+        if total > MOST_LINES:
+            raise too_many("the lines")
+        points.append(pairs.reshape(-1, 3))
+        letters += [letter] * len(pairs)
+        places += [_place(entity)] * len(pairs)
+    if not total:
+        raise InputError(": all are points; give a file with a crease pattern", "lines")
+    repairs = [f"{count(curved, 'curve')} drawn as chords within {tolerance:.3g} of it"]
+    return Drawing(
+        np.concatenate(points),
+        np.arange(2 * total).reshape(-1, 2),
+        tuple(letters),
+        np.full(total, np.nan),
+        meters=_meters(document),
+        assumed=1e-3,
+        places=tuple(places),
+        repairs=(*repairs[:curved], *skipped),
+        doubts=tuple(color_doubts(colors)),
+    )
+
+
+def _document(library: Any, text: str) -> Any:
+    logger, handler = logging.getLogger("ezdxf"), logging.NullHandler()
+    logger.addHandler(handler)  # else what it logs goes to standard error
+    try:
+        return library.read(io.StringIO(text))
+    except Exception as error:  # the library raises what its parts raise
+        said = shortened(f"{type(error).__name__} {error}")
+        raise InputError(f"is not a DXF file that can be read: {said}") from None
+    finally:
+        logger.removeHandler(handler)
+
+
+def _entities(document: Any) -> tuple[list[Any], list[str]]:
+    """Entities that are lines, those of blocks included, and what is told of the others."""
+    from ezdxf.disassemble import recursive_decompose
+
+    layers = [layer for layer in document.layers if layer.is_off() or layer.is_frozen()]
+    hidden = {layer.dxf.name.lower() for layer in layers}
+    kept, others = [], Counter[str]()
+    for entity in islice(recursive_decompose(document.modelspace()), MOST_LINES + 1):
+        kind = entity.dxftype()
+        if entity.dxf.get("layer", "0").lower() in hidden or entity.dxf.get("invisible", 0):
+            others["hidden"] += 1
+        elif kind in _DRAWN:
+            kept.append(entity)
+        else:
+            others[kind] += 1
+    if len(kept) + sum(others.values()) > MOST_LINES:
+        raise too_many("the entities")
+    if not others:
+        return kept, []
+    said = ", ".join(count(number, kind) for kind, number in sorted(others.items())[:6])
+    return kept, [f"left out {said}"]
+
+
+def _paths(entity: Any) -> Iterator[Any]:
+    """Path of an entity; meshes have none."""
+    from ezdxf.path import make_path
+
+    try:
+        yield make_path(entity)
+    except TypeError:
+        return
+    except Exception as error:  # what a damaged entity raises is not known
+        said = shortened(f"{type(error).__name__} {error}")
+        raise InputError(f": cannot be drawn: {said}", _place(entity)) from None
+
+
+def _place(entity: Any) -> str:
+    return f"{entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
+
+
+def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:
+    """Points (k, 3) along a path; those of circles and arcs lie on them."""
+    if path.has_curves and tolerance:
+        exact = entity.dxftype() in ("ARC", "CIRCLE") and entity.dxf.radius > tolerance
+        found = islice((entity if exact else path).flattening(tolerance), MOST_LINES + 2)
+    else:
+        found = path.control_vertices()
+    points = np.array([(v.x, v.y, v.z) for v in found]).reshape(-1, 3)
+    if not (np.abs(points) <= LONGEST).all():
+        raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", _place(entity))
+    return points
+
+
+def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]]) -> str | None:
+    """Letter of a line by its layer, else by its color; None where it is white."""
+    name = str(entity.dxf.get("layer", "0"))
+    for letter, pattern in _LAYERS:
+        if pattern.search(name.lower()):
+            return letter
+    color = _color(entity, document, name)
+    to = nearest(color)
+    colors[color, to] += 1
+    return None if to is None else COLORS[to][0]
+
+
+def _color(entity: Any, document: Any, layer: str) -> RGB:
+    """Color of a line: its own, or that of its layer; the index 7 is black on white paper."""
+    from ezdxf.colors import aci2rgb
+
+    holders = [entity]
+    if layer in document.layers:
+        holders.append(document.layers.get(layer))
+    for holder in holders:
+        if holder.rgb is not None:
+            red, green, blue = holder.rgb
+            return red, green, blue
+        index = abs(int(holder.dxf.get("color", 256)))
+        if index in (0, 7):
+            return 0, 0, 0
+        if index < 256:
+            red, green, blue = aci2rgb(index)
+            return red, green, blue
+    return 0, 0, 0
+
+
+def _meters(document: Any) -> float | None:
+    """Length of the unit (m) that the header names; None for none."""
+    unit = _UNITS.get(document.header.get("$INSUNITS", 0))
+    return None if unit is None else METERS[unit]

@@ -1,0 +1,147 @@
+"""Panels of a drawing that has lines alone: its planar graph, with what is told of its repair."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.formats import gaps
+from foldyn.formats.notes import Notes, count
+from foldyn.formats.panels import Panels, compact, enclosed, sheet, with_inner_borders
+from foldyn.formats.planar import (
+    Lines,
+    joined,
+    on_lines,
+    single,
+    split,
+    tolerance_of,
+    without_points,
+)
+
+_SAME = 1e-9  # of the size: ends that are farther apart are told of
+_PLANE = 1e-9  # of the size
+
+
+def flat_panels(lines: Lines, notes: Notes) -> Panels:
+    """Panels that lines in the plane enclose.
+
+    Parameters
+    ----------
+    lines : Lines
+        As drawn (m), with two coordinates, or three of which the last is the same everywhere.
+    notes : Notes
+        Gets what is repaired and doubted.
+
+    Raises
+    ------
+    InputError
+        The lines are not in the plane, enclose nothing, or are too many.
+    """
+    lines = _in_plane(lines)
+    tolerance = tolerance_of(lines)
+    whole = _joined(lines, tolerance, notes)
+    whole, contradictions = single(whole)
+    notes.contradict(contradictions)
+    whole = _on_lines(whole, tolerance, notes)
+    pieces = split(whole, tolerance)
+    if len(pieces.ends) > len(whole.ends):
+        more = len(pieces.ends) - len(whole.ends)
+        notes.repairs.append(f"split lines where they meet: {count(more, 'piece')} more")
+    pieces, moved, farthest = gaps.closed(pieces, tolerance)
+    if moved:
+        notes.repairs.append(
+            f"drew {count(moved, 'open end')} on to the next line, by up to {1e3 * farthest:.3g} mm"
+        )
+    panels, loose, divided = enclosed(pieces, tolerance)
+    _tell_loose(loose, lines, notes)
+    if divided:
+        notes.repairs.append(
+            f"divided {count(divided, 'panel')} with others or openings inside into triangles, by "
+            "flat creases"
+        )
+    panels, cuts, folds = with_inner_borders(panels)
+    if cuts:
+        notes.repairs.append(f"{count(cuts, 'line')} of the outline inside the sheet taken as cuts")
+    if folds:
+        notes.doubts.append(
+            f"all lines are of the outline's kind: the {folds} inside the sheet are taken as "
+            "creases without a letter"
+        )
+    panels, openings, others = sheet(panels)
+    if len(openings):
+        notes.repairs.append(
+            f"left out {count(len(openings), 'region')} that cuts bound on all sides, of "
+            f"{1e6 * openings.sum():.4g} mm2 in all"
+        )
+    for area, corner in others[:3]:
+        notes.doubts.append(
+            f"left out another sheet of {1e6 * area:.4g} mm2 at {notes.point(corner)}, which no "
+            "crease joins to the largest"
+        )
+    if len(others) > 3:
+        notes.doubts.append(f"left out {len(others) - 3} more such sheets")
+    return compact(panels)
+
+
+def _in_plane(lines: Lines) -> Lines:
+    points = lines.points
+    if not len(lines.ends):
+        raise InputError(": there are none; give a file with a crease pattern", "lines")
+    if points.shape[1] == 3:
+        used = points[np.unique(lines.ends)]
+        if np.ptp(used[:, 2]) > _PLANE * np.linalg.norm(np.ptp(used, axis=0)):
+            raise InputError(
+                ": panels cannot be found from lines in space; give a file with faces", "lines"
+            )
+    return Lines(points[:, :2], lines.ends, lines.letters, lines.angles, lines.source)
+
+
+def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
+    """Lines with joined ends, none of no length."""
+    whole = joined(lines, tolerance)
+    moves = np.linalg.norm(whole.points[whole.ends] - lines.points[lines.ends], axis=2)
+    moved = np.count_nonzero(moves > _SAME * lines.size)
+    if moved:
+        notes.repairs.append(
+            f"joined {count(moved, 'line end')} to others up to {1e3 * moves.max():.3g} mm away"
+        )
+    lengths = lines.lengths
+    drawn = without_points(whole)
+    if len(drawn.ends) < len(whole.ends):
+        gone = np.setdiff1d(whole.source, drawn.source)
+        notes.repairs.append(
+            f"left out {count(len(gone), 'line')} of no length (up to "
+            f"{1e3 * lengths[gone].max():.3g} mm): {notes.lines(gone.tolist())}"
+        )
+    if not len(drawn.ends):
+        raise InputError(": all are points; give a file with a crease pattern", "lines")
+    return drawn
+
+
+def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
+    """Lines whose ends lie on the lines that they nearly reach."""
+    placed = on_lines(lines, tolerance)
+    moves = np.linalg.norm(placed.points - lines.points, axis=1)
+    if moves.any():
+        notes.repairs.append(
+            f"moved {count(np.count_nonzero(moves), 'line end')} onto lines up to "
+            f"{1e3 * moves.max():.3g} mm away"
+        )
+    return placed
+
+
+def _tell_loose(loose: NDArray, lines: Lines, notes: Notes) -> None:
+    """Tell of lines that bound no panel."""
+    rows = np.unique(loose)
+    slits = rows[lines.letters[rows] == "C"]
+    rest = np.setdiff1d(rows, slits)
+    for which, told, what in (
+        (rest, notes.repairs, "left out {} or parts of them that bound no panel"),
+        (slits, notes.doubts, "left out {} that end inside a panel (end them on creases)"),
+    ):
+        if len(which):
+            noun = count(len(which), "line" if told is notes.repairs else "cut")
+            where = lines.points[lines.ends[which]].mean(axis=1)
+            names = notes.lines(which.tolist(), list(where))
+            told.append(f"{what.format(noun)}: {names}")

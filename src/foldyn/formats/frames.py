@@ -1,0 +1,45 @@
+"""`Frame`: one state of a pattern among several in a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.patterns import Pattern
+from foldyn.patterns.geometry import crease_dihedrals, face_geometry
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A state of a pattern.
+
+    Parameters
+    ----------
+    title : str
+        What to call it: "t = 0.1 s".
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m) of the pattern's vertices.
+    """
+
+    title: str
+    vertices: NDArray[np.float64]
+
+
+def fold_angles(pattern: Pattern, vertices: NDArray | None = None) -> NDArray[np.float64]:
+    """Angles (nc,) to which the creases are folded: pi less the dihedral (rad), valleys positive.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    vertices : ndarray, shape (n, 3), optional
+        Coordinates (m) of a state; by default at rest.
+    """
+    flat = pattern.flat_dihedrals
+    if vertices is None:
+        return flat - pattern.dihedrals
+    normals = face_geometry(vertices, pattern.faces).face_normals
+    dihedrals, closed = crease_dihedrals(vertices, normals, pattern.creases, pattern.crease_faces)
+    mountains = np.array(pattern.assignments) == "M"
+    return flat - np.where(closed & mountains, 2.0 * np.pi, dihedrals)

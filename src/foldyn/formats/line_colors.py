@@ -1,0 +1,65 @@
+"""Letters of lines by their colors: Origami Simulator's, and the nearest of these for others.
+
+Source: A. Ghassaei, E. Demaine, N. Gershenfeld, Fast, interactive origami simulation using GPU
+computation, Origami 7 (2018), and the notes on SVG of origamisimulator.org.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Mapping
+
+from foldyn.formats.notes import count
+
+RGB = tuple[int, int, int]
+
+COLORS: dict[RGB, tuple[str, str]] = {
+    (0, 0, 0): ("B", "black, outline"),
+    (255, 0, 0): ("M", "red, mountain"),
+    (0, 0, 255): ("V", "blue, valley"),
+    (255, 255, 0): ("F", "yellow, flat"),
+    (0, 255, 0): ("C", "green, cut"),
+    (255, 0, 255): ("U", "magenta, hinge"),
+}
+"""Letter and name of each color."""
+_HUES = (  # degrees up to which a hue is taken for a color
+    (30, (255, 0, 0)),
+    (90, (255, 255, 0)),
+    (165, (0, 255, 0)),
+    (200, (255, 255, 0)),  # cyan, the auxiliary lines of other programs
+    (270, (0, 0, 255)),
+    (330, (255, 0, 255)),
+    (360, (255, 0, 0)),
+)
+_GRAY = 0.15  # range of the components below which a color has no hue
+_DARK, _WHITE = 0.4, 0.95
+_MOST_COLORS = 10  # told one by one
+
+
+def nearest(rgb: RGB) -> RGB | None:
+    """Color of `COLORS` that another is taken for, by its hue; None for white, which is no line.
+
+    Dark gray is black, light gray yellow (flat), and so is cyan.
+    """
+    if rgb in COLORS:
+        return rgb
+    red, green, blue = (component / 255 for component in rgb)
+    if max(red, green, blue) - min(red, green, blue) < _GRAY:
+        gray = (red + green + blue) / 3
+        return (0, 0, 0) if gray < _DARK else (255, 255, 0) if gray < _WHITE else None
+    hue = 360 * colorsys.rgb_to_hsv(red, green, blue)[0]
+    return next(color for most, color in _HUES if hue <= most)
+
+
+def color_doubts(taken: Mapping[tuple[RGB, RGB | None], int]) -> list[str]:
+    """Sentences about colors not of `COLORS`, from how many lines each was taken for what."""
+    doubts = []
+    for (color, to), number in taken.items():
+        if color != to:
+            name = "white, not drawn" if to is None else COLORS[to][1]
+            doubts.append(
+                f"color #{color[0]:02x}{color[1]:02x}{color[2]:02x} of {count(number, 'line')} is "
+                f"taken for {name}"
+            )
+    left = len(doubts) - _MOST_COLORS
+    return [*doubts[:_MOST_COLORS], f"{left} more colors"] if left > 0 else doubts

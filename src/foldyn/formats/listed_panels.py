@@ -1,0 +1,140 @@
+"""Panels that a file lists: joined where they meet, without those listed twice or collapsed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.formats.notes import Notes, count
+from foldyn.formats.panels import Panels, compact, with_inner_borders
+from foldyn.formats.planar import Lines, single, without_points
+from foldyn.patterns.geometry import face_geometry, seams
+from foldyn.patterns.topology import Edge, Faces, around, build_topology, checked_faces, edge_of
+from foldyn.values import show
+
+_ROUNDS = 4
+
+
+def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
+    """Panels of a file, joined where they meet, with the letters of its lines.
+
+    Boundary edges that lie in the same place, and whose letters do not say that they are boundary
+    or cut, get the same points. Panels that lie upon each other there (layers) stay apart.
+
+    Parameters
+    ----------
+    lines : Lines
+        As the file has them (m).
+    faces : tuple of tuple of int
+        Corners of the panels, as numbers of the points.
+    notes : Notes
+        Gets what is repaired and doubted.
+
+    Raises
+    ------
+    InputError
+        A corner that does not exist, or panels that make no surface.
+    """
+    lines, contradictions = single(without_points(lines))
+    notes.contradict(contradictions)
+    pairs = [edge_of(a, b) for a, b in lines.ends.tolist()]
+    panels = Panels(
+        lines.points,
+        _numbered(faces, len(lines.points)),
+        dict(zip(pairs, lines.letters.tolist(), strict=True)),
+        dict(zip(pairs, lines.angles.tolist(), strict=True)),
+    )
+    panels, twice = _once(panels)
+    if twice:
+        notes.repairs.append(
+            f"left out {count(twice, 'panel')} listed twice or of fewer than 3 corners"
+        )
+    merged = 0
+    for _ in range(_ROUNDS):  # joined panels may close further seams
+        into = _seam_points(panels)
+        if into is None:
+            break
+        merged += int(np.count_nonzero(into != np.arange(len(into))))
+        panels = _renumbered(panels, into)
+    if merged:
+        notes.repairs.append(f"merged {count(merged, 'vertex', 'vertices')} where panels meet")
+        panels = compact(panels)
+    sides = panels.sides()
+    loose = sum(edge not in sides for edge in panels.letters)
+    if loose:
+        notes.repairs.append(f"left out {count(loose, 'line')} that bound no panel")
+    panels, cuts, folds = with_inner_borders(panels)
+    if cuts:
+        notes.doubts.append(f"{count(cuts, 'boundary edge')} of two panels taken as cuts")
+    if folds:
+        notes.doubts.append(
+            f"all edges are given as the boundary: the {folds} of two panels are taken as creases "
+            "without a letter"
+        )
+    return panels
+
+
+def _numbered(faces: Faces, n_vertices: int) -> Faces:
+    """Faces whose corners exist; what else may be wrong with them is repaired or found later."""
+    for f, face in enumerate(faces):
+        bad = [v for v in face if not 0 <= v < n_vertices]
+        if bad:
+            raise InputError(
+                f" = {show(list(face))}: vertex {bad[0]} does not exist; with {n_vertices} "
+                f"vertices the numbers run from 0 to {n_vertices - 1}",
+                f"faces[{f}]",
+            )
+    return tuple(tuple(int(v) for v in face) for face in faces)
+
+
+def _once(panels: Panels) -> tuple[Panels, int]:
+    """Panels without repeated corners, each listed once."""
+    faces: dict[tuple[int, ...], tuple[int, ...]] = {}
+    for face in panels.faces:
+        corners = tuple(a for a, b in around(face) if a != b)
+        if len(set(corners)) > 2:
+            faces.setdefault(tuple(sorted(corners)), corners)
+    if not faces:  # the pattern says what is wrong
+        return panels, 0
+    left = len(panels.faces) - len(faces)
+    return Panels(panels.points, tuple(faces.values()), panels.letters, panels.angles), left
+
+
+def _seam_points(panels: Panels) -> NDArray[np.int64] | None:
+    """Number of the point that each is merged into, or None where panels meet as they should."""
+    points = np.zeros((len(panels.points), 3))
+    points[:, : panels.points.shape[1]] = panels.points
+    topology = build_topology(checked_faces(panels.faces, len(points)), len(points))
+    normals = face_geometry(points, topology.faces).face_normals
+    pairs = seams(points, topology.faces, normals, topology.boundary)
+    into = np.arange(len(points))
+    for one, other in pairs:
+        if {panels.letters.get(one), panels.letters.get(other)} & {"B", "C"}:
+            continue
+        c, d = other
+        if np.linalg.norm(points[one[0]] - points[c]) > np.linalg.norm(points[one[0]] - points[d]):
+            c, d = d, c
+        for a, b in ((one[0], c), (one[1], d)):
+            low, high = sorted((_root(into, a), _root(into, b)))
+            into[high] = low
+    if np.array_equal(into, np.arange(len(points))):
+        return None
+    return np.array([_root(into, k) for k in range(len(points))])
+
+
+def _root(into: NDArray[np.int64], point: int) -> int:
+    while into[point] != point:
+        point = int(into[point])
+    return point
+
+
+def _renumbered(panels: Panels, into: NDArray[np.int64]) -> Panels:
+    number = into.tolist()
+    faces: Faces = tuple(tuple(number[point] for point in face) for face in panels.faces)
+    letters: dict[Edge, str] = {}
+    angles: dict[Edge, float] = {}
+    for (a, b), letter in panels.letters.items():
+        letters.setdefault(edge_of(number[a], number[b]), letter)
+        angles.setdefault(edge_of(number[a], number[b]), panels.angles.get((a, b), np.nan))
+    return Panels(panels.points, faces, letters, angles)

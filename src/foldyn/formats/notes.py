@@ -1,0 +1,60 @@
+"""What is said while a drawing is built: repairs and doubts, with places in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from numpy.typing import NDArray
+
+from foldyn.formats.drawing import Drawing
+
+_SHOWN = 3
+
+
+def count(number: int, noun: str, plural: str = "") -> str:
+    """Number and noun, "1 line" or "2 lines"."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
+class Notes:
+    """Collects the sentences of a diagnosis.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What is built; its own sentences come first.
+    unit : float
+        Length (m) of its unit: places are told in the file's coordinates.
+    """
+
+    def __init__(self, drawing: Drawing, unit: float) -> None:
+        self.repairs, self.doubts = list(drawing.repairs), list(drawing.doubts)
+        self._places, self._unit = drawing.places, unit
+
+    def line(self, source: int) -> str:
+        """Name of a drawn line."""
+        return self._places[source] if self._places else f"line {source}"
+
+    def point(self, point: NDArray) -> str:
+        """Place of a point (m) in the file."""
+        return "(" + ", ".join(f"{x:.6g}" for x in (point / self._unit).tolist()) + ")"
+
+    def lines(self, sources: Sequence[int], points: Sequence[NDArray] = ()) -> str:
+        """Names of some lines, and where they are."""
+        names: dict[str, None] = {}
+        for k, source in enumerate(sources):
+            where = f" near {self.point(points[k])}" if len(points) else ""
+            names.setdefault(self.line(int(source)) + where)
+        shown = list(names)[:_SHOWN]
+        more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+        return ", ".join(shown) + more
+
+    def contradict(self, pairs: Sequence[tuple[int, int]]) -> None:
+        """Tell of lines in one place, of which one is a mountain and the other a valley."""
+        if pairs:
+            one, other = pairs[0]
+            more = f" (and {len(pairs) - 1} more such pairs)" if len(pairs) > 1 else ""
+            self.doubts.append(
+                f"{self.line(one)} and {self.line(other)}{more} lie in one place, a mountain and a "
+                "valley: the first is kept"
+            )

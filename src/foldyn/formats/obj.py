@@ -1,0 +1,237 @@
+"""OBJ: meshes of polygons, with the creases that origami programs put into it.
+
+Creases are comment lines ``#e a b kind angle``: two vertices counted from 1, what the edge is, and
+a fold angle in degrees. Freeform Origami (T. Tachi) defined them, and MERLIN2 and Origami Simulator
+(js/saveSTL.js) write its kinds: 0 boundary, 1 flat, 2 valley, 3 mountain. ORIPA has numbers of its
+own (1 cut, 2 mountain, 3 valley) and coordinates of the screen, whose y runs down. Lines without
+faces (``l a b c``) are creases that are unassigned, or what their group, object or material is
+called: "mountain", "valley", "boundary", "facet", "cut".
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.units import METERS
+from foldyn.formats.writers import letters, warn_of_boards
+from foldyn.patterns import Pattern
+from foldyn.values import show
+
+FREEFORM = ("B", "F", "V", "M", "U")
+"""Letters of the kinds of `#e`; the last one is ours, for unassigned creases."""
+ORIPA = ("U", "B", "M", "V", "F")
+GROUPS = {"mountain": "M", "valley": "V", "boundary": "B", "border": "B", "facet": "F",
+          "flat": "F", "cut": "C"}  # fmt: skip
+"""Letters of lines by the beginning of the name of their group."""
+_UNIT = re.compile(r"#.*\bunits?\b\s*[:=]?\s*([a-z]+)", re.IGNORECASE)
+_NAMES = {"meters": "m", "millimeters": "mm", "centimeters": "cm", "inches": "in", "feet": "ft"}
+
+
+class _Crease(NamedTuple):
+    edge: tuple[int, int]
+    letter: str
+    angle: float
+    place: str
+
+
+def read(text: str) -> Drawing:
+    """Drawing of an OBJ file; groups, textures, normals and materials are left out.
+
+    Parameters
+    ----------
+    text : str
+        The file's content.
+
+    Returns
+    -------
+    Drawing
+        With the faces of the file. Edges of faces that the file does not list are left out: they
+        get the letter of their dihedral.
+
+    Raises
+    ------
+    InputError
+        A line that cannot be read, or a vertex that does not exist; the message names the line.
+    """
+    vertices: list[list[float]] = []
+    faces: list[tuple[int, ...]] = []
+    creases: list[_Crease] = []
+    lines: list[_Crease] = []
+    meters, name, letter = None, "", "U"
+    oripa = "ORIPA" in text[:200]
+    rows = [line.split() or [""] for line in _lines(text)]
+    count = sum(row[0] == "v" for row in rows)
+    for number, (word, *rest) in enumerate(rows, 1):
+        place, known = f"line {number}", (len(vertices), count)
+        if word == "v":
+            vertices.append(_coordinates(rest, place))
+        elif word == "f":
+            faces.append(_corners(rest, known, place))
+        elif word == "#e":
+            creases.append(_crease(rest, known, place, ORIPA if oripa else FREEFORM))
+        elif word == "l":
+            chain = _corners(rest, known, place)
+            lines += [_Crease((a, b), letter, np.nan, place) for a, b in pairwise(chain) if a != b]
+        elif word in ("g", "o", "usemtl"):
+            letter = _letter_of(" ".join(rest)) or letter
+            name = " ".join(rest) if word == "o" and not name else name
+        elif word.startswith("#"):
+            meters = meters or _meters(" ".join([word, *rest]))
+    if not vertices:
+        raise InputError("not an OBJ file of a pattern: it has no vertices (lines v x y z).")
+    if faces:  # lines that say no more than that there is an edge would undo its dihedral's letter
+        lines = [each for each in lines if each.letter != "U"]
+    marked = {tuple(sorted(each.edge)) for each in creases}
+    every = [*creases, *(each for each in lines if tuple(sorted(each.edge)) not in marked)]
+    points = np.array(vertices)
+    if oripa:
+        points[:, 1] *= -1.0
+        faces = [face if _area(points[list(face)]) > 0.0 else face[::-1] for face in faces]
+    return Drawing(
+        points if faces else _in_plane(points),
+        np.array([each.edge for each in every], dtype=np.int64).reshape(-1, 2),
+        tuple(each.letter for each in every),
+        _angles(every),
+        tuple(faces) or None,
+        meters,
+        name=name,
+        places=tuple(each.place for each in every),
+    )
+
+
+def _lines(text: str) -> list[str]:
+    """Lines; one that ends in a backslash goes on in the next, which is then empty."""
+    lines, begun = [], ""
+    for line in text.splitlines():
+        whole = begun + line
+        begun = f"{whole[:-1]} " if whole.endswith("\\") else ""
+        lines.append("" if begun else whole)
+    return lines
+
+
+def _coordinates(words: list[str], place: str) -> list[float]:
+    """Coordinates (3,) of a vertex; a weight or a color after them is left out."""
+    try:
+        if len(words) < 2:
+            raise ValueError
+        x, y, z = (float(word) for word in [*words[:3], "0"][:3])
+    except ValueError:
+        raise InputError(f": v {show(' '.join(words))}: give x y z, three numbers", place) from None
+    if not np.isfinite([x, y, z]).all():
+        raise InputError(f": v {' '.join(words[:3])}: coordinates must be finite numbers", place)
+    return [x, y, z]
+
+
+def _corners(words: list[str], known: tuple[int, int], place: str) -> tuple[int, ...]:
+    """Vertex numbers from 0 of a face or line, of which each may have a texture and a normal."""
+    return tuple(_vertex(word.partition("/")[0], known, place) for word in words)
+
+
+def _vertex(word: str, known: tuple[int, int], place: str) -> int:
+    """Vertex number from 0; negative ones count back from the last vertex so far.
+
+    known : how many vertices there were so far, and in the whole file
+    """
+    before, count = known
+    try:
+        number = int(word) if len(word) < 20 else 0
+    except ValueError:
+        number = 0
+    if not (1 <= number <= count or 1 <= -number <= before):
+        raise InputError(f": {show(word)} is no vertex; they are counted from 1 to {count}", place)
+    return number - 1 if number > 0 else before + number
+
+
+def _area(corners: NDArray) -> float:
+    """Signed area of a polygon (k, 3) in the plane z = 0."""
+    x, y = corners[:, 0], corners[:, 1]
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _crease(
+    words: list[str], known: tuple[int, int], place: str, kinds: tuple[str, ...]
+) -> _Crease:
+    """Crease of a line #e a b kind angle; kind and angle may be missing."""
+    if len(words) < 2:
+        raise InputError(": #e needs two vertices, then a kind and an angle", place)
+    a, b = (_vertex(word, known, place) for word in words[:2])
+    if a == b:
+        raise InputError(f": #e joins vertex {words[0]} with itself", place)
+    kind = words[2] if len(words) > 2 else "4"
+    known_kinds = {
+        **{str(k): letter for k, letter in enumerate(kinds)},
+        **{k: k for k in "BMVFUCJ"},
+    }
+    if kind not in known_kinds:
+        raise InputError(f": {show(kind)} is no kind of edge: give 0 to {len(kinds) - 1}", place)
+    try:
+        angle = float(words[3]) if len(words) > 3 else np.nan
+    except ValueError:
+        angle = np.inf
+    if not np.isnan(angle) and abs(angle) > 180.0 + 1e-9:
+        raise InputError(f": {show(words[3])}: give an angle from -180 to 180 degrees", place)
+    angle = -abs(angle) if known_kinds[kind] == "M" else angle  # some write its size alone
+    return _Crease((a, b), known_kinds[kind], float(np.clip(angle, -180.0, 180.0)), place)
+
+
+def _angles(creases: list[_Crease]) -> NDArray[np.float64]:
+    """Fold angles (degrees); where all are 0, the program has only filled the column."""
+    angles = np.array([each.angle for each in creases])
+    return np.full(len(angles), np.nan) if not np.nan_to_num(angles).any() else angles
+
+
+def _letter_of(name: str) -> str | None:
+    start = name.strip().lower()
+    return next((letter for word, letter in GROUPS.items() if start.startswith(word)), None)
+
+
+def _meters(comment: str) -> float | None:
+    """Length of the unit that a comment names."""
+    found = _UNIT.match(comment)
+    word = found[1].lower() if found else ""
+    return METERS.get(_NAMES.get(word, word))
+
+
+def _in_plane(points: NDArray) -> NDArray[np.float64]:
+    """Points of a drawing in a coordinate plane, seen from its positive side, with z = 0."""
+    flat = np.ptp(points, axis=0) == 0.0
+    x, y, z = points.T
+    if not flat[2] and flat[1]:
+        points = np.stack([x, -z, 0.0 * y], axis=1)
+    elif not flat[2] and flat[0]:
+        points = np.stack([y, z, 0.0 * x], axis=1)
+    return points
+
+
+def write(pattern: Pattern) -> str:
+    """Text of an OBJ file, in meters: vertices, faces, and all edges as lines #e.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        What to write. The angle of an edge is `Pattern.fold_angles`; it is left out where none is
+        given.
+
+    Returns
+    -------
+    str
+    """
+    warn_of_boards(pattern)
+    lines = ["# Foldyn", "# unit: m", "# edges: #e vertex vertex kind angle; kinds: "
+             "0 boundary, 1 flat, 2 valley, 3 mountain, 4 unassigned"]  # fmt: skip
+    if pattern.name:
+        lines.append(f"o {' '.join(pattern.name.split())}")
+    lines += ["v " + " ".join(map(repr, point)) for point in pattern.vertices.tolist()]
+    lines += ["f " + " ".join(str(v + 1) for v in face) for face in pattern.faces]
+    for (a, b), letter, angle in letters(pattern):
+        kind = FREEFORM.index("B" if letter == "C" else letter)
+        told = "" if np.isnan(angle) else f" {float(np.degrees(angle))!r}"
+        lines.append(f"#e {a + 1} {b + 1} {kind}{told}")
+    return "\n".join(lines) + "\n"

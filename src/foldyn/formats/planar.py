@@ -1,0 +1,309 @@
+"""Planar graph of drawn lines: ends joined, lines split where they meet, one line in each place.
+
+Lines are split as a snapping noder does: at every vertex that lies within the tolerance of a line,
+and at crossings, which become vertices; repeated until nothing is left to split (J. Hobby,
+Practical segment intersection with finite precision output, Comput. Geom. 13, 1999).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from shapely import STRtree
+
+from foldyn.errors import InputError
+
+MOST_LINES = 50_000
+"""Lines of a drawing, and pieces that they may be split into."""
+MOST_PAIRS = 4_000_000
+"""Pairs of lines that are near each other."""
+FINEST, COARSEST = 1e-6, 5e-4
+"""Tolerance within which two points are one, over the drawing's size (its diagonal)."""
+_SHARE = 0.1  # of the length of the shortest twentieth of the lines
+_ROUNDS = 12
+_RANKS = {letter: rank for rank, letter in enumerate("CMVUFJB")}
+_CHUNK = 16  # lines whose neighbors are listed at once: at most 16 * MOST_LINES pairs
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Straight lines between numbered points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Coordinates.
+    ends : ndarray of int, shape (m, 2)
+        Point numbers of each line.
+    letters : ndarray of str, shape (m,)
+        As of a `Drawing`.
+    angles : ndarray, shape (m,)
+        Fold angles (degrees), NaN where none is given.
+    source : ndarray of int, shape (m,)
+        Number of the drawn line that each is a piece of.
+    """
+
+    points: NDArray[np.float64]
+    ends: NDArray[np.int64]
+    letters: NDArray[np.str_]
+    angles: NDArray[np.float64]
+    source: NDArray[np.int64]
+
+    def taken(self, rows: NDArray) -> Lines:
+        """Some of the lines, by number or mask."""
+        return Lines(
+            self.points, self.ends[rows], self.letters[rows], self.angles[rows], self.source[rows]
+        )
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around all points."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Length of each line (m,)."""
+        return np.linalg.norm(self.points[self.ends[:, 1]] - self.points[self.ends[:, 0]], axis=1)
+
+
+def tolerance_of(lines: Lines) -> float:
+    """Distance within which points of a drawing are one vertex.
+
+    A tenth of the shortest lines (of their first twentieth), from 1e-6 to 5e-4 of the size.
+    """
+    size, lengths = lines.size, lines.lengths
+    lengths = lengths[lengths > FINEST * size]
+    short = float(np.percentile(lengths, 5)) if len(lengths) else 0.0
+    return float(np.clip(_SHARE * short, FINEST * size, COARSEST * size))
+
+
+def merged(points: NDArray, tolerance: float, kept: int = 0) -> NDArray[np.int64]:
+    """Number of the point that each is merged into: the first within the tolerance.
+
+    Points that remain are farther than the tolerance from each other; the first `kept` remain.
+    """
+    cells = np.round(points / (0.5 * tolerance))
+    _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    into = first[cell.ravel()]
+    into[:kept] = np.arange(kept)
+    rest = np.flatnonzero(into == np.arange(len(points)))
+    pairs = rest[cKDTree(points[rest]).query_pairs(tolerance, output_type="ndarray")]
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(pairs) else pairs
+    for low, high in pairs.tolist():  # low < high, by low: what is before low is settled
+        if into[low] == low and into[high] == high and high >= kept:
+            into[high] = low
+    return into[into]
+
+
+def joined(lines: Lines, tolerance: float) -> Lines:
+    """Lines whose ends within the tolerance are one point."""
+    return renumbered(lines, merged(lines.points, tolerance))
+
+
+def renumbered(lines: Lines, into: NDArray) -> Lines:
+    """Lines with other ends, and the points that they use."""
+    used, ends = np.unique(into[lines.ends], return_inverse=True)
+    ends = ends.reshape(lines.ends.shape)
+    return Lines(lines.points[used], ends, lines.letters, lines.angles, lines.source)
+
+
+def on_lines(lines: Lines, tolerance: float) -> Lines:
+    """Lines whose ends lie on the line that they nearly reach, which stays straight.
+
+    Ends within rounding of it stay as they are, and those near several lines.
+    """
+    hits = _points_on(lines, 0.5 * tolerance)
+    point, first, count = np.unique(hits[:, 1], return_index=True, return_counts=True)
+    point, line = point[count == 1], hits[first[count == 1], 0]
+    start = lines.points[lines.ends[line, 0]]
+    along = lines.points[lines.ends[line, 1]] - start
+    to = lines.points[point] - start
+    share = np.einsum("ij,ij->i", to, along) / np.einsum("ij,ij->i", along, along)
+    foot = start + share[:, None] * along
+    moved = np.linalg.norm(foot - lines.points[point], axis=1) > 1e-3 * FINEST * lines.size
+    points = lines.points.copy()
+    points[point[moved]] = foot[moved]
+    return Lines(points, lines.ends, lines.letters, lines.angles, lines.source)
+
+
+def without_points(lines: Lines) -> Lines:
+    """Lines without those of no length."""
+    return lines.taken(lines.ends[:, 0] != lines.ends[:, 1])
+
+
+def single(lines: Lines) -> tuple[Lines, list[tuple[int, int]]]:
+    """One line in each place; cuts go before folds, these before the outline.
+
+    Returns
+    -------
+    lines : Lines
+        Each between its own pair of points.
+    contradictions : list of (int, int)
+        Pairs of drawn lines, of which one is a mountain and the other a valley in one place; the
+        first drawn is kept.
+    """
+    rank = np.array([_RANKS[letter] for letter in "CMVUFJB"])
+    ranks = rank[[_RANKS[letter] for letter in lines.letters.tolist()]]
+    ranks = np.where(ranks == _RANKS["V"], _RANKS["M"], ranks)  # the first drawn of them
+    low, high = lines.ends.min(axis=1), lines.ends.max(axis=1)
+    order = np.lexsort((lines.source, ranks, high, low))
+    pairs = np.column_stack((low, high))[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
+    first = order[np.flatnonzero(new)[np.cumsum(new) - 1]] if len(order) else order
+    letters = lines.letters
+    against = (letters[order] != letters[first]) & np.isin(letters[order], ("M", "V"))
+    against &= np.isin(letters[first], ("M", "V"))
+    found = zip(lines.source[first[against]], lines.source[order[against]], strict=True)
+    return lines.taken(np.sort(order[new])), sorted({(int(a), int(b)) for a, b in found})
+
+
+def split(lines: Lines, tolerance: float) -> Lines:
+    """Lines that meet only at their ends.
+
+    Parameters
+    ----------
+    lines : Lines
+        With joined ends, none of no length.
+    tolerance : float
+        Distance within which a point lies on a line.
+
+    Raises
+    ------
+    InputError
+        Too many lines are near each other or cross, or tangle within the tolerance.
+    """
+    lines, _ = single(lines)
+    # With points a tolerance apart, no triangle has two corners that lie on the side across.
+    near_by = 0.5 * tolerance
+    for _ in range(_ROUNDS):
+        if len(lines.ends) > MOST_LINES:
+            raise too_many(f"{len(lines.ends)} lines")
+        lines, hits = _with_crossings(lines, near_by, tolerance)
+        near = np.concatenate((hits, _points_on(lines, near_by)))
+        if not len(near):
+            return lines
+        lines, _ = single(without_points(_pieces(lines, near)))
+    raise InputError(
+        f": some lines tangle within {tolerance:.3g} of each other; simplify the drawing",
+        "lines",
+    )
+
+
+def too_many(what: str) -> InputError:
+    """Error about a drawing that is too large to be split."""
+    return InputError(
+        f": {what} are too many (at most {MOST_LINES} lines and pieces of lines, and "
+        f"{MOST_PAIRS} pairs of lines near each other); read a part of the pattern",
+        "lines",
+    )
+
+
+def segments(lines: Lines) -> NDArray:
+    """Geometries of the lines (m,)."""
+    return shapely.linestrings(lines.points[lines.ends])
+
+
+def _neighbors(tree: STRtree, geometries: NDArray) -> Iterator[NDArray]:
+    """Pairs (k, 2) of lines whose boxes overlap, first < second, in portions."""
+    total = 0
+    for start in range(0, len(geometries), _CHUNK):
+        one, other = tree.query(geometries[start : start + _CHUNK])
+        one = one + start
+        total += len(one)
+        if total > 2 * MOST_PAIRS:
+            raise too_many("the lines near each other")
+        yield np.column_stack((one, other))[one < other]
+
+
+def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lines, NDArray]:
+    """Lines with a point at each crossing, and (k, 2) the lines and points of these."""
+    points, ends = lines.points, lines.ends
+    geometries = segments(lines)
+    found = [_crossings(points, ends, near, near_by)
+             for near in _batches(_neighbors(STRtree(geometries), geometries))]  # fmt: skip
+    pairs = np.concatenate([pair for pair, _ in found]) if found else np.empty((0, 2), int)
+    places = np.concatenate([place for _, place in found]) if found else np.empty((0, 2))
+    if not len(pairs):
+        return lines, np.empty((0, 2), dtype=np.int64)
+    if len(pairs) > MOST_LINES:
+        raise too_many(f"{len(pairs)} crossings")
+    every = np.concatenate((points, places))
+    number = merged(every, tolerance, kept=len(points))[len(points) :]
+    more = Lines(every, ends, lines.letters, lines.angles, lines.source)
+    hits = np.concatenate((np.column_stack((pairs[:, 0], number)),
+                           np.column_stack((pairs[:, 1], number))))  # fmt: skip
+    return more, hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
+
+
+def _batches(portions: Iterator[NDArray], size: int = 200_000) -> Iterator[NDArray]:
+    """Portions put together to be worked through in fewer steps."""
+    held: list[NDArray] = []
+    for portion in portions:
+        held.append(portion)
+        if sum(map(len, held)) > size:
+            yield np.concatenate(held)
+            held = []
+    if held:
+        yield np.concatenate(held)
+
+
+def _crossings(
+    points: NDArray, ends: NDArray, pairs: NDArray, tolerance: float
+) -> tuple[NDArray, NDArray]:
+    """Pairs (k, 2) of lines that cross away from their ends, and the places (k, 2)."""
+    pairs = pairs[(ends[pairs[:, 0]][:, :, None] != ends[pairs[:, 1]][:, None, :]).all(axis=(1, 2))]
+    p, q = points[ends[pairs[:, 0], 0]], points[ends[pairs[:, 1], 0]]
+    r, s = points[ends[pairs[:, 0], 1]] - p, points[ends[pairs[:, 1], 1]] - q
+    turn = _cross(r, s)
+    apart = q - p
+    length_r, length_s = np.linalg.norm(r, axis=1), np.linalg.norm(s, axis=1)
+    # Heights of the ends of each line over the other: of both signs, and beyond the tolerance.
+    over_s = -_cross(apart, s) / length_s, (_cross(r, s) - _cross(apart, s)) / length_s
+    over_r = _cross(r, apart) / length_r, (_cross(r, apart) + _cross(r, s)) / length_r
+    cross = np.ones(len(pairs), dtype=bool)
+    for one, other in (over_s, over_r):
+        cross &= (one * other < 0) & (np.abs(one) > tolerance) & (np.abs(other) > tolerance)
+    t = _cross(apart[cross], s[cross]) / turn[cross]
+    return pairs[cross], p[cross] + t[:, None] * r[cross]
+
+
+def _cross(a: NDArray, b: NDArray) -> NDArray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _points_on(lines: Lines, tolerance: float) -> NDArray:
+    """Lines and points (k, 2) where a point lies on a line that does not end there."""
+    used = np.unique(lines.ends)
+    tree = STRtree(segments(lines))
+    number, line = tree.query(
+        shapely.points(lines.points[used]), predicate="dwithin", distance=tolerance
+    )
+    hits = np.column_stack((line, used[number]))
+    return hits[(lines.ends[line] != hits[:, 1:]).all(axis=1)]
+
+
+def _pieces(lines: Lines, hits: NDArray) -> Lines:
+    """Lines split at points: rows (line, point)."""
+    every = np.arange(len(lines.ends))
+    line = np.concatenate((every, every, hits[:, 0]))
+    point = np.concatenate((lines.ends[:, 0], lines.ends[:, 1], hits[:, 1]))
+    start = lines.points[lines.ends[line, 0]]
+    along = lines.points[lines.ends[line, 1]] - start
+    place = np.einsum("ij,ij->i", lines.points[point] - start, along)
+    order = np.lexsort((place, line))
+    line, point = line[order], point[order]
+    same = line[1:] == line[:-1]
+    row = line[:-1][same]
+    return Lines(
+        lines.points,
+        np.column_stack((point[:-1][same], point[1:][same])),
+        lines.letters[row],
+        lines.angles[row],
+        lines.source[row],
+    )

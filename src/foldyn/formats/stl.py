@@ -1,0 +1,62 @@
+"""STL: the triangles of a pattern, flat or folded, as printers and viewers take them; written only.
+
+The text form, in millimeters, which these programs presume since the format has no unit. Panels of
+more corners are cut into triangles between their corners; what they are creased by is lost.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from foldyn.formats.writers import warn_of_boards
+from foldyn.patterns import Pattern
+
+PER_METER = 1e3
+
+
+def write(pattern: Pattern) -> str:
+    """Text of an STL file.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        What to write; panels wound counter-clockwise seen from the front keep their front.
+
+    Returns
+    -------
+    str
+    """
+    warn_of_boards(pattern)
+    name = " ".join(pattern.name.split()) or "foldyn"
+    corners = PER_METER * pattern.vertices[triangles(pattern)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lines = [f"solid {name}"]
+    for normal, three in zip(normals.tolist(), corners.tolist(), strict=True):
+        lines.append("facet normal " + " ".join(f"{value:.9g}" for value in normal))
+        lines.append("outer loop")
+        lines += ["vertex " + " ".join(map(repr, point)) for point in three]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, f"endsolid {name}"]) + "\n"
+
+
+def triangles(pattern: Pattern) -> NDArray[np.int64]:
+    """Vertex numbers (k, 3) of triangles that cover the panels, wound as these are."""
+    found: list[tuple[int, ...]] = []
+    for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
+        found += [face] if len(face) == 3 else _cut(face, pattern.vertices[list(face)], normal)
+    return np.array(found, dtype=np.int64)
+
+
+def _cut(face: tuple[int, ...], corners: NDArray, normal: NDArray) -> list[tuple[int, ...]]:
+    """Triangles of a polygon, cut in its mean plane."""
+    first = corners[1] - corners[0]
+    first = first - (first @ normal) * normal
+    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
+    flat = (corners - corners[0]) @ axes.T
+    number = {tuple(point): v for point, v in zip(flat.tolist(), face, strict=True)}
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
+    rings = [shapely.orient_polygons(piece).exterior.coords[:3] for piece in pieces]
+    return [tuple(number[x, y] for x, y in ring) for ring in rings]

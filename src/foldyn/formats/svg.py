@@ -1,0 +1,249 @@
+"""SVG crease patterns: lines whose colors say what they are, as Origami Simulator draws them.
+
+Red is a mountain, blue a valley, black the outline, yellow a flat crease, green a cut, magenta a
+hinge without a letter; the opacity of a mountain or valley is its fold angle over 180 degrees. y
+points down in an SVG and up in a pattern, which shows the sheet as it is drawn, from its front.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.formats.curves import CHORD
+from foldyn.formats.drawing import Drawing
+from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.notes import count
+from foldyn.formats.planar import MOST_LINES, too_many
+from foldyn.formats.svg_shapes import (
+    PIXEL,
+    SHAPES,
+    Curve,
+    Placing,
+    after,
+    curves,
+    length,
+    numbers,
+    placing,
+)
+from foldyn.formats.svg_styles import Rules, Style, rules_of, styled
+from foldyn.formats.xml_text import DEEPEST, from_xml, local
+from foldyn.values import LONGEST
+
+_GROUPS = ("svg", "g", "a", "switch")
+_NOT_DRAWN = ("text", "image", "foreignObject")
+_STATED = ("mm", "cm", "in", "pt", "pc")
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """How large the drawing is: its view in user units, and what these are."""
+
+    view: tuple[float, float]
+    pixels: float = 1.0  # of a user unit
+    physical: bool = False
+    stretch: float = 1.0  # of y against x
+
+
+@dataclass
+class _Lines:
+    """What is gathered from the elements."""
+
+    rules: Rules
+    names: dict[str, Element]
+    view: tuple[float, float]
+    curves: list[tuple[Curve, Placing, Style, str]] = field(default_factory=list)
+    counts: Counter[str] = field(default_factory=Counter)
+    visited: int = 0
+
+
+def read(text: str) -> Drawing:
+    """Lines of an SVG file.
+
+    Parameters
+    ----------
+    text : str
+        The file's content.
+
+    Returns
+    -------
+    Drawing
+        In user units of the file, y up. Curves are chords within 1e-3 of the drawing's size. What
+        is not displayed, and text, is left out.
+
+    Raises
+    ------
+    InputError
+        No SVG, one that is unsafe to read, or one without lines; the message names the place.
+    """
+    root = from_xml(text, "an SVG file")
+    if local(root) != "svg":
+        raise InputError(f"is not an SVG file: its first element is <{local(root)[:40]}>")
+    frame = _frame(root)
+    rules, left = rules_of("".join(e.text or "" for e in root.iter() if local(e) == "style"))
+    lines = _Lines(rules, {e.get("id", ""): e for e in root.iter()}, frame.view)
+    _walk(root, np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]]), Style(), lines, 0)
+    doubts = []
+    if left:
+        doubts.append(f"{count(left, 'style rule')} with selectors other than tag, class and id")
+    titles = [e.text or "" for e in root if local(e) == "title"]
+    return _drawing(lines, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
+
+
+def _frame(root: Element) -> _Frame:
+    box = numbers(root.get("viewBox", ""))
+    sizes = [(root.get(key) or "").strip() for key in ("width", "height")]
+    physical = any(size[-2:].lower() in _STATED for size in sizes)
+    pixels = [
+        0.0 if "%" in size else length(size, 0.0, f"svg.{key}")
+        for key, size in zip(("width", "height"), sizes, strict=True)
+    ]
+    if len(box) != 4 or not (box[2] > 0 and box[3] > 0):
+        return _Frame((pixels[0] or 100.0, pixels[1] or 100.0), 1.0, physical)
+    view = box[2], box[3]
+    ratios = [p / b for p, b in zip(pixels, view, strict=True) if p > 0]
+    if not ratios:
+        return _Frame(view)
+    aspect = root.get("preserveAspectRatio", "")
+    if "none" in aspect and len(ratios) == 2:
+        return _Frame(view, ratios[0], physical, ratios[1] / ratios[0])
+    return _Frame(view, max(ratios) if "slice" in aspect else min(ratios), physical)
+
+
+def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, depth: int) -> None:
+    """Gather the lines of an element and of what is in it."""
+    lines.visited += 1
+    if lines.visited > MOST_LINES:
+        raise too_many("the elements of the drawing")
+    if depth > DEEPEST:
+        raise InputError(f": elements are used within each other more than {DEEPEST} deep", "use")
+    name = local(element)
+    identity = element.get("id", "")[:40]
+    if identity == "legend" or name not in (*_GROUPS, *SHAPES, *_NOT_DRAWN, "use"):
+        return
+    lines.counts[name] += 1
+    if name in _NOT_DRAWN:
+        return
+    place = f'{name} "{identity}"' if identity else f"{name} {lines.counts[name]}"
+    style = styled(element, lines.rules, inherited, place)
+    if style is None:
+        return
+    here = after(outer, placing(element.get("transform"), place))
+    if name in SHAPES:
+        if style.shown:
+            found = curves(element, lines.view, place)
+            lines.curves += [(curve, here, style, place) for curve in found]
+            if len(lines.curves) > MOST_LINES:
+                raise too_many("the lines")
+        return
+    inside: Iterable[Element] = element
+    if name == "use" or (name == "svg" and depth):
+        x = length(element.get("x"), lines.view[0], f"{place}.x")
+        y = length(element.get("y"), lines.view[1], f"{place}.y")
+        here = after(here, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+    if name == "use":
+        target = lines.names.get(_link(element)[1:]) if _link(element)[:1] == "#" else None
+        if target is None:
+            lines.counts["lost"] += 1
+            return
+        inside = target if local(target) == "symbol" else (target,)
+    for child in inside:
+        _walk(child, here, style, lines, depth + 1)
+
+
+def _link(element: Element) -> str:
+    return element.get("href") or element.get("{http://www.w3.org/1999/xlink}href") or ""
+
+
+def _drawing(lines: _Lines, frame: _Frame, doubts: list[str], title: str) -> Drawing:
+    if not lines.curves:
+        raise InputError(
+            ": there are none to be seen; give crease lines a stroke (red mountains, blue valleys, "
+            "a black outline)",
+            "lines",
+        )
+    boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
+    for box, (*_, place) in zip(boxes, lines.curves, strict=True):
+        if not (np.abs(box) <= LONGEST).all():
+            raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", place)
+    every = np.concatenate(boxes)
+    tolerance = CHORD * float(np.linalg.norm(np.ptp(every, axis=0)))
+    points: list[NDArray[np.float64]] = []
+    letters: list[str] = []
+    opacities: list[float] = []
+    places: list[str] = []
+    taken: Counter[tuple[RGB, RGB | None]] = Counter()
+    total = 0
+    for (curve, here, style, place), box in zip(lines.curves, boxes, strict=True):
+        color = style.color or (0, 0, 0)
+        taken[color, nearest(color)] += 1
+        if nearest(color) is None:
+            continue
+        if curve.straight or not tolerance:
+            along = box[[0, -1]]
+        else:
+            growth = float(np.linalg.svd(here[:, :2], compute_uv=False)[0])
+            along = placed(curve.points(tolerance / growth if growth else tolerance), here)
+        pairs = np.stack((along[:-1], along[1:]), axis=1)
+        pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+        total += len(pairs)
+        if total > MOST_LINES:
+            raise too_many("the lines")
+        points.append(pairs.reshape(-1, 2))
+        letters += [COLORS[nearest(color) or color][0]] * len(pairs)
+        opacities += [style.opacity * style.own if style.stated else np.nan] * len(pairs)
+        places += [place] * len(pairs)
+    if not total:
+        raise InputError(": all are points, or white; give a file with a crease pattern", "lines")
+    angles, said = _fold_angles(np.array(letters), np.array(opacities))
+    curved = sum(not curve.straight for curve, *_ in lines.curves)
+    repairs = [f"{count(curved, 'curve')} drawn as chords within {tolerance:.3g} of it"]
+    return Drawing(
+        np.concatenate(points),
+        np.arange(2 * total).reshape(-1, 2),
+        tuple(letters),
+        angles,
+        meters=frame.pixels * PIXEL if frame.physical else None,
+        assumed=frame.pixels * PIXEL,
+        unit="px" if frame.pixels == 1.0 else "unit",
+        name=title,
+        places=tuple(places),
+        repairs=(*repairs[:curved], *_skipped(lines.counts)),
+        assumptions=said,
+        doubts=(*doubts, *color_doubts(taken)),
+    )
+
+
+def placed(points: NDArray[np.float64], here: Placing) -> NDArray[np.float64]:
+    """Points (k, 2) in the drawing."""
+    return points @ here[:, :2].T + here[:, 2]
+
+
+def _fold_angles(letters: NDArray, opacities: NDArray) -> tuple[NDArray, tuple[str, ...]]:
+    """Fold angles (degrees) of opacities, and what was assumed about them.
+
+    Where a mountain or valley is not opaque, those without a given opacity fold entirely.
+    """
+    folds = np.isin(letters, ("M", "V"))
+    stated = folds & np.isfinite(opacities)
+    if not stated.any():
+        return np.full(len(letters), np.nan), ()
+    if (opacities[stated] < 1.0).any():
+        opacities = np.where(folds & ~stated, 1.0, opacities)
+    angles = np.where(folds, 180.0 * opacities, np.nan)
+    return np.where(letters == "M", -angles, angles), (
+        "opacities are fold angles over 180 degrees",
+    )
+
+
+def _skipped(counts: Counter[str]) -> list[str]:
+    skipped = [count(counts[name], name) for name in _NOT_DRAWN if counts[name]]
+    if counts["lost"]:
+        skipped.append(count(counts["lost"], "reference") + " to what is not in the file")
+    return [f"left out {', '.join(skipped)}"] if skipped else []

@@ -1,0 +1,212 @@
+"""Shapes of SVG as polylines: lines as they are, curves as chords."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+from svgelements import Arc, Close, CubicBezier, Matrix, Move, Path, QuadraticBezier
+
+from foldyn.errors import InputError
+from foldyn.formats.curves import arc_chords, bezier
+from foldyn.formats.xml_text import local
+from foldyn.values import show
+
+PIXEL = 0.0254 / 96
+"""Length of a CSS pixel (m)."""
+_UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6,
+          "pt": 96 / 72, "pc": 16.0}  # fmt: skip
+_LENGTH = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z%]*)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_FUNCTION = re.compile(r"\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)[\s,]*")
+_LONGEST = 2000  # letters of a transform
+SHAPES = ("line", "polyline", "polygon", "rect", "circle", "ellipse", "path")
+Placing = NDArray[np.float64]
+"""Affine map (2, 3) from an element's coordinates to those of the drawing."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A piece of a shape: its ends and, between them, where it bends.
+
+    Attributes
+    ----------
+    frame : ndarray, shape (k, 2)
+        Points that tell how large the piece is, the first and last being its ends.
+    points : callable
+        From a tolerance to points (k, 2) along the piece, ends included.
+    straight : bool
+        Whether it is a line.
+    """
+
+    frame: NDArray[np.float64]
+    points: Callable[[float], NDArray[np.float64]]
+    straight: bool
+
+
+def length(text: str | None, whole: float, place: str, default: float = 0.0) -> float:
+    """Length in pixels; `whole` is what percentages refer to."""
+    if text is None or text.strip() in ("", "auto"):
+        return default
+    match = _LENGTH.fullmatch(text.strip()[:_LONGEST])
+    unit = match[2].lower() if match else None
+    if match is None or unit not in (*_UNITS, "%"):
+        raise InputError(f" = {show(text)}: give a length, as 12, 12px or 5mm", place)
+    value = float(match[1])
+    return value * whole / 100 if unit == "%" else value * _UNITS[str(unit)]
+
+
+def numbers(text: str) -> list[float]:
+    """Numbers of a list, whatever is between them."""
+    return [float(word) for word in _NUMBER.findall(text)]
+
+
+def placing(text: str | None, place: str) -> Placing:
+    """Affine map of a `transform`."""
+    text = (text or "").strip()
+    if not text or text == "none":
+        return np.eye(3)[:2]
+    end = 0
+    while end < len(text) <= _LONGEST and (match := _FUNCTION.match(text, end)):
+        end = match.end()
+    try:
+        if end < len(text):
+            raise ValueError
+        m = Matrix(text)
+        found = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f]], dtype=np.float64)
+    except (ValueError, TypeError, IndexError, OverflowError, AttributeError):
+        raise InputError(f" = {show(text)}: is no transform", f"{place}.transform") from None
+    if not np.isfinite(found).all():
+        raise InputError(f" = {show(text)}: must be finite", f"{place}.transform")
+    return found
+
+
+def after(outer: Placing, inner: Placing) -> Placing:
+    """Map that applies `inner` first."""
+    return outer @ np.vstack((inner, (0.0, 0.0, 1.0)))
+
+
+def curves(element: Element, whole: tuple[float, float], place: str) -> list[Curve]:
+    """Pieces of a shape in its own coordinates.
+
+    Raises
+    ------
+    InputError
+        Attributes that make no shape; the message names the place.
+    """
+    name = local(element)
+
+    def side(key: str, axis: int, default: float = 0.0) -> float:
+        size = whole[axis] if axis < 2 else float(np.hypot(*whole) / np.sqrt(2.0))
+        return length(element.get(key), size, f"{place}.{key}", default)
+
+    if name == "line":
+        return _polyline([(side("x1", 0), side("y1", 1)), (side("x2", 0), side("y2", 1))])
+    if name in ("polyline", "polygon"):
+        given = numbers(element.get("points", ""))
+        points = [(given[k], given[k + 1]) for k in range(0, len(given) - 1, 2)]
+        return _polyline(points + points[:1] if name == "polygon" else points)
+    if name == "rect":
+        x, y, w, h = side("x", 0), side("y", 1), side("width", 0), side("height", 1)
+        rx = side("rx", 0, side("ry", 1))
+        ry = side("ry", 1, rx)
+        if w <= 0 or h <= 0:
+            return []
+        return _rectangle(x, y, w, h, min(max(rx, 0.0), w / 2), min(max(ry, 0.0), h / 2))
+    if name in ("circle", "ellipse"):
+        r = side("r", 2)
+        rx, ry = (r, r) if name == "circle" else (side("rx", 0), side("ry", 1))
+        return _ellipse(side("cx", 0), side("cy", 1), rx, ry) if rx > 0 and ry > 0 else []
+    return list(_path(element.get("d", ""), f"{place}.d"))
+
+
+def _polyline(points: list[tuple[float, float]]) -> list[Curve]:
+    return [_line(np.array(pair)) for pair in pairwise(points)]
+
+
+def _line(ends: NDArray[np.float64]) -> Curve:
+    return Curve(ends, lambda _: ends, True)
+
+
+def _rectangle(x: float, y: float, w: float, h: float, rx: float, ry: float) -> list[Curve]:
+    if not rx or not ry:
+        return _polyline([(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)])
+    corners = ((x + w - rx, y + ry, -90), (x + w - rx, y + h - ry, 0),
+               (x + rx, y + h - ry, 90), (x + rx, y + ry, 180))  # fmt: skip
+    arcs = [_ellipse(cx, cy, rx, ry, start, 90.0)[0] for cx, cy, start in corners]
+    links = [
+        _line(np.array([one.frame[-1], other.frame[0]]))
+        for one, other in zip(arcs, (*arcs[1:], arcs[0]), strict=True)
+    ]
+    return [piece for pair in zip(arcs, links, strict=True) for piece in pair]
+
+
+def _ellipse(
+    cx: float, cy: float, rx: float, ry: float, start: float = 0.0, sweep: float = 360.0
+) -> list[Curve]:
+    """One arc from a start (degrees) about a center; a whole ellipse ends where it begins."""
+
+    def along(count: int) -> NDArray[np.float64]:
+        angle = np.radians(start + sweep * np.linspace(0.0, 1.0, count + 1))
+        points = np.column_stack((cx + rx * np.cos(angle), cy + ry * np.sin(angle)))
+        if sweep == 360.0:
+            points[-1] = points[0]
+        return points
+
+    def points(tolerance: float) -> NDArray[np.float64]:
+        count = arc_chords(max(rx, ry), float(np.radians(sweep)), tolerance)
+        return along(4 * -(-count // 4) if sweep == 360.0 else count)
+
+    return [Curve(along(4), points, False)]
+
+
+def _path(text: str, place: str) -> Iterator[Curve]:
+    if text.strip() in ("", "none"):
+        return
+    try:
+        if text.strip()[0] not in "Mm":
+            raise ValueError
+        path = Path(text)
+    except (ValueError, TypeError, IndexError, OverflowError, ZeroDivisionError, AttributeError):
+        raise InputError(f" = {show(text)}: is no path", place) from None
+    for segment in path:
+        if isinstance(segment, Move):
+            continue
+        start, end = segment.start, segment.end
+        if start is None or end is None:
+            if isinstance(segment, Close):
+                continue
+            raise InputError(f" = {show(text)}: is no path", place)
+        if isinstance(segment, CubicBezier):
+            yield _bezier(start, segment.control1, segment.control2, end)
+        elif isinstance(segment, QuadraticBezier):
+            yield _bezier(start, segment.control, end)
+        elif isinstance(segment, Arc) and segment.sweep:
+            yield _arc(segment)
+        else:
+            yield _line(np.array([(start.x, start.y), (end.x, end.y)]))
+
+
+def _bezier(*points: Any) -> Curve:
+    control = np.array([(point.x, point.y) for point in points])
+    return Curve(control, lambda tolerance: bezier(control, tolerance), False)
+
+
+def _arc(segment: Any) -> Curve:
+    ends = np.array([(segment.start.x, segment.start.y), (segment.end.x, segment.end.y)])
+
+    def along(count: int) -> NDArray[np.float64]:
+        inner = [segment.point(k / count) for k in range(1, count)]
+        return np.array([ends[0], *((point.x, point.y) for point in inner), ends[1]])
+
+    def points(tolerance: float) -> NDArray[np.float64]:
+        radius = max(float(segment.rx), float(segment.ry))
+        return along(arc_chords(radius, float(segment.sweep), tolerance))
+
+    return Curve(along(4), points, False)

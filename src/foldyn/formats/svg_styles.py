@@ -1,0 +1,177 @@
+"""What an SVG element looks like: attributes, style sheets and inheritance, as far as lines go."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from xml.etree.ElementTree import Element
+
+from svgelements import Color
+
+from foldyn.errors import InputError
+from foldyn.formats.line_colors import RGB
+from foldyn.formats.xml_text import local
+from foldyn.values import show
+
+PROPERTIES = ("stroke", "stroke-opacity", "opacity", "display", "visibility", "color")
+_SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
+_HEX = re.compile(r"#(?:[0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})")
+_LONGEST = 200  # letters of a value
+
+
+@dataclass(frozen=True)
+class Style:
+    """How lines of an element are drawn.
+
+    Attributes
+    ----------
+    color : (int, int, int) or None
+        Red, green and blue of the stroke, 0 to 255; None where lines are not drawn.
+    opacity : float
+        Of the stroke, with that of the groups that the element is in.
+    stated : bool
+        Whether an opacity is given anywhere.
+    visible : bool
+        Of the element itself; parts of a group may be visible again.
+    current : (int, int, int)
+        What "currentColor" is.
+    """
+
+    color: RGB | None = None
+    opacity: float = 1.0
+    stated: bool = False
+    visible: bool = True
+    current: RGB = (0, 0, 0)
+    own: float = 1.0  # stroke-opacity, which is inherited; opacity of groups multiplies
+
+    @property
+    def shown(self) -> bool:
+        """Whether there are lines to see."""
+        return self.visible and self.color is not None and self.opacity * self.own > 0.0
+
+
+Rules = list[tuple[tuple[int, int], str, str, frozenset[str], dict[str, str]]]
+"""Style rules in order: (specificity), tag, id, classes, declarations."""
+
+
+def declarations(text: str) -> dict[str, str]:
+    """Values of the properties that count, from "stroke:#f00; opacity: 0.5"."""
+    found = {}
+    for declaration in text.split(";"):
+        name, _, value = declaration.partition(":")
+        if name.strip().lower() in PROPERTIES:
+            found[name.strip().lower()] = value.partition("!")[0].strip()
+    return found
+
+
+def rules_of(text: str) -> tuple[Rules, int]:
+    """Rules of a style sheet, weakest first, and the number of those too intricate to follow."""
+    rules: Rules = []
+    left = 0
+    for order, block in enumerate(_without_comments(text).split("}")):
+        selectors, brace, body = block.rpartition("{")
+        found = declarations(body)
+        if not brace or not found:
+            continue
+        for selector in selectors.rpartition("{")[2].split(","):
+            match = _SELECTOR.fullmatch(selector.strip()[:_LONGEST])
+            if not match or not selector.strip():
+                left += 1
+                continue
+            names = re.findall(r"([.#])([\w-]+)", match[2])
+            ids = [name for kind, name in names if kind == "#"]
+            classes = frozenset(name for kind, name in names if kind == ".")
+            tag = match[1] if match[1] not in (None, "*") else ""
+            weight = 100 * len(ids) + 10 * len(classes) + (1 if tag else 0)
+            rules.append(((weight, order), tag, ids[0] if ids else "", classes, found))
+    return sorted(rules, key=lambda rule: rule[0]), left
+
+
+def _without_comments(text: str) -> str:
+    kept, place = [], 0
+    while (start := text.find("/*", place)) >= 0:
+        kept.append(text[place:start])
+        end = text.find("*/", start + 2)
+        if end < 0:
+            return "".join(kept)
+        place = end + 2
+    return "".join((*kept, text[place:]))
+
+
+def styled(element: Element, rules: Rules, inherited: Style, place: str) -> Style | None:
+    """Style of an element in one of another style; None where nothing in it is displayed.
+
+    Raises
+    ------
+    InputError
+        A value that is none; the message names the place.
+    """
+    given = _given(element, rules)
+    if given.get("display") == "none":
+        return None
+    style = inherited
+    if "visibility" in given and given["visibility"] != "inherit":
+        style = replace(style, visible=given["visibility"] == "visible")
+    if given.get("color", "inherit") not in ("inherit", "currentColor"):
+        style = replace(style, current=_rgba(given["color"], style, place)[0] or (0, 0, 0))
+    if given.get("stroke", "inherit") != "inherit":
+        color, alpha = _rgba(given["stroke"], style, place)
+        style = replace(style, color=color)
+        if alpha < 1.0:
+            style = replace(style, own=alpha, stated=True)
+    if given.get("stroke-opacity", "inherit") != "inherit":
+        own = _share(given["stroke-opacity"], f"{place}.stroke-opacity")
+        style = replace(style, own=own, stated=True)
+    if given.get("opacity", "inherit") != "inherit":
+        share = _share(given["opacity"], f"{place}.opacity")
+        style = replace(style, opacity=style.opacity * share, stated=True)
+    return style
+
+
+def _given(element: Element, rules: Rules) -> Mapping[str, str]:
+    given = {name: element.get(name, "").strip() for name in PROPERTIES if element.get(name)}
+    if rules:
+        tag, name = local(element), element.get("id", "")
+        classes = set(element.get("class", "").split())
+        for _, rule_tag, rule_id, rule_classes, found in rules:
+            if (
+                (not rule_tag or rule_tag == tag)
+                and (not rule_id or rule_id == name)
+                and rule_classes <= classes
+            ):
+                given |= found
+    return given | declarations(element.get("style", ""))
+
+
+def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
+    """Color and opacity of a paint; the first color of a gradient is not known: black."""
+    word = value.lower()
+    if word in ("none", "transparent", ""):
+        return None, 1.0
+    if word == "currentcolor":
+        return style.current, 1.0
+    if word.startswith("url("):
+        return (0, 0, 0), 1.0
+    color = None
+    if len(word) <= _LONGEST and (not word.startswith("#") or _HEX.fullmatch(word)):
+        try:
+            color = Color(word)
+        except (ValueError, TypeError, IndexError, AttributeError, OverflowError):
+            color = None
+    if color is None or color.value is None or (color.rgb == 0 and not _is_black(word)):
+        raise InputError(f" = {show(value)}: is no color", f"{place}.stroke")
+    return (color.red, color.green, color.blue), color.alpha / 255
+
+
+def _is_black(word: str) -> bool:
+    """Whether a color is black by what it says; svgelements takes what it does not know for it."""
+    return word == "black" or word.startswith(("#", "rgb", "hsl"))
+
+
+def _share(value: str, place: str) -> float:
+    try:
+        share = float(value[:-1]) / 100 if value.endswith("%") else float(value)
+    except ValueError:
+        raise InputError(f" = {show(value)}: give a number from 0 to 1", place) from None
+    return min(1.0, max(0.0, share)) if share == share else 1.0

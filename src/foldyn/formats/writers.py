@@ -1,0 +1,85 @@
+"""What writers of all formats need: letters of all edges, whether a pattern is flat, boards."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.patterns import Pattern
+from foldyn.patterns.geometry import seams
+from foldyn.patterns.topology import Edge, edge_lookup
+
+PLANE = 1e-9  # of the pattern's size: heights that count as none
+
+
+def is_plane(pattern: Pattern) -> bool:
+    """Whether all vertices have z = 0, as a file of two coordinates needs it."""
+    return not np.any(pattern.vertices[:, 2])
+
+
+def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
+    """Coordinates (n, 2), m, of a flat pattern.
+
+    Raises
+    ------
+    InputError
+        The pattern is folded or does not lie in a plane z = constant, so that a drawing (`kind`)
+        would not show its true shape.
+    """
+    heights = np.ptp(pattern.vertices[:, 2])
+    folded = np.abs(pattern.dihedrals - np.pi) > 1e-6
+    if heights > PLANE * pattern.size or folded.any():
+        raise InputError(
+            f": {kind} files hold flat patterns, and this one is "
+            + (f"folded at {int(folded.sum())} creases" if folded.any() else "not level")
+            + "; write the flat pattern, or the folded one as .fold, .obj or .stl",
+            "pattern",
+        )
+    return pattern.vertices[:, :2]
+
+
+def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
+    """Every edge with its letter ("B" on the boundary, "C" on a cut) and the angle to fold it to.
+
+    Welds are "F", as facets are in all formats.
+
+    The angle (rad) is NaN where none is given, and on the boundary.
+    """
+    row, welds = edge_lookup(pattern.creases), edge_lookup(pattern.welds)
+    pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
+    cuts = {edge for pair in pairs for edge in pair}
+    told = []
+    for a, b in pattern.edges.tolist():
+        k = row.get((a, b))
+        if (a, b) in welds:
+            told.append(((a, b), "F", np.nan))
+        elif k is None:
+            told.append(((a, b), "C" if (a, b) in cuts else "B", np.nan))
+        else:
+            told.append(((a, b), pattern.assignments[k], float(pattern.fold_angles[k])))
+    return told
+
+
+def warn_of_boards(pattern: Pattern) -> None:
+    """Say that a file has no place for boards."""
+    if pattern.boards is not None:
+        warnings.warn(
+            "pattern: the file has no place for the thickness of its panels and holds the planes "
+            "through their hinge lines; write the thin pattern, and thicken what is read",
+            FoldynWarning,
+            stacklevel=5,
+        )
+
+
+def warn_of_angles(pattern: Pattern, kind: str) -> None:
+    """Say that a file has no place for the angles to fold to."""
+    if not np.isnan(pattern.fold_angles).all():
+        warnings.warn(
+            f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "
+            "to keep them",
+            FoldynWarning,
+            stacklevel=5,
+        )

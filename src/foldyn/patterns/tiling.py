@@ -1,0 +1,159 @@
+"""Copies of patterns side by side: the periods of a pattern, and edges that are glued."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from foldyn.errors import InputError
+from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
+
+PARALLEL = 1e-3  # rad: periods closer than that count as one direction
+MOST_EDGES = 2000
+"""Boundary edges among which periods are looked for."""
+
+
+class Glued(NamedTuple):
+    """Several sheets as one.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m).
+    numbers : list of ndarray of int
+        For each sheet the new number of each of its vertices.
+    joined : int
+        How many pairs of edges were glued.
+    """
+
+    vertices: NDArray[np.float64]
+    numbers: list[NDArray[np.int64]]
+    joined: int
+
+
+def half_edges(faces: Faces, boundary: NDArray) -> NDArray[np.int64]:
+    """Boundary edges (m, 2) in the direction in which their face runs along them."""
+    rim = edge_lookup(boundary)
+    found = [(a, b) for face in faces for a, b in around(face) if edge_of(a, b) in rim]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float) -> Glued:
+    """Join sheets along boundary edges that lie in the same place.
+
+    Only ends of such edges become one, so that cuts within a sheet stay open.
+
+    Parameters
+    ----------
+    vertices : sequence of ndarray, shape (n, 3)
+        Coordinates (m) of each sheet.
+    edges : sequence of ndarray of int, shape (m, 2)
+        Boundary edges of each sheet.
+    tolerance : float
+        Distance (m) that counts as none.
+
+    Returns
+    -------
+    Glued
+        With the vertices of the first sheet first, each where the first sheet has it.
+    """
+    starts = np.cumsum([0, *(len(each) for each in vertices)])
+    points = np.concatenate(list(vertices))
+    rim = np.concatenate([part + start for part, start in zip(edges, starts, strict=False)])
+    owner = np.repeat(np.arange(len(edges)), [len(part) for part in edges])
+    ends = points[rim].reshape(-1, 6)
+    turned = points[rim[:, ::-1]].reshape(-1, 6)
+    tree, same, joined = cKDTree(ends), [], 0
+    for other, flip in ((turned, True), (ends, False)):
+        near = tree.query_ball_tree(cKDTree(other), tolerance * np.sqrt(2.0))
+        for e, matches in enumerate(near):
+            for f in matches:
+                if owner[e] < owner[f]:
+                    same += zip(rim[e], rim[f][::-1] if flip else rim[f], strict=True)
+                    joined += 1
+    pairs = np.array(same, dtype=np.int64).reshape(-1, 2)
+    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(points), len(points)))
+    label = connected_components(graph, directed=False)[1]
+    _, first = np.unique(label, return_index=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    number = rank[label]
+    return Glued(
+        points[np.sort(first)],
+        [number[start:end] for start, end in pairwise(starts)],
+        joined,
+    )
+
+
+def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.float64]:
+    """Two translations (2, 3), m, that put a sheet beside itself, edge to edge.
+
+    They are those that bring the longest parts of the boundary together with others that run the
+    other way, as two panels do on both sides of a crease.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Coordinates (m).
+    edges : ndarray of int, shape (m, 2)
+        Boundary edges in the direction in which their face runs along them.
+    tolerance : float
+        Distance (m) that counts as none.
+
+    Returns
+    -------
+    ndarray, shape (2, 3)
+        First the one that is nearer to the x axis; each towards positive coordinates.
+
+    Raises
+    ------
+    InputError
+        There are no two.
+    """
+    found: list[NDArray] = []
+    if len(edges) <= MOST_EDGES:
+        for step in _translations(vertices, edges, tolerance):
+            if all(_angle(step, other) > PARALLEL for other in found):
+                found.append(step)
+            if len(found) == 2:
+                one, two = found
+                along = [abs(each[0]) / np.linalg.norm(each) for each in found]
+                return np.stack([one, two] if along[0] >= along[1] else [two, one])
+    raise InputError(
+        f": found {len(found)} of the two translations that put the pattern beside itself; give "
+        "them, as in periods=[(0.1, 0, 0), (0, 0.1, 0)]",
+        "periods",
+    )
+
+
+def _translations(vertices: NDArray, edges: NDArray, tolerance: float) -> list[NDArray]:
+    """Translations that bring boundary edges together, the most boundary first."""
+    a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
+    way = b - a
+    near = cKDTree(way).query_ball_tree(cKDTree(-way), 2.0 * tolerance)
+    one = np.repeat(np.arange(len(edges)), [len(others) for others in near])
+    two = np.array([f for others in near for f in others], dtype=np.int64)
+    shifts, lengths = b[two] - a[one], np.linalg.norm(way[one], axis=1)
+    largest = np.take_along_axis(shifts, np.abs(shifts).argmax(axis=1)[:, None], axis=1)
+    shifts = np.where(largest < 0.0, -shifts, shifts)
+    far = np.linalg.norm(shifts, axis=1) > 10.0 * tolerance
+    shifts, lengths = shifts[far], lengths[far]
+    keys, group = np.unique(
+        np.round(shifts / (8.0 * tolerance)).astype(np.int64), axis=0, return_inverse=True
+    )
+    weight = np.bincount(group.ravel(), lengths, len(keys))
+    size = np.linalg.norm(keys, axis=1)
+    order = np.lexsort((size, -np.round(weight / weight.max(initial=1.0), 6)))
+    return [shifts[group.ravel() == k].mean(axis=0) for k in order.tolist()]
+
+
+def _angle(one: NDArray, two: NDArray) -> float:
+    across = np.linalg.norm(np.cross(one, two))
+    return float(np.arctan2(across, abs(one @ two)))

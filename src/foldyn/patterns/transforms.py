@@ -1,0 +1,330 @@
+"""Patterns made from others: scaled, moved, rotated, mirrored, repeated, joined."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.memory import check_memory
+from foldyn.patterns.boards import Boards
+from foldyn.patterns.tiling import glue, half_edges
+from foldyn.patterns.tiling import periods as periods_of
+from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.values import number, numbers, show, vector, whole
+
+PER_VERTEX = 2200.0
+"""Bytes a vertex of a pattern as it is made."""
+FLAT = 1e-6  # rad from pi: a crease between copies that is given no letter by its dihedral
+TURNED = {"M": "V", "V": "M"}
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+class Transforms:
+    """What `Pattern` can make of itself; every method returns a new pattern."""
+
+    if TYPE_CHECKING:
+        vertices: NDArray[np.float64]
+        faces: tuple[tuple[int, ...], ...]
+        assignments: tuple[str, ...]
+        name: str
+        boards: Boards | None
+        fold_angles: NDArray[np.float64]
+        families: Mapping[str, NDArray[np.int64]]
+        custom: Mapping[str, Any]
+        flipped: tuple[bool, ...]
+        creases: NDArray[np.int64]
+        boundary: NDArray[np.int64]
+        welds: NDArray[np.int64]
+        crease_faces: NDArray[np.int64]
+        dihedrals: NDArray[np.float64]
+        size: float
+
+    def scaled(self, factor: float) -> Self:
+        """Return the pattern with all lengths multiplied, those of boards too.
+
+        Parameters
+        ----------
+        factor : float
+            Greater than 0.
+        """
+        factor = number("factor", factor, above=0.0)
+        return self._placed(lambda x: factor * x, factor)
+
+    def moved(self, shift: ArrayLike) -> Self:
+        """Return the pattern moved.
+
+        Parameters
+        ----------
+        shift : array_like, shape (3,)
+            By how much (m).
+        """
+        step = np.array(vector("shift", shift))
+        return self._placed(lambda x: x + step)
+
+    def rotated(
+        self, angle: float, axis: str | ArrayLike = "z", about: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> Self:
+        """Return the pattern rotated, by the right-hand rule.
+
+        Parameters
+        ----------
+        angle : float
+            Degrees.
+        axis : {"x", "y", "z"} or array_like, shape (3,)
+            Direction of the axis.
+        about : array_like, shape (3,)
+            A point on the axis (m).
+        """
+        turn = np.radians(number("angle", angle, unit="degrees"))
+        x, y, z = unit = _direction("axis", axis)
+        center = np.array(vector("about", about))
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        rotation = (
+            np.eye(3)
+            + np.sin(turn) * cross
+            + (1.0 - np.cos(turn)) * (np.outer(unit, unit) - np.eye(3))
+        )  # Rodrigues' formula
+        return self._placed(lambda x: (x - center) @ rotation.T + center)
+
+    def mirrored(self, normal: str | ArrayLike = "x", about: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
+        """Return the mirror image of the pattern.
+
+        The front is mirrored too: panels are listed the other way around, so that what is a
+        valley seen from the front stays one, with its dihedral and its fold angle. In a plane
+        that stands on a flat sheet the mirror image shows the same side, with the same letters.
+
+        Parameters
+        ----------
+        normal : {"x", "y", "z"} or array_like, shape (3,)
+            Direction across the mirror.
+        about : array_like, shape (3,)
+            A point on the mirror (m).
+        """
+        unit = _direction("normal", normal)
+        center = np.array(vector("about", about))
+        reflection = np.eye(3) - 2.0 * np.outer(unit, unit)
+        return self._placed(lambda x: (x - center) @ reflection.T + center, turned=True)
+
+    def repeated(
+        self,
+        counts: Sequence[int],
+        periods: ArrayLike | None = None,
+        tolerance: float = 1e-6,
+    ) -> Self:
+        """Return copies of the pattern side by side as one sheet, glued edge to edge.
+
+        Parameters
+        ----------
+        counts : sequence of two int
+            How many copies along the first and the second period, at least 1.
+        periods : array_like, shape (2, 3), optional
+            Translations (m) from a copy to the next. By default they are found: those that bring
+            the longest parts of the boundary together, first the one nearer to the x axis.
+        tolerance : float
+            Distance, as a fraction of the pattern's size, at which edges lie in the same place.
+
+        Returns
+        -------
+        Pattern
+            The copies run along the second period first. Creases keep letters, fold angles and
+            families; those between copies get the letter of their dihedral, "U" where it is flat.
+
+        Raises
+        ------
+        InputError
+            No periods are found, copies do not meet along edges, or panels are thick.
+        """
+        first, second = _counts(counts)
+        _thin(self)
+        check_memory(
+            "counts", f"a pattern of {first * second * len(self.vertices):.3g} vertices",
+            PER_VERTEX * first * second * len(self.vertices), "take fewer",
+        )  # fmt: skip
+        near = number("tolerance", tolerance, above=0.0) * self.size
+        rim = half_edges(self.faces, self.boundary)
+        steps = periods_of(self.vertices, rim, near) if periods is None else _given(periods)
+        shifts = [i * steps[0] + j * steps[1] for i in range(first) for j in range(second)]
+        made, joined = _joined(self, [(self, shift) for shift in shifts], near)
+        if joined < first * (second - 1) + second * (first - 1):
+            raise InputError(
+                ": copies do not meet along edges; give the translations from one copy to the "
+                "next, or a larger tolerance",
+                "periods",
+            )
+        return made
+
+    def joined(self, other: Self, tolerance: float = 1e-6) -> Self:
+        """Return two patterns as one, glued where boundary edges lie in the same place.
+
+        The front is that of this pattern; where it glues the back of the other to it, mountains
+        and valleys of the other change places, as seen from there.
+
+        Parameters
+        ----------
+        other : Pattern
+        tolerance : float
+            Distance, as a fraction of the larger size, at which edges lie in the same place.
+
+        Returns
+        -------
+        Pattern
+            With the vertices and panels of this pattern first. Creases between the two get the
+            letter of their dihedral, "U" where it is flat.
+
+        Raises
+        ------
+        InputError
+            Not a pattern, thick panels, or an edge that more than two panels would share.
+
+        Warns
+        -----
+        FoldynWarning
+            They share no edge.
+        """
+        if not isinstance(other, Transforms):
+            raise InputError(f" = {show(other)}: give a Pattern", "other")
+        _thin(self), _thin(other)
+        near = number("tolerance", tolerance, above=0.0) * max(self.size, other.size)
+        zero = np.zeros(3)
+        made, joined = _joined(self, [(self, zero), (other, zero)], near)
+        if not joined:
+            warnings.warn(
+                "other: the patterns share no edge and are two parts of one; move one of them so "
+                "that boundary edges coincide, or give a larger tolerance",
+                FoldynWarning,
+                stacklevel=2,
+            )
+        return made
+
+    def changed(self, **values: Any) -> Self:
+        """Return the pattern with other arguments; see `Pattern`.
+
+        Warnings that it has given when it was first made are not given again.
+
+        Parameters
+        ----------
+        **values
+            Arguments of `Pattern`, instead of its own.
+        """
+        own = {
+            "vertices": self.vertices,
+            "faces": self.faces,
+            "assignments": self.assignments,
+            "name": self.name,
+            "boards": self.boards,
+            "fold_angles": self.fold_angles,
+            "families": {name: self.creases[rows] for name, rows in self.families.items()},
+            "custom": self.custom,
+            "welds": self.welds,
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FoldynWarning)
+            return type(self)(**{**own, **values})
+
+    def _placed(self, place: Any, factor: float = 1.0, turned: bool = False) -> Self:
+        """The pattern with its points put elsewhere; with panels listed the other way around."""
+        boards = self.boards
+        order = [
+            np.array([0, *range(len(face) - 1, 0, -1)]) if turned else np.arange(len(face))
+            for face in self.faces
+        ]
+        faces = [
+            tuple(face[k] for k in ranks.tolist())
+            for face, ranks in zip(self.faces, order, strict=True)
+        ]
+        if boards is not None:
+            corners = [boards.of(panel)[ranks] for panel, ranks in enumerate(order)]
+            boards = Boards(
+                boards.offsets, place(np.concatenate(corners)), factor * boards.thickness
+            )
+        return self.changed(vertices=place(self.vertices), faces=faces, boards=boards)
+
+
+def _joined(
+    first: Transforms, sheets: Sequence[tuple[Transforms, NDArray]], near: float
+) -> tuple[Any, int]:
+    """Sheets, each moved, as one pattern; and how many edges were glued."""
+    points = [sheet.vertices + shift for sheet, shift in sheets]
+    rims = [half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets]
+    glued = glue(points, rims, near)
+    faces: list[tuple[int, ...]] = []
+    letters: dict[tuple[int, int], str] = {}
+    angles: dict[tuple[int, int], float] = {}
+    families: dict[str, list[tuple[int, int]]] = {}
+    custom: dict[str, Any] = {}
+    welds: list[tuple[int, int]] = []
+    starts = []
+    for (sheet, _), numbers_ in zip(sheets, glued.numbers, strict=True):
+        starts.append(len(faces))
+        faces += [tuple(numbers_[list(face)].tolist()) for face in sheet.faces]
+        welds += numbers_[sheet.welds].tolist()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        bare = first.changed(
+            vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
+            families=None, custom=None, welds=welds,
+        )  # fmt: skip
+    flat = np.abs(bare.dihedrals - np.pi) < FLAT
+    for k, pair in enumerate(bare.creases.tolist()):
+        letters[pair[0], pair[1]] = "U" if flat[k] else bare.assignments[k]
+    for (sheet, _), numbers_, start in zip(sheets, glued.numbers, starts, strict=True):
+        custom = {**sheet.custom, **custom}
+        pairs = [edge_of(*pair) for pair in numbers_[sheet.creases].tolist()]
+        turned = np.array(bare.flipped)[start + sheet.crease_faces[:, 0]]
+        for k, pair in enumerate(pairs):
+            letter, angle = sheet.assignments[k], float(sheet.fold_angles[k])
+            letters[pair] = TURNED.get(letter, letter) if turned[k] else letter
+            angles[pair] = -angle if turned[k] else angle
+        for name, rows in sheet.families.items():
+            families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
+    known = edge_lookup(bare.creases)
+    return (
+        bare.changed(
+            assignments=letters,
+            fold_angles={pair: angle for pair, angle in angles.items() if pair in known},
+            families=families,
+            custom=custom,
+        ),
+        glued.joined,
+    )
+
+
+def _given(steps: Any) -> NDArray[np.float64]:
+    """Translations (2, 3) as they are given."""
+    array = numbers("periods", steps)
+    if array.shape != (2, 3):
+        raise InputError(
+            f" = {show(steps)}: give two translations, as in [(0.1, 0, 0), (0, 0.1, 0)]", "periods"
+        )
+    return array
+
+
+def _counts(counts: Any) -> tuple[int, int]:
+    try:
+        first, second = counts
+    except (TypeError, ValueError):
+        raise InputError(f" = {show(counts)}: give two numbers, as in (3, 2)", "counts") from None
+    return whole("counts[0]", first, least=1), whole("counts[1]", second, least=1)
+
+
+def _thin(pattern: Transforms) -> None:
+    if pattern.boards is not None:
+        raise InputError(
+            ": its panels are thick; repeat or join the thin pattern, and thicken the result",
+            "pattern",
+        )
+
+
+def _direction(name: str, given: Any) -> NDArray[np.float64]:
+    """Unit vector (3,) of an axis that is named or given by its coordinates."""
+    if isinstance(given, str) and given in AXES:
+        return np.array(AXES[given])
+    if isinstance(given, str):
+        raise InputError(f' = {show(given)}: give "x", "y", "z" or three numbers', name)
+    direction = np.array(vector(name, given, nonzero=True))
+    return direction / np.linalg.norm(direction)
