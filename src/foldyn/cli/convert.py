@@ -65,7 +65,7 @@ def _pattern(given: argparse.Namespace, source: Path) -> tuple[Pattern, Sequence
     frame = int(given.frame) if given.frame and given.frame.isdecimal() else given.frame
     if not given.check:
         return read_pattern(source, given.scale, given.unit, frame, "line"), ()
-    pattern, diagnosis, _ = diagnose(source, given.scale, given.unit, frame, "line")
+    pattern, diagnosis = diagnose(source, given.scale, given.unit, frame, "line")
     print(f"{source}: {pattern!r}")
     print(diagnosis)
     return pattern, ()

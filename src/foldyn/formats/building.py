@@ -31,7 +31,6 @@ class Built(NamedTuple):
 
     pattern: Pattern
     diagnosis: Diagnosis
-    facets: tuple[Edge, ...] = ()  # creases that the drawing itself assigns "F", not to be folded
 
 
 def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) -> Built:
@@ -91,8 +90,8 @@ def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) 
             tuple(notes.repairs),
             tuple(notes.doubts),
             flat_foldability(pattern),
+            _facets(pattern, panels),
         ),
-        _facets(pattern, panels),
     )
 
 

@@ -28,23 +28,23 @@ def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
     drawn = _drawn(made, drawing)
     if facets is not None:
         choice("facets", facets, FACETS)
-        if facets == HINGE or not (drawn or made.facets):
+        if facets == HINGE or not (drawn or made.diagnosis.facets):
             return made
-        chosen = tuple(dict.fromkeys((*made.facets, *drawn)))
+        chosen = tuple(dict.fromkeys((*made.diagnosis.facets, *drawn)))
         with within("facets"):
             return made._replace(pattern=welded(made.pattern, chosen, join=facets == WELD))
     if drawing.welds is not None:
         return made._replace(pattern=welded(made.pattern, drawn)) if drawn else made
-    if not made.facets:
+    if not made.diagnosis.facets:
         return made
-    told, bent = made.diagnosis, _bent(made.pattern, made.facets)
+    told, bent = made.diagnosis, _bent(made.pattern, made.diagnosis.facets)
     if bent:
         text = (
             f"{bent}: flat creases of the file are folded, so that all of its flat creases are "
             'hinges; facets = "weld" takes them for lines in the sheet, "hinge" for hinges'
         )
         return made._replace(diagnosis=replace(told, doubts=(*told.doubts, text)))
-    pattern = welded(made.pattern, made.facets)
+    pattern = welded(made.pattern, made.diagnosis.facets)
     text = _acted(made.pattern, pattern)
     return made._replace(
         pattern=pattern, diagnosis=replace(told, assumptions=(*told.assumptions, text))

@@ -112,7 +112,7 @@ def read_pattern(
     FoldynWarning
         What was assumed, with the pattern's size, what was repaired, and what may not be meant.
     """
-    pattern, diagnosis, _ = diagnose(path, scale, unit, frame, facets)
+    pattern, diagnosis = diagnose(path, scale, unit, frame, facets)
     size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
     for told in (
         diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",

@@ -15,9 +15,10 @@ beta K_b beta / 2.
 On a side shared by two triangles of one panel, and along a weld of two panels, the sheet is smooth:
 with d the change of the dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a
 rotation without mass. On a crease each side has a rotation of its own, and the crease turns by what
-is left of the dihedral, d - x - y. Free sides have no moment: their rotation is eliminated in the triangle. A clamped side
-keeps its rest tangent in space: its hinge has a wing that is no node and rides on the mean
-displacement of the side's ends. The sides of rigid panels, which stay flat, have no rotations.
+is left of the dihedral, d - x - y. Free sides have no moment: their rotation is eliminated in the
+triangle. A clamped side keeps its rest tangent in space: its hinge has a wing that is no node and
+rides on the mean displacement of the side's ends. The sides of rigid panels, which stay flat, have
+no rotations.
 """
 
 from __future__ import annotations

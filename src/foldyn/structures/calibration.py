@@ -51,15 +51,6 @@ def bend_stiffness_per_length(d: NDArray, g: NDArray, t: NDArray) -> NDArray:
     return g * (d / t) ** (1.0 / 3.0) / d
 
 
-def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole welds (nw,), N m/rad: that of a bend on a diagonal as long."""
-    count, length = len(pattern.faces), lengths(pattern.vertices, pattern.welds)
-    g = sheet.values("bending_modulus", count)[pattern.weld_faces]
-    t = sheet.values("thickness", count)[pattern.weld_faces]
-    sides = bend_stiffness_per_length(length[:, None], g, t) * length[:, None]
-    return 2.0 / (1.0 / sides).sum(axis=1)
-
-
 def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool) -> NDArray:
     """Stiffness of each whole bend (N m/rad), in the mesh's order."""
     vector = mesh.nodes[mesh.inner[:, 1]] - mesh.nodes[mesh.inner[:, 0]]

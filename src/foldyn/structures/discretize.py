@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
@@ -88,8 +89,9 @@ def discretize(
         bow between their ends.
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
-        but that of the scheme "n5b8e" where this is given, and "herkal", the paper's, where a
-        calibration other than "plate" is given, or `bend_law="superlinear"` and no calibration.
+        but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,
+        where a calibration other than "plate" is given, or `bend_law="superlinear"` and no
+        calibration.
 
     Returns
     -------
@@ -111,12 +113,20 @@ def discretize(
     check_kinds(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
-        preset, scheme=scheme, mass=mass, bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
+        preset, welds=len(pattern.welds) > 0, scheme=scheme, mass=mass,
+        bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
         straight=boundary_edges(straight, pattern, "straight"),
     )  # fmt: skip
     check_welds(options.rigid, pattern)
+    if len(pattern.welds) and options.scheme != "n5b8e":
+        warnings.warn(
+            f"pattern: its welds ({len(pattern.welds)}) become hinges, which bend as the sheet "
+            'does only roughly: take preset = "n5b8e", or a shell',
+            FoldynWarning,
+            stacklevel=2,
+        )
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     calibrate.check_sheet(sheet, pattern)
@@ -127,8 +137,8 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
-    bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
-    bends = np.concatenate([bends, calibrate.weld_stiffness(pattern, sheet)])
+    welds, onset = plate.weld_stiffness(pattern, sheet), np.zeros(0)
+    bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates = None
     if options.scheme == "n5b8e":
         every = range(len(pattern.faces))
@@ -136,12 +146,11 @@ def discretize(
             mesh, pattern, sheet, options.straight,
             every if isinstance(options.rigid, str) else options.rigid or (),
         )  # fmt: skip
-        bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends) + len(mesh.welds))
+        bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
     elif options.calibration == "plate":
         folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
-        small = plate.bend_stiffness(mesh, pattern, sheet), plate.weld_stiffness(pattern, sheet)
-        bends, large = np.concatenate(small), bends
-        onset = plate_onset(bends, large)
+        small = np.concatenate([plate.bend_stiffness(mesh, pattern, sheet), welds])
+        bends, onset = small, plate_onset(small, bends)
 
     x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)

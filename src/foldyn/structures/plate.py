@@ -9,7 +9,10 @@ spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the 
                             `POLYGON`, because a plate that only its corners bend is softer;
 diagonal (N4B5)             2 (1 - nu) G A s / D^2, A the area of its two triangles;
 fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2), but for panels
-                            that are rigid.
+                            that are rigid;
+weld of length Lf           1/k = sum over its two panels of c A/(G Lf^2), a crease that does not
+                            turn; in triangles c = 2/3, which is a third of their height: the sheet
+                            between the middles of two panels.
 
 All four spokes of a quad are alike. The twist of a parallelogram, with its corners at +w and -w in
 turn, then has the stiffness 32 (1 - nu) G s/A, which without s is that of a plate whose edges stay
@@ -33,6 +36,7 @@ from foldyn.structures.sheet import Sheet
 
 COMPLIANCE, ALONE = 0.12, 0.19  # c of panels of more than three corners; of quads with one crease
 TRIANGLE = (0.22, 0.6)  # c of triangles without a free edge, and with one or two
+MIDDLE = 2.0 / 3.0  # c of triangles at a weld
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
 SKEW = (0.18, 0.5, 0.63, 0.84, 3.0)  # e with 0, 1, 2 (opposite), 3, 4 edges free
 OBTUSE, ACUTE = 0.7, 1.2  # e with two creases that meet at an obtuse or at an acute corner
@@ -83,13 +87,19 @@ def _given_way(pattern: Pattern, sheet: Sheet) -> NDArray:
     """Turn c A/G (np,), m2/(N m), of panels at an edge of length 1 under a moment of 1."""
     free = _free_edges(pattern)
     share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
-    return share * pattern.face_areas / sheet.values("bending_modulus", len(pattern.faces))
+    return share * pattern.face_areas / _modulus(pattern, sheet)
 
 
 def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of whole welds (nw,), N m/rad: that of a fold with a crease that does not turn."""
-    compliance, length = _given_way(pattern, sheet), lengths(pattern.vertices, pattern.welds)
-    return length**2 / compliance[pattern.weld_faces].sum(axis=1)
+    """Stiffness of whole welds (nw,), N m/rad: that of the panels on both sides in series."""
+    share = _given_way(pattern, sheet)
+    flat = np.array([len(face) == 3 for face in pattern.faces])
+    share[flat] = (MIDDLE * pattern.face_areas / _modulus(pattern, sheet))[flat]
+    return lengths(pattern.vertices, pattern.welds) ** 2 / share[pattern.weld_faces].sum(axis=1)
+
+
+def _modulus(pattern: Pattern, sheet: Sheet) -> NDArray:
+    return sheet.values("bending_modulus", len(pattern.faces))
 
 
 def _free_edges(pattern: Pattern) -> set[tuple[int, ...]]:
