@@ -70,7 +70,9 @@ def test_panels_that_do_not_lie_in_one_plane_stay():
     angle = np.radians(np.array([0, 10, 20]))
     arc = np.column_stack([np.sin(angle), np.zeros(3), np.cos(angle)])
     roof = fd.Pattern(
-        np.concatenate([arc, arc + (0, 1, 0)]), [(0, 1, 4, 3), (1, 2, 5, 4)], {(1, 4): "F"}
+        np.concatenate([arc, arc + np.array([0, 1, 0])]),
+        [(0, 1, 4, 3), (1, 2, 5, 4)],
+        {(1, 4): "F"},
     )
     made = fd.welded(roof)
     assert (made.faces, made.welds.tolist()) == (roof.faces, [[1, 4]])
@@ -145,7 +147,7 @@ def test_thick_panels_are_no_sheet():
     halves = fd.Pattern(
         [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
     )
-    with pytest.raises(InputError, match="panels . and . are welded"):
+    with pytest.raises(InputError, match="are welded to one sheet"):
         fd.thicken(fd.welded(halves), 0.01)
     with pytest.raises(InputError, match="facets: thick panels are boards"):
         fd.welded(fd.thicken(halves, 0.01))

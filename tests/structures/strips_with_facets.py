@@ -52,7 +52,7 @@ def half_pipe(facets, radius=0.1, angle=90.0):
     n = facets + 1
     faces = [(k, k + 1, n + k + 1, n + k) for k in range(facets)]
     letters = {(k, n + k): "F" for k in range(1, facets)}
-    return fd.Pattern(np.concatenate([arc, arc + (0, 0.1, 0)]), faces, letters)
+    return fd.Pattern(np.concatenate([arc, arc + np.array([0, 0.1, 0])]), faces, letters)
 
 
 def elastic(structure, count=12):
