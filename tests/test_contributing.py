@@ -29,7 +29,7 @@ EXISTING = {
     "A history": ("", "", r"\b(Chirp|CHIRP)\b"),
     "An integrator": ("leapfrog", "central_difference", r'(?<!")\bcentral_difference\b(?!")'),
     "A law": ("cubic", "linear", r"\bLinearBar\b|\blinear\.(bar_(energy|stress|slope)|CODE)"),
-    "A format": ("obj", "fold", r"formats import fold\b"),
+    "A format": ("ply", "stl", r"\bstl\.write\b"),
 }
 CASE = """
 [pattern]

@@ -258,8 +258,8 @@ def test_a_pattern_file_without_faces(workplace, edited) -> None:
     workplace.write('{"vertices_coords": [[0, 0], [1, 0], [1, 1]]}', "bare.fold")
     check(
         workplace.run(edited((KIND, 'file = "bare.fold"'))),
-        'pattern.file = "bare.fold": bare.fold: faces_vertices is missing',
-        "export the pattern with its faces",
+        'pattern.file = "bare.fold": bare.fold: edges_vertices is missing',
+        "export the pattern with its edges",
     )
 
 

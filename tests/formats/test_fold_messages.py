@@ -30,7 +30,7 @@ BAD_FIELDS = [
     ({"faces_vertices": {}}, "faces_vertices must be a list"),
     (
         {"faces_vertices": [[0, 1, 9]]},
-        r"faces_vertices\[0\] = \[0, 1, 9\]: give vertex numbers from 0 to 5",
+        r"faces_vertices\[0\] = \[0, 1, 9\]: give at least three vertex numbers from 0 to 5",
     ),
     (
         {"faces_vertices": [[0, 1, 1.5]]},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fuzz_of_cases
+import fuzz_of_drawings
 import fuzz_of_fits
 import fuzz_of_patterns
 import fuzz_of_results
@@ -14,8 +15,9 @@ TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
         fuzz_of_cases.TARGET,
+        *fuzz_of_drawings.TARGETS,
         fuzz_of_fits.TARGET,
-        fuzz_of_patterns.TARGET,
+        *fuzz_of_patterns.TARGETS,
         *fuzz_of_results.TARGETS,
         fuzz_of_selections.TARGET,
         fuzz_of_tables.TARGET,

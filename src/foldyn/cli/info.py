@@ -11,7 +11,19 @@ from foldyn import __version__
 from foldyn.errors import InputError
 from foldyn.studies import shipped_cases
 
-REQUIRED = ("numpy", "scipy", "numba", "xarray", "h5netcdf", "pydantic", "matplotlib", "tqdm")
+REQUIRED = (
+    "numpy",
+    "scipy",
+    "numba",
+    "xarray",
+    "h5netcdf",
+    "pydantic",
+    "matplotlib",
+    "tqdm",
+    "shapely",
+    "svgelements",
+    "defusedxml",
+)
 
 
 def info() -> str:
@@ -20,6 +32,7 @@ def info() -> str:
     from foldyn.dynamics import METHODS, compiled
     from foldyn.experiment.camera import opencv
     from foldyn.formats import FORMATS
+    from foldyn.formats.dxf_writer import ezdxf
     from foldyn.linear.frf import METHODS as FRF_METHODS
     from foldyn.mechanics.threads import MOST
     from foldyn.patterns import GENERATORS
@@ -30,6 +43,7 @@ def info() -> str:
 
     video = _part(find_ffmpeg, "imageio-ffmpeg")
     camera = _part(lambda: opencv().__version__, "opencv-python-headless")
+    drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
     lines = [
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
@@ -41,6 +55,7 @@ def info() -> str:
     lines += [
         f"optional parts: ffmpeg for MP4 animations, {video}",
         f"optional part for camera tracking: OpenCV, {camera}",
+        f"optional part for pattern files in DXF: {drawings}",
         *(
             f"optional solver for large structures: {name}, "
             f"{'found' if solver.present else f'missing: pip install {solver.module}'}"

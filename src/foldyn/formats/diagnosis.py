@@ -78,10 +78,11 @@ class Diagnosis:
                 )
                 if not holds
             ]
+            deficit = round(float(np.degrees(v.deficits[k])), 3) + 0.0  # no -0
             alternating = "odd" if v.degrees[k] % 2 else f"{np.degrees(v.alternating[k]):.3f}"
             lines.append(
                 f"{v.vertices[k]:8d}{v.degrees[k]:8d}{v.mountains[k]:6d}{v.valleys[k]:6d}"
-                f"{v.unassigned[k]:6d}{alternating:>10}{np.degrees(v.deficits[k]):10.3f}"
+                f"{v.unassigned[k]:6d}{alternating:>10}{deficit:10.3f}"
                 + (f"  {', '.join(faults)}" if faults else "")
             )
         if len(good) > MOST_ROWS:

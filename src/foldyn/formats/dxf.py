@@ -26,6 +26,7 @@ from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.notes import count
 from foldyn.formats.planar import MOST_LINES, too_many
 from foldyn.formats.units import METERS
+from foldyn.input_files import DEEPEST
 from foldyn.values import LONGEST, shortened
 
 _LAYERS = (
@@ -37,6 +38,7 @@ _LAYERS = (
     ("U", re.compile(r"fold|crease|hinge|^u$")),
 )
 _DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
+_MOST_INSERTED = 10_000
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 12: "nm", 13: "um", 21: "ft"}
 """Units by their number in $INSUNITS (DXF reference, header section)."""
 
@@ -124,7 +126,12 @@ def _entities(document: Any) -> tuple[list[Any], list[str]]:
     layers = [layer for layer in document.layers if layer.is_off() or layer.is_frozen()]
     hidden = {layer.dxf.name.lower() for layer in layers}
     kept, others = [], Counter[str]()
-    for entity in islice(recursive_decompose(document.modelspace()), MOST_LINES + 1):
+    space = document.modelspace()
+    if _inserted(space, document, {}, 0) > _MOST_INSERTED:
+        raise too_many("the entities of blocks")
+    if len(space) > MOST_LINES:
+        raise too_many("the entities")
+    for entity in recursive_decompose(space):
         kind = entity.dxftype()
         if entity.dxf.get("layer", "0").lower() in hidden or entity.dxf.get("invisible", 0):
             others["hidden"] += 1
@@ -132,12 +139,25 @@ def _entities(document: Any) -> tuple[list[Any], list[str]]:
             kept.append(entity)
         else:
             others[kind] += 1
-    if len(kept) + sum(others.values()) > MOST_LINES:
-        raise too_many("the entities")
     if not others:
         return kept, []
     said = ", ".join(count(number, kind) for kind, number in sorted(others.items())[:6])
     return kept, [f"left out {said}"]
+
+
+def _inserted(layout: Any, document: Any, known: dict[str, int], depth: int) -> int:
+    """How many entities the blocks of a layout make, in all."""
+    total = 0
+    for insert in layout.query("INSERT"):
+        name = str(insert.dxf.get("name", "")).lower()
+        if name in document.blocks:
+            if name not in known:
+                if depth == DEEPEST:
+                    raise InputError(f": nested deeper than {DEEPEST} levels", "blocks")
+                block = document.blocks.get(name)
+                known[name] = len(block) + _inserted(block, document, known, depth + 1)
+            total += max(1, insert.mcount) * (1 + known[name])
+    return total
 
 
 def _paths(entity: Any) -> Iterator[Any]:

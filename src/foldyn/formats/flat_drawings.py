@@ -11,6 +11,7 @@ from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, enclosed, sheet, with_inner_borders
 from foldyn.formats.planar import (
     Lines,
+    check_crowding,
     joined,
     on_lines,
     single,
@@ -43,6 +44,7 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     whole = _joined(lines, tolerance, notes)
     whole, contradictions = single(whole)
     notes.contradict(contradictions)
+    check_crowding(whole)
     whole = _on_lines(whole, tolerance, notes)
     pieces = split(whole, tolerance)
     if len(pieces.ends) > len(whole.ends):
@@ -101,7 +103,7 @@ def _joined(lines: Lines, tolerance: float, notes: Notes) -> Lines:
     """Lines with joined ends, none of no length."""
     whole = joined(lines, tolerance)
     moves = np.linalg.norm(whole.points[whole.ends] - lines.points[lines.ends], axis=2)
-    moved = np.count_nonzero(moves > _SAME * lines.size)
+    moved = int(np.count_nonzero(moves > _SAME * lines.size))
     if moved:
         notes.repairs.append(
             f"joined {count(moved, 'line end')} to others up to {1e3 * moves.max():.3g} mm away"
@@ -125,7 +127,7 @@ def _on_lines(lines: Lines, tolerance: float, notes: Notes) -> Lines:
     moves = np.linalg.norm(placed.points - lines.points, axis=1)
     if moves.any():
         notes.repairs.append(
-            f"moved {count(np.count_nonzero(moves), 'line end')} onto lines up to "
+            f"moved {count(int(np.count_nonzero(moves)), 'line end')} onto lines up to "
             f"{1e3 * moves.max():.3g} mm away"
         )
     return placed

@@ -120,7 +120,7 @@ def _frame(document: dict[str, Any], chosen: int | str | None) -> dict[str, Any]
                 "its frame_parent."
             )
         seen.add(number)
-        own = {_OLD.get(key, key): value for key, value in frames[number].items()}
+        own = {_OLD.get(key) or key: value for key, value in frames[number].items()}
         fields = {**own, **fields}
         if number == 0 or own.get("frame_inherit") is not True:
             return fields
@@ -200,9 +200,11 @@ def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | 
         return None
     faces = []
     for f, face in enumerate(_list(fields, "faces_vertices")):
-        if not isinstance(face, list) or not all(type(v) is int and 0 <= v < count for v in face):
+        known = isinstance(face, list) and all(type(v) is int and 0 <= v < count for v in face)
+        if not known or len(face) < 3:
             raise InputError(
-                f"faces_vertices[{f}] = {show(face)}: give vertex numbers from 0 to {count - 1}."
+                f"faces_vertices[{f}] = {show(face)}: give at least three vertex numbers from 0 to "
+                f"{count - 1}."
             )
         faces.append(tuple(face))
     return tuple(faces) or None  # some programs write an empty list

@@ -45,7 +45,7 @@ def closed(lines: Lines, tolerance: float) -> tuple[Lines, int, float]:
     used = np.unique(lines.ends)
     near = cKDTree(lines.points[used]).query(lines.points[open_ends], k=min(3, len(used)),
                                              distance_upper_bound=gap)  # fmt: skip
-    tree, geometries = STRtree(segments(lines)), shapely.points(lines.points[open_ends])
+    tree, geometries = STRtree(segments(lines)), np.asarray(shapely.points(lines.points[open_ends]))
     for k, (end, root) in enumerate(zip(open_ends.tolist(), roots.tolist(), strict=True)):
         if into[end] != end:
             continue

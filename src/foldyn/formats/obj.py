@@ -1,8 +1,9 @@
 """OBJ: meshes of polygons, with the creases that origami programs put into it.
 
 Creases are comment lines ``#e a b kind angle``: two vertices counted from 1, what the edge is, and
-a fold angle in degrees. Freeform Origami (T. Tachi) defined them, and MERLIN2 and Origami Simulator
-(js/saveSTL.js) write its kinds: 0 boundary, 1 flat, 2 valley, 3 mountain. ORIPA has numbers of its
+a fold angle in degrees. They come from Freeform Origami (T. Tachi), and other programs (MERLIN2)
+share them; its kinds, as Origami Simulator writes them for it (js/saveSTL.js), are 0 boundary, 1
+flat, 2 valley, 3 mountain. ORIPA (doc/exporter/ExporterOBJ.java) has numbers of its
 own (1 cut, 2 mountain, 3 valley) and coordinates of the screen, whose y runs down. Lines without
 faces (``l a b c``) are creases that are unassigned, or what their group, object or material is
 called: "mountain", "valley", "boundary", "facet", "cut".
@@ -24,8 +25,8 @@ from foldyn.formats.writers import letters, warn_of_boards
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
-FREEFORM = ("B", "F", "V", "M", "U")
-"""Letters of the kinds of `#e`; the last one is ours, for unassigned creases."""
+FREEFORM = ("B", "F", "V", "M", "U", "C")
+"""Letters of the kinds of `#e`; the last two are ours, for unassigned creases and cuts."""
 ORIPA = ("U", "B", "M", "V", "F")
 GROUPS = {"mountain": "M", "valley": "V", "boundary": "B", "border": "B", "facet": "F",
           "flat": "F", "cut": "C"}  # fmt: skip
@@ -74,6 +75,8 @@ def read(text: str) -> Drawing:
             vertices.append(_coordinates(rest, place))
         elif word == "f":
             faces.append(_corners(rest, known, place))
+            if len(rest) < 3:
+                raise InputError(": a face needs at least three corners", place)
         elif word == "#e":
             creases.append(_crease(rest, known, place, ORIPA if oripa else FREEFORM))
         elif word == "l":
@@ -225,13 +228,12 @@ def write(pattern: Pattern) -> str:
     """
     warn_of_boards(pattern)
     lines = ["# Foldyn", "# unit: m", "# edges: #e vertex vertex kind angle; kinds: "
-             "0 boundary, 1 flat, 2 valley, 3 mountain, 4 unassigned"]  # fmt: skip
+             "0 boundary, 1 flat, 2 valley, 3 mountain, 4 unassigned, 5 cut"]  # fmt: skip
     if pattern.name:
         lines.append(f"o {' '.join(pattern.name.split())}")
     lines += ["v " + " ".join(map(repr, point)) for point in pattern.vertices.tolist()]
     lines += ["f " + " ".join(str(v + 1) for v in face) for face in pattern.faces]
     for (a, b), letter, angle in letters(pattern):
-        kind = FREEFORM.index("B" if letter == "C" else letter)
         told = "" if np.isnan(angle) else f" {float(np.degrees(angle))!r}"
-        lines.append(f"#e {a + 1} {b + 1} {kind}{told}")
+        lines.append(f"#e {a + 1} {b + 1} {FREEFORM.index(letter)}{told}")
     return "\n".join(lines) + "\n"

@@ -105,7 +105,9 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
     corners, polygon = shapely.get_coordinates(
         shapely.get_exterior_ring(polygons), return_index=True
     )
-    number = {(x, y): k for k, (x, y) in enumerate(lines.points.tolist())}
+    used = np.unique(lines.ends)  # others may lie in the same places
+    places = lines.points[used].tolist()
+    number = {(x, y): k for k, (x, y) in zip(used.tolist(), places, strict=True)}
     numbers = [number[x, y] for x, y in corners.tolist()]
     bounds = np.searchsorted(polygon, np.arange(len(polygons) + 1)).tolist()
     faces = []
@@ -119,6 +121,7 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
 def _straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
     """Lines without those of the suspected points that lie within a line of one kind."""
     at: dict[int, set[int]] = {}
+    drawn = {edge_of(a, b) for a, b in lines.ends.tolist()}
     for row, (a, b) in enumerate(lines.ends.tolist()):
         at.setdefault(a, set()).add(row)
         at.setdefault(b, set()).add(row)
@@ -131,7 +134,7 @@ def _straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
             lines.angles[one], lines.angles[other], equal_nan=True
         )
         a, b = int(ends[one].sum() - point), int(ends[other].sum() - point)
-        if not alike or a == b:
+        if not alike or edge_of(a, b) in drawn:
             continue
         along = lines.points[b] - lines.points[a]
         to = lines.points[point] - lines.points[a]
@@ -140,6 +143,7 @@ def _straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
         if not 0 < to @ along < along @ along:
             continue
         ends[one], kept[other] = (a, b), False
+        drawn.add(edge_of(a, b))
         at[b] = at[b] - {other} | {one}
     joined = Lines(lines.points, ends, lines.letters, lines.angles, lines.source)
     return joined.taken(kept)
@@ -157,7 +161,7 @@ def with_inner_borders(panels: Panels) -> tuple[Panels, int, int]:
     if not inner:
         return Panels(panels.points, panels.faces, letters, panels.angles), 0, 0
     plain = set(letters.values()) == {"B"}
-    part = components(list(sides), len(panels.points))
+    part = components(list(letters), len(panels.points))  # as drawn, without what was divided
     rim = {part[edge[0]] for edge, at in sides.items() if len(at) == 1}
     folds = [edge for edge in inner if plain and part[edge[0]] in rim]
     letters |= dict.fromkeys(inner, "C") | dict.fromkeys(folds, "U")
@@ -169,7 +173,7 @@ def areas(panels: Panels) -> NDArray[np.float64]:
     """Area of each panel of a flat drawing."""
     corners = panels.points[[point for face in panels.faces for point in face], :2]
     number = np.repeat(np.arange(len(panels.faces)), [len(face) for face in panels.faces])
-    return shapely.area(shapely.polygons(shapely.linearrings(corners, indices=number)))
+    return np.asarray(shapely.area(shapely.polygons(shapely.linearrings(corners, indices=number))))
 
 
 def parts(panels: Panels) -> NDArray[np.int64]:

@@ -27,6 +27,7 @@ FINEST, COARSEST = 1e-6, 5e-4
 _SHARE = 0.1  # of the length of the shortest twentieth of the lines
 _ROUNDS = 12
 _RANKS = {letter: rank for rank, letter in enumerate("CMVUFJB")}
+_SOME = 500
 _CHUNK = 16  # lines whose neighbors are listed at once: at most 16 * MOST_LINES pairs
 
 
@@ -195,6 +196,21 @@ def split(lines: Lines, tolerance: float) -> Lines:
     )
 
 
+def check_crowding(lines: Lines) -> None:
+    """Refuse lines of which too many are near each other, judged by some of them.
+
+    Raises
+    ------
+    InputError
+        So many that `split` would work long before it refuses them.
+    """
+    geometries = segments(lines)
+    some = geometries[:: -(-len(geometries) // _SOME)]
+    pairs = len(STRtree(geometries).query(some)[0]) * len(geometries) / len(some)
+    if pairs > 4 * MOST_PAIRS:
+        raise too_many("the lines near each other")
+
+
 def too_many(what: str) -> InputError:
     """Error about a drawing that is too large to be split."""
     return InputError(
@@ -206,7 +222,7 @@ def too_many(what: str) -> InputError:
 
 def segments(lines: Lines) -> NDArray:
     """Geometries of the lines (m,)."""
-    return shapely.linestrings(lines.points[lines.ends])
+    return np.asarray(shapely.linestrings(lines.points[lines.ends]))
 
 
 def _neighbors(tree: STRtree, geometries: NDArray) -> Iterator[NDArray]:

@@ -88,12 +88,15 @@ def read(text: str) -> Drawing:
     frame = _frame(root)
     rules, left = rules_of("".join(e.text or "" for e in root.iter() if local(e) == "style"))
     lines = _Lines(rules, {e.get("id", ""): e for e in root.iter()}, frame.view)
-    _walk(root, np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]]), Style(), lines, 0)
+    upward = np.array([[1.0, 0.0, 0.0], [0.0, -frame.stretch, 0.0]])
+    with np.errstate(over="ignore", invalid="ignore"):  # where everything is, is checked at the end
+        _walk(root, upward, Style(), lines, 0)
+        boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
     doubts = []
     if left:
         doubts.append(f"{count(left, 'style rule')} with selectors other than tag, class and id")
     titles = [e.text or "" for e in root if local(e) == "title"]
-    return _drawing(lines, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
+    return _drawing(lines, boxes, frame, doubts, " ".join("".join(titles[:1]).split())[:200])
 
 
 def _frame(root: Element) -> _Frame:
@@ -134,7 +137,9 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     style = styled(element, lines.rules, inherited, place)
     if style is None:
         return
-    here = after(outer, placing(element.get("transform"), place))
+    here = outer
+    if "transform" in element.attrib:
+        here = after(outer, placing(element.get("transform"), place))
     if name in SHAPES:
         if style.shown:
             found = curves(element, lines.view, place)
@@ -146,7 +151,8 @@ def _walk(element: Element, outer: Placing, inherited: Style, lines: _Lines, dep
     if name == "use" or (name == "svg" and depth):
         x = length(element.get("x"), lines.view[0], f"{place}.x")
         y = length(element.get("y"), lines.view[1], f"{place}.y")
-        here = after(here, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
+        if x or y:
+            here = after(here, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]))
     if name == "use":
         target = lines.names.get(_link(element)[1:]) if _link(element)[:1] == "#" else None
         if target is None:
@@ -161,14 +167,19 @@ def _link(element: Element) -> str:
     return element.get("href") or element.get("{http://www.w3.org/1999/xlink}href") or ""
 
 
-def _drawing(lines: _Lines, frame: _Frame, doubts: list[str], title: str) -> Drawing:
+def _drawing(
+    lines: _Lines,
+    boxes: list[NDArray[np.float64]],
+    frame: _Frame,
+    doubts: list[str],
+    title: str,
+) -> Drawing:
     if not lines.curves:
         raise InputError(
             ": there are none to be seen; give crease lines a stroke (red mountains, blue valleys, "
             "a black outline)",
             "lines",
         )
-    boxes = [placed(curve.frame, here) for curve, here, _, _ in lines.curves]
     for box, (*_, place) in zip(boxes, lines.curves, strict=True):
         if not (np.abs(box) <= LONGEST).all():
             raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", place)

@@ -12,18 +12,12 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from foldyn.formats.line_colors import COLORS
 from foldyn.formats.writers import flat_points, letters, warn_of_boards
 from foldyn.patterns import Pattern
 
 PER_METER = 1e3  # mm
-COLORS = {
-    "B": "#000000",
-    "M": "#ff0000",
-    "V": "#0000ff",
-    "F": "#ffff00",
-    "U": "#ff00ff",
-    "C": "#00ff00",
-}
+PAINT = {letter: "#{:02x}{:02x}{:02x}".format(*rgb) for rgb, (letter, _) in COLORS.items()}
 NAMES = {
     "B": "boundary",
     "M": "mountain",
@@ -32,6 +26,8 @@ NAMES = {
     "U": "unassigned",
     "C": "cut",
 }
+FAINTEST = 1e-6
+"""Opacity of a crease to be folded by nothing: a line without any is not drawn."""
 _DARKER = {"F": "#b8a000", "C": "#00a000"}  # of words, which must be read on white
 
 
@@ -76,10 +72,11 @@ def write(pattern: Pattern) -> str:
     ]
     for (a, b), letter, angle in edges:
         (x1, y1), (x2, y2) = points[a].tolist(), points[b].tolist()
-        opacity = "" if np.isnan(angle) else f' stroke-opacity="{abs(angle) / np.pi!r}"'
+        share = max(abs(angle) / np.pi, FAINTEST)
+        opacity = "" if np.isnan(angle) else f' stroke-opacity="{share!r}"'
         lines.append(
             f'<line x1="{x1!r}" y1="{y1!r}" x2="{x2!r}" y2="{y2!r}" '
-            f'stroke="{COLORS[letter]}"{opacity if letter in "MV" else ""}/>'
+            f'stroke="{PAINT[letter]}"{opacity if letter in "MV" else ""}/>'
         )
     lines += ["</g>", f'<g id="legend" font-family="sans-serif" font-size="{type_size:.4g}">']
     for k, text in enumerate(words):
@@ -92,7 +89,7 @@ def _legend(pattern: Pattern, edges: list) -> list[str]:
     """Lines of the legend: kinds of lines in their colors; what opacity means; the size."""
     used = [letter for letter in "BMVFUC" if any(edge[1] == letter for edge in edges)]
     kinds = "  ".join(
-        f'<tspan fill="{_DARKER.get(letter, COLORS[letter])}">{NAMES[letter]}</tspan>'
+        f'<tspan fill="{_DARKER.get(letter, PAINT[letter])}">{NAMES[letter]}</tspan>'
         for letter in used
     )
     driven = [abs(edge[2]) for edge in edges if edge[1] in "MV" and not np.isnan(edge[2])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml import DefusedXmlException, ElementTree
@@ -11,6 +12,11 @@ from foldyn.values import shortened
 
 DEEPEST = 100
 """Levels of nested elements."""
+_FIRST, _MOST, _LARGEST = 20_000, 50, 1 << 26  # letters, entities, letters
+_SUBSET = re.compile(r"<!DOCTYPE[^\[>]{0,500}\[([^\]]*)\]\s{0,9}>")
+_ENTITY = re.compile(
+    r"<!ENTITY\s{1,9}([A-Za-z_][\w.-]{0,50})\s{1,9}([\"'])([^\"'<>]{0,200})\2\s{0,9}>"
+)
 
 
 def from_xml(text: str, what: str) -> Element:
@@ -29,11 +35,11 @@ def from_xml(text: str, what: str) -> Element:
         No XML, with entities or parts in other files, or nested too deep.
     """
     try:
-        root = ElementTree.fromstring(text, forbid_dtd=False)
+        root = ElementTree.fromstring(_without_abbreviations(text), forbid_dtd=False)
     except DefusedXmlException:
         raise InputError(
-            f"is not {what} that can be read safely: it defines entities or names other files; "
-            "save it anew without them (in Illustrator without its editing capabilities)"
+            f"is not {what} that can be read safely: it defines entities of entities, or names "
+            "other files; save it anew without them"
         ) from None
     except (ParseError, ValueError, LookupError) as error:
         raise InputError(f"is not {what}: {shortened(str(error))}") from None
@@ -43,6 +49,26 @@ def from_xml(text: str, what: str) -> Element:
         if not level:
             return root
     raise InputError(f"is not {what}: elements are nested deeper than {DEEPEST} levels")
+
+
+def _without_abbreviations(text: str) -> str:
+    """Text with entities written out that stand for short words, as Illustrator's do.
+
+    Where there are others, the text stays as it is, and is refused.
+    """
+    subset = _SUBSET.search(text[:_FIRST])
+    if not subset:
+        return text
+    words = {name: value for name, _, value in _ENTITY.findall(subset[1])}
+    rest = _ENTITY.sub("", subset[1])
+    if rest.strip() or len(words) > _MOST or any("&" in v or "%" in v for v in words.values()):
+        return text
+    body = text[subset.end() :]
+    for name, value in words.items():
+        body = body.replace(f"&{name};", value)
+        if len(body) > _LARGEST:
+            return text
+    return text[: subset.start()] + body
 
 
 def local(element: Element) -> str:

@@ -16,7 +16,7 @@ from foldyn.errors import InputError
 from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
 
 PARALLEL = 1e-3  # rad: periods closer than that count as one direction
-MOST_EDGES = 2000
+MOST_EDGES = 600
 """Boundary edges among which periods are looked for."""
 
 
@@ -119,39 +119,56 @@ def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.f
     """
     found: list[NDArray] = []
     if len(edges) <= MOST_EDGES:
-        for step in _translations(vertices, edges, tolerance):
-            if all(_angle(step, other) > PARALLEL for other in found):
-                found.append(step)
-            if len(found) == 2:
-                one, two = found
-                along = [abs(each[0]) / np.linalg.norm(each) for each in found]
-                return np.stack([one, two] if along[0] >= along[1] else [two, one])
-    raise InputError(
-        f": found {len(found)} of the two translations that put the pattern beside itself; give "
-        "them, as in periods=[(0.1, 0, 0), (0, 0.1, 0)]",
-        "periods",
-    )
+        lengths = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1)
+        left = lengths.copy()  # of boundary that no period has brought together with other
+        steps = _translations(vertices, edges, tolerance)
+        while steps and len(found) < 2:
+            step, brought = max(steps, key=lambda each: (_rounded(left[each[1]].sum(), lengths),
+                                                         -np.linalg.norm(each[0])))  # fmt: skip
+            if left[brought].sum() == 0.0:
+                break
+            found.append(step)
+            left[brought] = 0.0
+            steps = [each for each in steps if _angle(each[0], step) > PARALLEL]
+    if len(found) < 2:
+        raise InputError(
+            f": found {len(found)} of the two translations that put the pattern beside itself; "
+            "give them, as in periods=[(0.1, 0, 0), (0, 0.1, 0)]",
+            "periods",
+        )
+    along = [abs(step[0]) / np.linalg.norm(step) for step in found]
+    return np.stack(found if along[0] >= along[1] else found[::-1])
 
 
-def _translations(vertices: NDArray, edges: NDArray, tolerance: float) -> list[NDArray]:
-    """Translations that bring boundary edges together, the most boundary first."""
+def _rounded(length: float, lengths: NDArray) -> float:
+    """Share of a boundary, in which rounding does not tell equal ones apart."""
+    return round(float(length / lengths.sum()), 6)
+
+
+def _translations(
+    vertices: NDArray, edges: NDArray, tolerance: float
+) -> list[tuple[NDArray, NDArray]]:
+    """Translations that bring boundary edges together, with the edges that they do so with."""
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
     way = b - a
     near = cKDTree(way).query_ball_tree(cKDTree(-way), 2.0 * tolerance)
     one = np.repeat(np.arange(len(edges)), [len(others) for others in near])
     two = np.array([f for others in near for f in others], dtype=np.int64)
-    shifts, lengths = b[two] - a[one], np.linalg.norm(way[one], axis=1)
+    shifts = b[two] - a[one]
     largest = np.take_along_axis(shifts, np.abs(shifts).argmax(axis=1)[:, None], axis=1)
-    shifts = np.where(largest < 0.0, -shifts, shifts)
     far = np.linalg.norm(shifts, axis=1) > 10.0 * tolerance
-    shifts, lengths = shifts[far], lengths[far]
-    keys, group = np.unique(
-        np.round(shifts / (8.0 * tolerance)).astype(np.int64), axis=0, return_inverse=True
-    )
-    weight = np.bincount(group.ravel(), lengths, len(keys))
-    size = np.linalg.norm(keys, axis=1)
-    order = np.lexsort((size, -np.round(weight / weight.max(initial=1.0), 6)))
-    return [shifts[group.ravel() == k].mean(axis=0) for k in order.tolist()]
+    shifts = np.where(largest < 0.0, -shifts, shifts)[far]
+    one, two = one[far], two[far]
+    pairs = cKDTree(shifts).query_pairs(4.0 * tolerance, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), (len(shifts), len(shifts)))
+    group = connected_components(graph, directed=False)[1]
+    order = np.argsort(group, kind="stable")
+    bounds = np.flatnonzero(np.diff(group[order])) + 1
+    return [
+        (shifts[members].mean(axis=0), np.unique([one[members], two[members]]))
+        for members in np.split(order, bounds)
+        if len(members)
+    ]
 
 
 def _angle(one: NDArray, two: NDArray) -> float:

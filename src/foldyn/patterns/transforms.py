@@ -188,7 +188,8 @@ class Transforms:
         """
         if not isinstance(other, Transforms):
             raise InputError(f" = {show(other)}: give a Pattern", "other")
-        _thin(self), _thin(other)
+        _thin(self)
+        _thin(other)
         near = number("tolerance", tolerance, above=0.0) * max(self.size, other.size)
         zero = np.zeros(3)
         made, joined = _joined(self, [(self, zero), (other, zero)], near)

@@ -1,0 +1,131 @@
+"""`foldyn convert`: pattern files read, checked and written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.formats import diagnose
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+
+
+def written(path: str) -> Any:
+    return json.loads(Path(path).read_text())
+
+
+@pytest.fixture
+def files(workplace):
+    """A flat sheet with letters, in a file without a unit."""
+    folded = fd.patterns.miura()
+    flat = fd.patterns.miura(dihedral=180).changed(assignments=folded.assignments)
+    fd.write_pattern("sheet.fold", flat, [fd.formats.Frame("folded", folded.vertices)])
+    text = written("sheet.fold")
+    del text["frame_unit"]
+    Path("sheet.fold").write_text(json.dumps(text))
+    return workplace
+
+
+def test_convert(files) -> None:
+    told = files.call("convert", "sheet.fold", "sheet.svg", "--unit", "mm")
+    assert (told.status, told.err) == (0, "")
+    assert told.out == "wrote sheet.svg: 9 vertices, 4 panels, 4 creases\n"
+    assert told.new == ["sheet.svg"]
+    found = diagnose("sheet.svg").pattern
+    assert found.size == pytest.approx(1e-3 * fd.patterns.miura(dihedral=180).size)
+
+
+def test_what_was_assumed_is_said(files) -> None:
+    told = files.call("convert", "sheet.fold", "sheet.obj", "--scale", "0.01", "--quiet")
+    assert (told.status, told.out) == (0, "")
+    assert "sheet.fold: the file does not say its unit" in told.err
+
+
+def test_a_frame(files) -> None:
+    assert files.call("convert", "sheet.fold", "a.obj", "--frame", "1", "--unit", "m").status == 0
+    told = files.call("convert", "sheet.fold", "b.obj", "--frame", "folded", "--unit", "m")
+    assert told.status == 0
+    np.testing.assert_array_equal(diagnose("b.obj").pattern.vertices, fd.patterns.miura().vertices)
+    assert Path("a.obj").read_text() == Path("b.obj").read_text()
+
+
+def test_check(files) -> None:
+    told = files.call("convert", "--check", "sheet.fold")
+    assert (told.status, told.err, told.new) == (0, "", [])
+    assert "sheet.fold: <Pattern 'miura': 9 vertices, 4 faces, 4 creases>" in told.out
+    assert "assumptions:" in told.out and "repairs: none" in told.out
+    assert "Maekawa holds at 1, Kawasaki at 1" in told.out
+
+
+def test_check_and_write(files) -> None:
+    told = files.call("convert", "--check", "sheet.fold", "sheet.stl")
+    assert told.status == 0 and told.new == ["sheet.stl"]
+    assert "Maekawa" in told.out and "wrote sheet.stl" in told.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["sheet.fold"], "OUT: missing; name the file to write, or give --check"),
+        (["none.fold", "a.obj"], "none.fold: there is no such file"),
+        (["sheet.fold", "a.xyz"], "a.xyz: has the unknown extension '.xyz'"),
+        (["sheet.fold", "a.svg", "--frame", "1"], "SVG files hold flat patterns"),
+        (["sheet.fold", "a.obj", "--unit", "ell"], 'unit = "ell": choose one of'),
+        (["sheet.fold", "a.obj", "--scale", "-1"], "scale = -1.0"),
+        (["sheet.fold", "a.obj", "--every", "2"], "--every: only for results"),
+        (["sheet.fold", "no/a.obj"], "cannot be written: No such file"),
+    ],
+)
+def test_bad_input_has_status_2_and_writes_nothing(files, arguments, message) -> None:
+    told = files.call("convert", *arguments)
+    assert (told.status, told.out, told.new) == (2, "", [])
+    assert message in told.err
+
+
+@pytest.fixture
+def result(workplace):
+    """A motion of a Miura cell with six samples."""
+    case = fd.Case(fd.discretize(fd.patterns.miura(), SHEET), [fd.Fix([0, 1, 2])])
+    motion = fd.simulate(case, 0.005, method="rk4", dt=1e-3, initial=None, force=True)
+    fd.save(motion, "run.nc")
+    return workplace, motion
+
+
+def test_a_result_with_its_states(result) -> None:
+    workplace, motion = result
+    count = motion.sizes["time"]
+    told = workplace.call("convert", "run.nc", "run.fold")
+    assert (told.status, told.new) == (0, ["run.fold"])
+    assert told.out.endswith(f"4 creases, {count} frames\n")
+    assert len(written("run.fold")["file_frames"]) == count
+    workplace.call("convert", "run.nc", "some.fold", "--every", "4")
+    assert len(written("some.fold")["file_frames"]) == len({*range(0, count, 4), count - 1})
+
+
+def test_a_result_in_one_state(result) -> None:
+    workplace, _ = result
+    for arguments in (["run.stl"], ["a.obj", "--frame", "0"], ["a.fold", "--frame", "2"]):
+        assert workplace.call("convert", "run.nc", *arguments).status == 0
+    assert "file_frames" not in written("a.fold")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.fold", "--unit", "mm"], "--unit: only for pattern files"),
+        (["a.fold", "--check"], "--check: only for pattern files"),
+        (["a.fold", "--frame", "last"], "--frame = last: give the number of a sample"),
+        (["a.fold", "--frame", "99"], "frame = 99: the result has the samples 0 to"),
+        (["a.obj", "--every", "2"], "--every: only where all states are written"),
+        (["a.xyz"], "unknown extension"),
+    ],
+)
+def test_bad_input_for_a_result(result, arguments, message) -> None:
+    told = result[0].call("convert", "run.nc", *arguments)
+    assert (told.status, told.new) == (2, [])
+    assert message in told.err

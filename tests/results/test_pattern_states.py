@@ -1,0 +1,168 @@
+"""What a pattern says of its creases, in results; states of results as frames of a file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.analyses import read_case
+from foldyn.errors import InputError
+from foldyn.results import frames_of, state_of
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
+
+
+def told(pattern):
+    return pattern.changed(
+        fold_angles=[0.5, None, -1.0, 0.25],
+        families={"zigzag": pattern.creases[:2], "a b": pattern.creases[3:]},
+        custom={"tm:x": [1, None, {"y": 2.5}], "é:b": "ü"},
+    )
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A Miura cell that is pulled."""
+    structure = fd.discretize(told(fd.patterns.miura()), SHEET)
+    case = fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (0.01, 0, 0))])
+    return fd.simulate(case, 0.01, method="rk4", every=20)
+
+
+@pytest.fixture(scope="module")
+def path():
+    structure = fd.discretize(fd.patterns.miura(), SHEET)
+    case = fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (1e-4, 0, 0))])
+    return fd.trace(case, load_factors=[0.5, 1.0])
+
+
+@pytest.mark.parametrize("make", [fd.discretize, lambda p, s: fd.shell(p, s, divisions=2)])
+def test_angles_families_and_data_survive_a_result(make, motion, tmp_path):
+    structure = make(told(fd.patterns.miura()), SHEET)
+    case = fd.Case(structure, [fd.Fix([0, 1, 2])])
+    fd.save(fd.modes(case, count=1), tmp_path / "x.nc")
+    found = fd.load(tmp_path / "x.nc")
+    p, q = structure.pattern, fd.case_of(found).structure.pattern
+    np.testing.assert_array_equal(q.fold_angles, p.fold_angles)
+    assert {k: v.tolist() for k, v in q.families.items()} == {"zigzag": [0, 1], "a b": [3]}
+    assert q.custom == p.custom
+    assert found["fold_angles"].attrs["units"] == "rad"
+
+
+def test_a_result_without_them_is_as_it_was(path):
+    assert not {"fold_angles", "tables_family0_creases"} & set(path.variables)
+    assert "families" not in str(path["case"].values)
+
+
+def test_data_that_cannot_be_written_is_an_obstacle():
+    pattern = fd.patterns.miura().changed(custom={"a:b": object()})
+    case = fd.Case(fd.discretize(pattern, SHEET), [fd.Fix([0, 1, 2])])
+    found = fd.modes(case, count=1)
+    assert "custom data" in found.attrs["not_rerunnable_because"]
+
+
+def test_states_of_a_motion_go_to_a_file_and_back(motion, tmp_path):
+    pattern, frames = frames_of(motion)
+    assert len(frames) == motion.sizes["time"]
+    np.testing.assert_array_equal(pattern.vertices, fd.patterns.miura().vertices)
+    x = motion["rest_position"].values + motion["displacement"].values
+    fd.write_pattern(tmp_path / "x.fold", pattern, frames)
+    for k in (0, len(frames) - 1):
+        found = fd.formats.diagnose(tmp_path / "x.fold", frame=k + 1).pattern
+        np.testing.assert_array_equal(found.vertices, x[k, : len(pattern.vertices)])
+        assert found.name == f"t = {float(motion.time[k]):.6g} s"
+        assert found.assignments == pattern.assignments
+
+
+def test_every_so_many_states_and_the_last(motion):
+    count = motion.sizes["time"]
+    titles = [frame.title for frame in frames_of(motion)[1]]
+    some = [frame.title for frame in frames_of(motion, every=2)[1]]
+    assert some == [titles[k] for k in sorted({*range(0, count, 2), count - 1})]
+    assert [f.title for f in frames_of(motion, every=10**6)[1]] == [titles[0], titles[-1]]
+
+
+def test_a_state_of_a_path(path):
+    assert frames_of(path)[1][-1].title == "load factor 1"
+    last = state_of(path)
+    nodes = path["rest_position"].values + path["displacement"].values[-1]
+    np.testing.assert_array_equal(last.vertices, nodes[: len(last.vertices)])
+    assert last.name == "miura, load factor 1"
+    np.testing.assert_array_equal(state_of(path, 0).vertices, frames_of(path)[1][0].vertices)
+
+
+def test_what_has_no_states(motion):
+    case = fd.Case(fd.case_of(motion).structure, [fd.Fix([0, 1, 2])])
+    with pytest.raises(InputError, match=r"result: is of kind 'modes'.*motion or a path"):
+        frames_of(fd.modes(case, count=1))
+    with pytest.raises(InputError, match="every = 0"):
+        frames_of(motion, every=0)
+    with pytest.raises(InputError, match="frame = 999: the result has the samples 0 to"):
+        state_of(motion, 999)
+    with pytest.raises(InputError, match="displacement must be numbers over time, node, axis"):
+        frames_of(motion.drop_vars("displacement"))
+
+
+CASE = """
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+"""
+INLINE = """
+[pattern]
+vertices = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
+faces = [[0, 1, 4, 3], [1, 2, 5, 4]]
+assignments = ["V"]
+"""
+
+
+def read(tmp_path, pattern):
+    (tmp_path / "case.toml").write_text(pattern + CASE)
+    return read_case(tmp_path / "case.toml").pattern
+
+
+def test_angles_and_families_in_a_case_file(tmp_path):
+    p = read(tmp_path, INLINE + "fold_angles = [120]\nfamilies = { middle = [[4, 1]] }\n")
+    np.testing.assert_allclose(p.fold_angles, np.radians([120]))
+    assert p.families["middle"].tolist() == [0]
+    assert np.isnan(read(tmp_path, INLINE + "fold_angles = [nan]\n").fold_angles).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("fold_angles = 5", r"pattern\.fold_angles = 5: must be a list of angles"),
+        ('fold_angles = ["5"]', r"pattern\.fold_angles = .*must be a list"),
+        ("fold_angles = [1, 2]", r"pattern: fold_angles has 2 angles for 1 creases"),
+        ("fold_angles = [181]", r"pattern: fold_angles: .*from -pi"),
+        ("families = [1]", r"pattern\.families = .*table of lists"),
+        ("families = { a = 1 }", r"pattern\.families = .*table of lists"),
+        ("families = { a = [[0, 1]] }", r"pattern: families\[.a.\]: \(0, 1\) is not a crease"),
+    ],
+)
+def test_wrong_angles_and_families_in_a_case_file(keys, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, INLINE + keys + "\n")
+
+
+def test_unit_scale_and_frame_in_a_case_file(tmp_path):
+    p = fd.patterns.miura(dihedral=180)
+    folded = fd.patterns.miura(dihedral=90)
+    frame = fd.formats.Frame("folded", folded.vertices)
+    fd.write_pattern(tmp_path / "x.fold", p.changed(assignments=folded.assignments), [frame])
+    found = read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = "folded"\nunit = "mm"\n')
+    np.testing.assert_allclose(found.vertices, 1e-3 * folded.vertices)
+    found = read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = 1\nscale = 2.0\n')
+    np.testing.assert_allclose(found.vertices, 2.0 * folded.vertices)
+    with pytest.raises(InputError, match=r'pattern\.file = "x\.fold": .*unit = "ell": choose'):
+        read(tmp_path, '[pattern]\nfile = "x.fold"\nunit = "ell"\n')
+    with pytest.raises(InputError, match="frame = 7: the file has the frames 0 to 1"):
+        read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = 7\n')
+    with pytest.raises(InputError, match=r"pattern\.unt"):
+        read(tmp_path, '[pattern]\nfile = "x.fold"\nunt = "mm"\n')
