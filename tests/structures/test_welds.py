@@ -4,10 +4,15 @@ import warnings
 
 import numpy as np
 import pytest
-from tests.patterns.test_facets import crossed_miura
-from tests.structures.strips_with_facets import (
+
+import foldyn as fd
+from foldyn import checks
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.plates_condensed import condensed_force
+from sheets_with_facets import (
     LENGTH,
     STEEL,
+    crossed_miura,
     cut_across,
     elastic,
     half_pipe,
@@ -15,12 +20,7 @@ from tests.structures.strips_with_facets import (
     with_lines,
 )
 
-import foldyn as fd
-from foldyn import checks
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.plates_condensed import condensed_force
-
-SHELL = (130.1, 317.0, 360.5)  # Hz, of the uncut strip: tests/shells/test_welds.py
+SHELL = (130.1, 317.0, 360.5)  # Hz, of the uncut strip: tests/shells/test_shell_welds.py
 
 
 def plain(pattern, **options):

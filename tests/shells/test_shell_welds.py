@@ -2,7 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.structures.strips_with_facets import (
+
+import foldyn as fd
+from foldyn import checks
+from foldyn.errors import InputError
+from sheets_with_facets import (
     FREE_BEAM,
     LENGTH,
     STEEL,
@@ -13,10 +17,6 @@ from tests.structures.strips_with_facets import (
     uncut,
     with_lines,
 )
-
-import foldyn as fd
-from foldyn import checks
-from foldyn.errors import InputError
 
 CUTS = {
     "across": (cut_across([0.5]), 8),

@@ -1,4 +1,4 @@
-"""Strips of steel, 200 x 50 x 1 mm, that are cut by facets; a curved sheet of facets."""
+"""Sheets that are cut by facets: strips of steel, 200 x 50 x 1 mm, a part of a pipe, a Miura."""
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -53,6 +53,21 @@ def half_pipe(facets, radius=0.1, angle=90.0):
     faces = [(k, k + 1, n + k + 1, n + k) for k in range(facets)]
     letters = {(k, n + k): "F" for k in range(1, facets)}
     return fd.Pattern(np.concatenate([arc, arc + np.array([0, 0.1, 0])]), faces, letters)
+
+
+def crossed_miura(dihedral=90):
+    """A Miura sheet, and the same with each panel cut by a diagonal, the one or the other."""
+    whole = fd.patterns.miura(cells=(2, 1), a=0.05, b=0.04, panel_angle=60, dihedral=dihedral)
+    letters = dict(zip(map(tuple, whole.creases.tolist()), whole.assignments, strict=True))
+    cut = []
+    for k, (a, b, c, d) in enumerate(whole.faces):
+        cut += [(a, b, c), (a, c, d)] if k % 2 else [(a, b, d), (b, c, d)]
+    angles = dict.fromkeys(letters, 0.5)
+    families = {"straight": [pair for pair, letter in letters.items() if letter == "M"]}
+    made = fd.Pattern(
+        whole.vertices, cut, letters, "cut", fold_angles=angles, families=families, custom={"a": 1}
+    )
+    return whole, made
 
 
 def elastic(structure, count=12):
