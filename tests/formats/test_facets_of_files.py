@@ -94,3 +94,49 @@ def test_other_formats_draw_welds_as_facets(ending, tmp_path):
 def test_wrong_word(tmp_path):
     with pytest.raises(InputError, match="facets"):
         fd.read_pattern(file_of(tmp_path), facets="glue")
+
+
+CASE = """
+[pattern]
+{pattern}
+[sheet]
+youngs_modulus = 2e9
+poissons_ratio = 0.3
+thickness = 1e-3
+density = 700
+[analysis]
+kind = "modes"
+"""
+INLINE = """
+vertices = [[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1]]
+faces = [[0, 1, 2], [0, 2, 3], [1, 4, 5, 2]]
+assignments = ["F", "V"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("keys", "panels", "welds", "scheme"),
+    [
+        (INLINE, 3, 0, "n5b8"),
+        (INLINE + 'facets = "hinge"', 3, 0, "n5b8"),
+        (INLINE + 'facets = "line"', 3, 1, "n5b8e"),
+        (INLINE + 'facets = "weld"', 2, 0, "n5b8"),
+        ('file = "x.fold"\nfacets = "weld"', 2, 0, "n5b8"),
+        ('file = "x.fold"\nfacets = "line"', 3, 1, "n5b8e"),
+        ('kind = "eggbox"\nfacets = "weld"', 4, 0, "n5b8"),
+    ],
+)
+def test_case_files(keys, panels, welds, scheme, tmp_path):
+    file_of(tmp_path)
+    (tmp_path / "case.toml").write_text(CASE.format(pattern=keys))
+    case_file = fd.read_case(tmp_path / "case.toml")
+    assert (len(case_file.pattern.faces), len(case_file.pattern.welds)) == (panels, welds)
+    made = case_file.case()
+    assert made.structure.options.scheme == scheme
+    assert made.structure.options.mass == ("condensed" if welds else "consistent")
+
+
+def test_wrong_word_in_a_case_file(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE.format(pattern=INLINE + 'facets = "glue"'))
+    with pytest.raises(InputError, match=r'pattern.facets = "glue"'):
+        fd.read_case(tmp_path / "case.toml")

@@ -139,7 +139,7 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
         with faults.collected(), within("model: "):
-            welds = pattern is not None and len(pattern.welds) > 0
+            welds = bool(len(getattr(pattern, "welds", ())))  # no pattern where it is at fault
             default = model.options(welds=welds, **schema.model.options).mass
         faults.tell()
         masses = list(schema.model.mass or [default])[: None if kind.by_mass else 1]

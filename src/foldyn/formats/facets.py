@@ -73,14 +73,14 @@ def _bent(pattern: Pattern, facets: tuple[Edge, ...]) -> str:
 def _acted(before: Pattern, after: Pattern) -> str:
     """What welding did, in words."""
     lost = len(before.creases) - len(after.creases)
-    gone = len(before.faces) - len(after.faces)
-    parts = [
-        gone
-        and f"{count(gone + len(set(after.faces) - set(before.faces)), 'panel')} joined to "
-        f"{len(set(after.faces) - set(before.faces))}",
-        len(after.welds) and f"{len(after.welds)} kept as welds",
-    ]
+    new = len(set(after.faces) - set(before.faces))
+    parts = []
+    if new:
+        whole = len(before.faces) - len(after.faces) + new
+        parts.append(f"{count(whole, 'panel')} joined to {new}")
+    if len(after.welds):
+        parts.append(f"{len(after.welds)} kept as welds")
     return (
         f"{count(lost, 'line')} assigned F taken as part of the sheet, not as hinges "
-        f'({", ".join(part for part in parts if part)}; facets = "hinge" makes them hinges)'
+        f'({", ".join(parts)}; facets = "hinge" makes them hinges)'
     )
