@@ -178,7 +178,7 @@ def test_circles_are_chords_within_the_tolerance(shape, center, radius):
     assert (
         0.2 * CHORD * size < (radius - middles).max() <= CHORD * size
     )  # and not finer than needed
-    assert "drawn as chords within 0.141 of it" in drawing.repairs[0]
+    assert "drawn as chords, within 0.141 units" in drawing.repairs[0]
 
 
 def test_bezier_curves_are_chords_within_the_tolerance():

@@ -12,6 +12,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
 
@@ -63,9 +64,13 @@ def read(text: str) -> Drawing:
         No DXF, one without lines, or ezdxf is not installed.
     """
     document = _document(ezdxf(), text)
-    entities, skipped = _entities(document)
+    with _reading("entities"):
+        entities, skipped = _entities(document)
     paths = [(entity, path) for entity in entities for path in _paths(entity)]
-    controls = [np.array([(v.x, v.y, v.z) for v in path.control_vertices()]) for _, path in paths]
+    with _reading("lines"):
+        controls = [
+            np.array([(v.x, v.y, v.z) for v in path.control_vertices()]) for _, path in paths
+        ]
     boxes = [box for box in controls if len(box)]
     if not boxes:
         raise InputError(": there are none that can be read; give a crease pattern", "lines")
@@ -79,10 +84,11 @@ def read(text: str) -> Drawing:
     places: list[str] = []
     total, curved = 0, 0
     for entity, path in paths:
-        letter = _letter(entity, document, colors)
-        if letter is None or not len(path):
+        with _reading(_place(entity)):
+            letter = _letter(entity, document, colors)
+            along = _along(entity, path, tolerance)
+        if letter is None:
             continue
-        along = _along(entity, path, tolerance)
         pairs = np.stack((along[:-1], along[1:]), axis=1)
         pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
         total, curved = total + len(pairs), curved + path.has_curves
@@ -93,7 +99,7 @@ def read(text: str) -> Drawing:
         places += [_place(entity)] * len(pairs)
     if not total:
         raise InputError(": all are points; give a file with a crease pattern", "lines")
-    repairs = [f"{count(curved, 'curve')} drawn as chords within {tolerance:.3g} of it"]
+    repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
     return Drawing(
         np.concatenate(points),
         np.arange(2 * total).reshape(-1, 2),
@@ -111,12 +117,22 @@ def _document(library: Any, text: str) -> Any:
     logger, handler = logging.getLogger("ezdxf"), logging.NullHandler()
     logger.addHandler(handler)  # else what it logs goes to standard error
     try:
-        return library.read(io.StringIO(text))
-    except Exception as error:  # the library raises what its parts raise
-        said = shortened(f"{type(error).__name__} {error}")
-        raise InputError(f"is not a DXF file that can be read: {said}") from None
+        with _reading("is not a DXF file"):
+            return library.read(io.StringIO(text))
     finally:
         logger.removeHandler(handler)
+
+
+@contextmanager
+def _reading(place: str) -> Iterator[None]:
+    """Refuse what the library cannot read: what it raises of damaged files is not known."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        said = shortened(f"{type(error).__name__} {error}")
+        raise InputError(f": cannot be read: {said}", place) from None
 
 
 def _entities(document: Any) -> tuple[list[Any], list[str]]:
@@ -164,17 +180,12 @@ def _paths(entity: Any) -> Iterator[Any]:
     """Path of an entity; meshes have none."""
     from ezdxf.path import make_path
 
-    try:
+    with _reading(_place(entity)), suppress(TypeError):
         yield make_path(entity)
-    except TypeError:
-        return
-    except Exception as error:  # what a damaged entity raises is not known
-        said = shortened(f"{type(error).__name__} {error}")
-        raise InputError(f": cannot be drawn: {said}", _place(entity)) from None
 
 
 def _place(entity: Any) -> str:
-    return f"{entity.dxftype()} {entity.dxf.get('handle') or ''}".strip()
+    return f"{entity.dxftype()} {entity.dxf.handle if entity.dxf.hasattr('handle') else ''}".strip()
 
 
 def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:

@@ -214,7 +214,7 @@ def _drawing(
         raise InputError(": all are points, or white; give a file with a crease pattern", "lines")
     angles, said = _fold_angles(np.array(letters), np.array(opacities))
     curved = sum(not curve.straight for curve, *_ in lines.curves)
-    repairs = [f"{count(curved, 'curve')} drawn as chords within {tolerance:.3g} of it"]
+    repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
     return Drawing(
         np.concatenate(points),
         np.arange(2 * total).reshape(-1, 2),
