@@ -5,16 +5,18 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from foldyn.studies.fidelity import motion_results as motions
+from foldyn.studies.fidelity.internal import first_table, read_first
 from foldyn.studies.fidelity.stored import RESULTS, read, table
 
 PAGE = Path(__file__).with_name("fidelity.md")
 TABLES = {
     "documented": lambda: table(read(RESULTS / "documented.csv")),
     "drawn": lambda: table(read(RESULTS / "drawn.csv")),
+    "documented internal": lambda: first_table(read_first(RESULTS / "documented_internal.csv")),
+    "drawn internal": lambda: first_table(read_first(RESULTS / "drawn_internal.csv")),
     "motions": lambda: motions.summaries(motions.read()),
     "motion cases": lambda: motions.by_case(motions.read()),
 }
@@ -24,8 +26,8 @@ def with_tables(text: str) -> str:
     """The page's text with the tables between their marks."""
     for name, make in TABLES.items():
         begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        found = make()
-        text = re.sub(f"{begin}.*?{end}", f"{begin}\n{found}\n{end}", text, flags=re.S)
+        before, rest = text.split(begin)
+        text = f"{before}{begin}\n{make()}\n{end}{rest.split(end)[1]}"
     return text
 
 

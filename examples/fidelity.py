@@ -30,8 +30,8 @@ def check(result: fd.Fidelity) -> None:
     plate, standard, edges = (result.table(model)[:BELOW] for model in result.models)
     assert result.models == ("own", "standard", "n5b8e")  # one's own is "plate"
     assert [mode.below for mode in result.table()] == [True] * BELOW + [False] * 4
-    assert max(abs(mode.error) for mode in plate) < 0.08
-    assert min(mode.mac for mode in plate) > 0.94
+    assert max(abs(mode.error) for mode in plate) < 0.10
+    assert min(mode.mac for mode in plate) > 0.93
     assert max(abs(mode.error) for mode in edges) < 0.02
     assert min(mode.error for mode in standard) > 0.25
     assert max(abs(mode.mesh_error) for mode in plate) < 0.02

@@ -63,6 +63,33 @@ def test_the_supports_and_loads_of_the_case_file_page_can_be_read(tmp_path):
     assert len(case.actuated_creases) == len(case.structure.folds)
 
 
+def test_the_gallery_of_patterns_shows_every_generator_by_calls_that_run():
+    page = (DOCS / "patterns-gallery.md").read_text("utf-8")
+    calls = "".join(blocks("patterns-gallery.md", "python"))
+    for kind in fd.patterns.GENERATORS:
+        assert f"fd.patterns.{kind}(" in calls
+        picture = f"images/pattern-{kind.replace('_', '-')}.png"
+        assert f"({picture})" in page
+        assert (DOCS / picture).stat().st_size < 150_000
+    names = {"fd": fd}
+    exec(calls, names)
+    assert len(names["links"]) == 14
+    for family in re.findall(r'^`"(\w+)"`', page, re.M):
+        assert any(family in make().families for make in fd.patterns.GENERATORS.values())
+
+
+def test_the_patterns_page_shows_families_that_can_be_used():
+    (block,) = blocks("patterns.md", "python")
+    pattern = fd.patterns.miura((2, 2), dihedral=100)
+    corners, panels = [(x, y) for y in (0, 1) for x in range(3)], [(0, 1, 4, 3), (1, 2, 5, 4)]
+    strip = fd.Pattern(corners, panels, families={"straight": [(1, 4)]})
+    sheet = fd.Sheet(1e9, 0.3, 1e-3, 700.0)
+    *lines, thick = block.strip().splitlines()
+    for line in lines:
+        exec(line, {"fd": fd, "pattern": pattern, "sheet": sheet})
+    exec(thick, {"fd": fd, "pattern": strip})
+
+
 def test_the_loads_page_shows_a_case_that_can_be_made():
     names: dict = {}
     (block,) = blocks("loads.md", "python")
@@ -106,6 +133,14 @@ def test_compress_release_vibrate_of_the_quasi_static_page():
     top = motion.displacement.sel(node=3, axis="x").values
     assert top[0] == pytest.approx(0.010)
     assert top.min() < -0.002  # it springs back beyond its height
+
+
+def test_the_folding_page_folds_a_pattern_and_computes_its_modes():
+    (block,) = blocks("folding.md", "python")
+    names: dict = {}
+    exec(compile(block, "folding.md", "exec"), names)
+    assert names["folding"].kind == "rigid"
+    assert (names["modes"].frequency > 0.0).all()
 
 
 def test_the_tables_of_the_quasi_static_page_are_what_the_example_computes():

@@ -108,7 +108,7 @@ def _peak(make) -> float:
 
 def test_estimates_are_right_within_a_factor_of_two():
     """Of what Python and NumPy allocate; the constants are of the whole process."""
-    from foldyn.patterns.generators import PER_VERTEX
+    from foldyn.patterns.generators.arguments import PER_VERTEX
     from foldyn.shells.shell import PER_NODE as PER_SHELL_NODE
     from foldyn.structures.discretize import PER_NODE
 

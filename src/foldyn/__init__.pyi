@@ -87,7 +87,13 @@ from foldyn.results import (
     save as save,
 )
 from foldyn.shells import Shell as Shell, shell as shell
-from foldyn.statics import landscape as landscape, switch_branch as switch_branch, trace as trace
+from foldyn.statics import (
+    Folding as Folding,
+    fold as fold,
+    landscape as landscape,
+    switch_branch as switch_branch,
+    trace as trace,
+)
 from foldyn.structures import (
     Laminate as Laminate,
     PanelSheet as PanelSheet,

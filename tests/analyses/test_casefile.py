@@ -76,7 +76,7 @@ def test_axis_and_range_of_the_figures(read, short) -> None:
     assert (output.axis, output.max_frequency) == ("y", 5.0)
     assert isinstance(output.max_frequency, float)
     output = read(short).output
-    assert (output.axis, output.max_frequency, output.animation) == (None, None, "gif")
+    assert (output.axis, output.max_frequency, output.animation) == (None, None, None)
 
 
 def test_a_byte_order_mark_is_no_obstacle(read, short) -> None:

@@ -94,7 +94,7 @@ BAD = {
     ),
     "creases in words": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", 'creases = "mountains"\nangle = 90')],
-        "loads[0].creases = \"mountains\": did you mean 'mountain'? give crease numbers, as in",
+        "loads[0].creases = \"mountains\": did you mean 'mountain'? this pattern knows",
     ),
     "crease number": (
         [("nodes = [6, 7, 8]\nforce = [0.01, 0, 0]", "creases = [0, 4]\nangle = 90")],

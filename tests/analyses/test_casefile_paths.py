@@ -72,7 +72,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
     }
     output = found.output
     np.testing.assert_array_equal(output.nodes, [6, 7])  # the loaded ones
-    assert (output.axis, output.shapes, output.animation) == (None, 4, "gif")
+    assert (output.axis, output.shapes, output.animation) == (None, 4, None)
     assert output.max_frequency is None
     assert found.masses == [ModelOptions().mass]
     assert found.case().loads == (Force([7, 6], (1, 0, 0)),)

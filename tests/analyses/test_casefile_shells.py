@@ -149,6 +149,10 @@ WRONG = {
         [SHELL, *drive("impulse", 'integrator = "rk4"')],
         'analysis.integrator = "rk4": needs mass everywhere',
     ),
+    "internal amplitudes": (
+        [SHELL, MODES[0], (STATICS, 'kind = "modes"\ninternal = 3')],
+        "analysis.internal = 3: is for the panels of bars and hinges; leave it out",
+    ),
     "a secant": (
         [SHELL, MODES[0], (STATICS, 'kind = "modes"\nsecant = 1')],
         "analysis.secant = 1.0: is for superlinear bends, and a shell has none; leave it out",
@@ -223,8 +227,9 @@ def test_responses_and_modes_as_those_of_a_shell(filed):
     arguments = read_case(simulated, model="shell").analysis.arguments
     assert arguments["pulse"] == 0.01
     assert not {"integrator", "dt"} & set(arguments)
-    judged = filed(MODES[0], (STATICS, 'kind = "modes"\nsecant = 1\ncount = 3'))
-    assert read_case(judged, model="shell").analysis.arguments["secant"] is None
+    judged = filed(MODES[0], (STATICS, 'kind = "modes"\nsecant = 1\ninternal = 2\ncount = 3'))
+    given = read_case(judged, model="shell").analysis.arguments
+    assert (given["secant"], given["internal"]) == (None, 0)
     assert read_case(judged, model="shell").analysis.arguments["count"] == 3
 
 

@@ -39,8 +39,8 @@ gravity = [0, 0, -9.81]
 def test_what_is_left_out_has_its_default(read) -> None:
     modes = read(MODES)
     assert modes.analysis.kind == "modes"
-    assert modes.analysis.arguments == {"count": 6, "state": None, "secant": None}
-    assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, "gif", None)
+    assert modes.analysis.arguments == {"count": 6, "state": None, "secant": None, "internal": 0}
+    assert (modes.output.shapes, modes.output.animation, modes.output.axis) == (6, None, None)
     assert not modes.output.named
     assert modes.initial() is None
     response = read(RESPONSE)
@@ -50,6 +50,7 @@ def test_what_is_left_out_has_its_default(read) -> None:
         "method": "direct",
         "state": None,
         "secant": None,
+        "internal": 0,
         "amplitude": 1.0,
         "drive": [Force([7, 6], (1, 0, 0))],
     }
@@ -62,12 +63,26 @@ def test_everything_that_can_be_said_of_modes(read) -> None:
     text = MODES + 'count = 12\nstate = "equilibrium"\nsecant = 0.5\n' + PRELOADS
     output = '[output]\nshapes = [1, 3]\naxis = "y"\nnodes = "xmax"\nanimation = "mp4"\n'
     found = read(text + output)
-    assert found.analysis.arguments == {"count": 12, "state": "equilibrium", "secant": 0.5}
+    given = {"count": 12, "state": "equilibrium", "secant": 0.5, "internal": 0}
+    assert found.analysis.arguments == given
     assert found.output.shapes == (1, 3)
     assert (found.output.axis, found.output.animation, found.output.named) == ("y", "mp4", True)
     np.testing.assert_array_equal(found.output.nodes, [6, 7, 8])
     assert found.case().supports == (Fix("xmin"), Impose([8], "z", -0.1))
     assert found.case().loads == (Gravity((0, 0, -9.81)),)
+
+
+def test_internal_amplitudes_belong_to_one_scheme(read) -> None:
+    plates = '[model]\npreset = "n5b8e"\n[analysis]'
+    found = read(MODES.replace("[analysis]", plates) + "internal = 3\n").run(count=4)
+    assert found.attrs["internal"] == 3
+    driven = RESPONSE.replace("[analysis]", plates).replace("[[drive]]", "internal = 3\n[[drive]]")
+    response = read(driven).run(frequencies=[1.0])
+    assert response.attrs["internal"] == 3
+    with pytest.raises(InputError, match=r"analysis\.internal = 3: .* the scheme n5b8e"):
+        read(MODES + "internal = 3\n").computation()
+    with pytest.raises(InputError, match=r"analysis\.internal = 3: .* the scheme n5b8e"):
+        read(RESPONSE.replace("[[drive]]", "internal = 3\n[[drive]]")).computation()
 
 
 def test_everything_that_can_be_said_of_a_response(read) -> None:
@@ -85,6 +100,7 @@ def test_everything_that_can_be_said_of_a_response(read) -> None:
         "method": "burst_random",
         "state": None,
         "secant": None,
+        "internal": 0,
         "amplitude": 0.1,
         "averages": 3,
         "seed": 4,
@@ -129,6 +145,10 @@ BAD = {
     "secant all around": (
         [('"modes"', '"modes"\nsecant = 200')],
         "analysis.secant = 200: must be at most 180",
+    ),
+    "too many amplitudes": (
+        [('"modes"', '"modes"\ninternal = 7')],
+        "analysis.internal = 7: must be at most 6",
     ),
     "no density": ([("density = 1.0\n", "")], "sheet.density: missing; modes need it (kg/m3)"),
     "key of a motion": (
@@ -201,6 +221,10 @@ BAD = {
 KEYS = "{ first = 0, last = 5, count = 51 }"
 DRIVE = "nodes = [7, 6]\nforce = [1, 0, 0]"
 BAD_RESPONSE = {
+    "amplitudes of a method by amplitude": (
+        [("[[drive]]", 'method = "harmonic"\ninternal = 3\n[[drive]]')],
+        "analysis.internal = 3: the method harmonic goes by the amplitude of the drive, internal",
+    ),
     "no frequencies": ([(f"frequencies = {KEYS}\n", "")], "analysis.frequencies: missing; give"),
     "frequencies in words": (
         [(KEYS, '"all"')],

@@ -168,7 +168,10 @@ def test_a_structure_without_a_pattern_takes_crease_numbers() -> None:
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: Actuate("valleys", 90), "creases = \"valleys\": did you mean 'valley'\\? give"),
+        (
+            lambda: Case(STRUCTURE, loads=[Actuate("valleys", 90)]),
+            r"loads\[0\].creases = \"valleys\": did you mean 'valley'\? this pattern knows",
+        ),
         (lambda: Actuate("", 90), r'creases = "": give crease numbers, as in \[0, 1\], or one of'),
         (lambda: Actuate([], 90), r'creases = \[\]: must be crease numbers, as .* or one of "all"'),
         (lambda: Actuate([0.0], 90), r"creases = \[0.0\]: 0.0 is not a crease number"),

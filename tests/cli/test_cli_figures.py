@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 import foldyn as fd
+from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
 
-PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "motion.gif", "energies.png")
+PICTURES = ("structure.png", "laws.png", "load.png", "motion.png", "energies.png")
 
 
 def test_figures_of_a_tiny_case(workplace, edited) -> None:
@@ -43,6 +44,15 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     ):  # fmt: skip
         assert told in page, told
     assert f"figures and {Path('r/report.html')}" in done.out
+
+
+def test_a_film_where_it_is_asked_for(workplace, edited) -> None:
+    workplace.write(edited(("every = 0.01", "every = 0.02")))
+    done = workplace.call("run", "case.toml", "--out", "r", "--film", "gif")
+    assert (done.status, done.err) == (0, "")
+    assert "r/motion.gif" in done.new
+    assert main(["run", "case.toml", "--out", "r", "--quiet"]) == 0
+    assert not Path("r/motion.gif").exists()  # it would show the old motion
 
 
 def test_a_film_instead_of_a_gif(workplace, edited) -> None:

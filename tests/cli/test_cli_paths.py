@@ -68,7 +68,7 @@ MOVED = (
     '[[loads]]\nnodes = "zmax"\nforce = [0, 0, -1]\n',
     '[[supports]]\nnodes = "zmax"\naxis = "z"\ndisplacement = -0.01\n',
 )
-PICTURES = ("structure.png", "laws.png", "energies.png", "shapes.png", "path.gif")
+PICTURES = ("structure.png", "laws.png", "energies.png", "shapes.png")
 
 
 @pytest.fixture

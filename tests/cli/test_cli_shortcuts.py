@@ -63,7 +63,8 @@ def test_the_response_of_a_motion_to_its_forces(workplace, miura) -> None:
 def test_about_the_equilibrium_loads_act(read, miura) -> None:
     text = miura.replace("[[loads]]", MOVED + "[[loads]]").replace("[analysis]", GRAVITY)
     found = read(text, "modes", state="equilibrium")
-    assert found.analysis.arguments == {"count": 6, "state": "equilibrium", "secant": None}
+    given = {"count": 6, "state": "equilibrium", "secant": None, "internal": 0}
+    assert found.analysis.arguments == given
     case = found.case()
     assert case.supports == (Fix([0, 1, 2]), Impose([8], "z", 0.1))  # without histories
     assert case.loads == (Force([7], (0.01, 0, 0)), Gravity((0, 0, -9.81)))
@@ -129,9 +130,11 @@ nodes = "xmin"
 
 
 def test_flags_stand_above_what_the_file_says(read, tmp_path) -> None:
-    modes = OWN + 'kind = "modes"\ncount = 3\nsecant = 1.0\n'
-    assert read(modes, "modes").analysis.arguments == {"count": 3, "state": None, "secant": 1.0}
+    modes = OWN + 'kind = "modes"\ncount = 3\nsecant = 1.0\ninternal = 2\n'
+    given = {"count": 3, "state": None, "secant": 1.0, "internal": 2}
+    assert read(modes, "modes").analysis.arguments == given
     assert read(modes, "modes", count=5).analysis.arguments["count"] == 5
+    assert read(modes, "modes", internal=3).analysis.arguments["internal"] == 3
     stored = modes + '[initial]\nfile = "a.nc"\n'
     assert read(stored, "modes", state="rest").initial() is None
     with pytest.raises(InputError, match=r"initial\.file = .*b\.nc.*no such file"):

@@ -47,7 +47,7 @@ nodes = [7, 8]
 """
 )
 LOAD = "[[loads]]\nnodes = [7]\nforce = [0.01, 0, 0]\n"
-PICTURES = ("structure.png", "laws.png", "modes.png", "modes.gif")
+PICTURES = ("structure.png", "laws.png", "modes.png")
 
 
 @pytest.fixture

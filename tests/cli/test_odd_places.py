@@ -44,7 +44,7 @@ def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
     assert "wrote figures and o/f\\udcffall/report.html" in out
     folder = os.fsencode(tmp_path) + b"/o/" + ODD
     assert result_of(folder) == 6
-    assert os.path.exists(folder + b"/motion.gif")
+    assert os.path.exists(folder + b"/motion.png")
 
 
 def test_streams_that_are_closed_or_full(tmp_path, miura) -> None:

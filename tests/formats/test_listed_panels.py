@@ -163,7 +163,7 @@ def test_the_text_of_a_diagnosis():
     p = miura(cells=(1, 2), dihedral=180)
     # three vertices inside, of four mountains each
     text = str(built(listed(p.vertices, p.faces, p.creases, "M" * len(p.creases))).diagnosis)
-    assert text.startswith("size: ") and " mm\n" in text
+    assert text.startswith("size: ") and " m\n" in text
     assert "doubts: none" in text
     assert "vertices inside: 3; Maekawa holds at 0, Kawasaki at 3, developable 3" in text
     assert "       4     4     0     0     0.000     0.000  Maekawa" in text

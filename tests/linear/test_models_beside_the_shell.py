@@ -74,10 +74,10 @@ def test_errors_are_those_of_the_study(support, miura):
 
 
 def test_displacements_are_those_of_the_study(miura):
-    """Case study 2 of docs/fidelity.md: 23.9 mm, -28 % and +0.3 % beside 8 and 16 divisions."""
+    """Case study 2 of docs/fidelity.md: 23.9 mm, -28 % and +0.6 % beside 8 and 16 divisions."""
     result = miura[1].result
     assert float(result["deflection"]) == pytest.approx(23.95e-3, abs=1e-4)
-    assert result["deflection_error"].values == pytest.approx([-0.28, 0.002, 0.024], abs=5e-3)
+    assert result["deflection_error"].values == pytest.approx([-0.28, 0.005, 0.024], abs=5e-3)
     assert 0.0 < float(result["deflection_mesh_error"]) < 0.011  # a coarser mesh is softer
 
 
@@ -92,7 +92,7 @@ def test_the_models_of_case_study_2(miura):
     assert max(abs(m.error) for m in edges if m.below) < 0.02
     assert max(abs(m.error) for m in plate if m.below) < 0.06
     assert max(abs(m.error) for m in own if m.below) > 0.4
-    assert max(m.mac for m in plate if not m.below) < 0.8
+    assert max(m.mac for m in plate if not m.below) < 0.82
     assert all(m.mac > 0.9 and 0.0 < m.error < 0.2 for m in edges[3:7])
     assert any(math.isinf(m.error) and m.mac < 0.5 for m in plate)  # a plate's mode, lost
     assert found.result["cost_ratio"].min() > 10.0

@@ -49,7 +49,7 @@ def test_simple_fold(a, b, dihedral, edge_length, corner_angle):
     np.testing.assert_allclose(p.vertices, expected, atol=1e-15)
     assert p.creases.tolist() == [[2, 3]]
     assert np.degrees(p.dihedrals[0]) == pytest.approx(360 - dihedral, abs=1e-10)
-    assert p.assignments == ("F" if dihedral == 180 else "M",)
+    assert p.assignments == ("M",)
     assert (p.face_normals[:, 2] > 0).all()  # the front is above
     for u, v in ((0, 2), (1, 3), (2, 4), (3, 5)):
         assert edge_length(p, u, v) == pytest.approx(a, rel=1e-14)
@@ -146,7 +146,7 @@ def test_miura_rows_keep_their_height():
 def test_flat_miura():
     p = miura(cells=(2, 2), dihedral=180)
     assert not p.vertices[:, 2].any()
-    assert set(p.assignments) == {"F"}
+    assert p.assignments == miura(cells=(2, 2), dihedral=100).assignments
     np.testing.assert_allclose(p.dihedrals, np.pi, atol=1e-12)
 
 

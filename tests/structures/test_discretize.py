@@ -86,8 +86,9 @@ def test_hinge_orientation(name, scheme):
         assert face[(face.index(j) + 1) % len(face)] == k
     np.testing.assert_allclose(s.fold_rest, pattern.dihedrals, rtol=0, atol=1e-12)
     letters = np.array(pattern.assignments)
-    assert (s.fold_rest[letters == "V"] < np.pi).all()
-    assert (s.fold_rest[letters == "M"] > np.pi).all()
+    if np.ptp(pattern.vertices[:, 2]) > 0.0:  # a flat pattern is neither yet
+        assert (s.fold_rest[letters == "V"] < np.pi).all()
+        assert (s.fold_rest[letters == "M"] > np.pi).all()
     np.testing.assert_allclose(s.bend_rest, np.pi, rtol=0, atol=1e-12)
     for row in s.bends.tolist():
         panels = {sides[row[0], row[1]][1], sides[row[1], row[0]][1]}

@@ -15,7 +15,8 @@ from foldyn.mechanics.plates_condensed import (
     condensed_force,
     condensed_work,
 )
-from foldyn.structures.condensed_panel import _condensed, outline, panel_stiffness
+from foldyn.structures.condensed_panel import _condensed, panel_stiffness
+from foldyn.structures.panel_plate import outline
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1.0)
 G = SHEET.bending_modulus

@@ -190,3 +190,9 @@ def test_creases_know_nothing_of_welds():
     np.testing.assert_allclose(made.fold_stiffness, np.arange(1, len(length) + 1) * length)
     with pytest.raises(InputError, match="no crease assigned flat"):
         fd.discretize(lines, STEEL, crease_stiffness={"flat": 1.0})
+
+
+def test_internal_amplitudes_are_refused():
+    case = fd.Case(fd.discretize(fd.welded(cut_across([0.5])), STEEL))
+    with pytest.raises(InputError, match=r"internal = 2: .* has welds \(1\); leave it out"):
+        fd.modes(case, count=8, internal=2)

@@ -27,6 +27,7 @@ from foldyn.report.page import write_report
 from foldyn.report.sections import Section
 from foldyn.structures import Sheet
 from foldyn.values import choice
+from foldyn.viewer import stage
 
 Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
@@ -47,8 +48,8 @@ class Output:
     axis : str or None
         Component that figures show, "x", "y" or "z", of a path also "-x", "-y" or "-z"; None: the
         one in which a node moves most.
-    animation : str
-        "gif" or "mp4".
+    animation : str or None
+        Film of the motion that is written beside the page, "gif" or "mp4"; None: none.
     max_frequency : float or None
         Of a motion: where the axes of spectra end (Hz); None: at half the sampling rate.
     shapes : int, tuple of int or None
@@ -61,7 +62,7 @@ class Output:
     nodes: NDArray[np.int64]
     named: bool = False
     axis: str | None = None
-    animation: str = "gif"
+    animation: str | None = None
     max_frequency: float | None = None
     shapes: int | tuple[int, ...] | None = None
     quantity: str | None = None
@@ -84,6 +85,8 @@ class Analysis(ABC):
         Beginning of a message, "a motion needs"; "" where it does without.
     takes : sequence of str
         Names of the arguments that may take the place of the file's.
+    moving : bool
+        Whether its results move, and are shown so at the top of their page.
     by_mass : bool
         Whether each mass rule of a file has a result of its own; otherwise its first has the one.
     arguments : dict
@@ -95,6 +98,7 @@ class Analysis(ABC):
     files: ClassVar[tuple[str, ...]]
     needs_density: ClassVar[str]
     takes: ClassVar[Sequence[str]]
+    moving: ClassVar[bool] = True
     by_mass: ClassVar[bool] = True
 
     def __init__(self, arguments: dict[str, Any]) -> None:
@@ -126,7 +130,10 @@ class Analysis(ABC):
 
         command : what was typed to compute them, for the page.
         """
+        cases = {mass: case_file.case(mass) for mass in results}
+        shown = case_file.output.nodes.tolist()
         sections = [
+            *([stage(results, cases, case_file.heading, shown)] if self.moving else []),
             *self.sections(case_file, results, Album(folder)),
             *provenance(case_file, results, command),
         ]

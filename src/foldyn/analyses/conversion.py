@@ -128,7 +128,8 @@ def remodeled(
     """Case file for another model, or a shell of other divisions.
 
     What means nothing to the other model is left out: keys of [model] that it does not have, the
-    mass rules, and for a shell explicit methods with their steps, and secant amplitudes.
+    mass rules, and for a shell explicit methods with their steps, secant and internal
+    amplitudes.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def _fold_law_of(preset: str | None) -> Document:
 
 def _of_a_shell(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """The table [analysis] without what means nothing to a shell."""
-    left = {"secant"}
+    left = {"secant", "internal"}
     key = "method" if analysis["kind"] == "dynamics" else "integrator"
     if analysis.get(key, "rk4") not in ("auto", *MASSLESS_METHODS):
         left |= {key, "dt", "force"}

@@ -20,7 +20,7 @@ from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, argumen
 from foldyn.analyses.frf_page import frf_sections
 from foldyn.analyses.motion import check_massless
 from foldyn.analyses.sections import Positive, Section, ShownSection, one_of, part
-from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import BaseMotion, Case, Force
 from foldyn.cases.decode import check_keys, given_keys
 from foldyn.cases.directions import DIRECTIONS, check_axis
@@ -29,6 +29,7 @@ from foldyn.dynamics import Progress
 from foldyn.errors import InputError, within
 from foldyn.linear import frf
 from foldyn.linear.frf import METHODS, PER_FORCE
+from foldyn.linear.internal_modes import check_internal
 from foldyn.values import number, show, whole
 
 MOST_FREQUENCIES = 100_000
@@ -81,6 +82,7 @@ class FrfSection(_Options):
     method: Annotated[str, one_of(METHODS)] = "direct"
     state: About = "rest"
     secant: Secant = None
+    internal: Internal = 0
     amplitude: Positive = 1.0
 
     @model_validator(mode="after")
@@ -99,6 +101,13 @@ class FrfSection(_Options):
                 f" = {show(self.secant)}: the method {self.method} goes by the amplitude of the "
                 "drive; leave it out, and give amplitude",
                 ".secant",
+            )
+        if self.internal and method.by_amplitude:
+            raise InputError(
+                f" = {self.internal}: the method {self.method} goes by the amplitude of the drive, "
+                'internal amplitudes are for small vibrations; take method = "direct" or "modal", '
+                "or leave it out",
+                ".internal",
             )
         with within("."):
             method.options(**self.options())
@@ -189,7 +198,8 @@ class FrfAnalysis(Analysis):
         """See `Analysis`."""
         section = schema.analysis
         given: dict[str, Any] = {
-            key: getattr(section, key) for key in ("frequencies", "method", "secant", "amplitude")
+            key: getattr(section, key)
+            for key in ("frequencies", "method", "secant", "internal", "amplitude")
         }
         given["state"] = None if section.state == "rest" else section.state
         return cls({**given, **section.options(), "drive": schema.drive})
@@ -198,6 +208,7 @@ class FrfAnalysis(Analysis):
         """See `Analysis`; `frf` refuses bad input before it tells of its first progress."""
         given = {**self.arguments, **about(case_file, mass), **changes}
         case = case_file.case(mass)
+        check_internal(case.structure, given.get("internal", 0))
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             def tell(now: Progress) -> None:

@@ -117,6 +117,7 @@ def _peaks(
 def _run(case_file: CaseFile, results: ByRule) -> Table:
     keys = {
         "secant": "secant (degrees)",
+        "internal": "internal amplitudes",
         "modes": "modes",
         "amplitude": "amplitude",
         "pulse": "pulse (s)",

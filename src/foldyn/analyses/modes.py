@@ -13,9 +13,10 @@ from foldyn import plots
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
 from foldyn.analyses.sections import Animation, Count, Section, ShownSection, some_shapes
-from foldyn.analyses.vibration import About, Secant, VibrationSchema, about, bar_closed
+from foldyn.analyses.vibration import About, Internal, Secant, VibrationSchema, about, bar_closed
 from foldyn.cases import Case
 from foldyn.linear import character, mac, modes, pair_modes
+from foldyn.linear.internal_modes import check_internal
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
@@ -34,13 +35,14 @@ class ModesSection(Section):
     count: Count = 6
     state: About = "rest"
     secant: Secant = None
+    internal: Internal = 0
 
 
 class ModesOutput(ShownSection):
     """[output] of modes: what is shown, and along which axis and at which nodes it is judged."""
 
     shapes: Annotated[int | tuple[int, ...], some_shapes("modes", "mode", least=1)] = 6
-    animation: Animation = "gif"
+    animation: Animation | None = None
 
 
 class ModesSchema(VibrationSchema):
@@ -69,6 +71,7 @@ class ModesAnalysis(Analysis):
         """See `Analysis`."""
         given = {**self.arguments, **about(case_file, mass), **changes}
         case = case_file.case(mass)
+        check_internal(case.structure, given.get("internal", 0))
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
             text = f"modes with mass rule {mass} (first use compiles kernels)"
@@ -111,12 +114,13 @@ class ModesAnalysis(Analysis):
             "mode has no amplitude of its own: each is drawn so that it can be read.",
             lambda: plots.draw_modes(case, modes, shown, names=names),
         )
-        together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
-        filmed = shown[: min(MOST_FILMED, together)]
-        film = album.folder / f"modes.{case_file.output.animation}"
-        plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
-        some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
-        yield Picture(film, f"The same modes{some} in motion, all at one pace.")
+        if case_file.output.animation:
+            together = max(1, MOST_TRIANGLES // len(case.structure.triangles))
+            filmed = shown[: min(MOST_FILMED, together)]
+            film = album.folder / f"modes.{case_file.output.animation}"
+            plots.animate_modes(case, modes, film, filmed, names=names, frames=FRAMES, fps=FPS)
+            some = f" (the first {len(filmed)})" if len(filmed) < len(shown) else ""
+            yield Picture(film, f"The same modes{some} in motion, all at one pace.")
         same = {rule: mac(modes, other, case.mass) for rule, other in others}
         if same:
             yield album.figure(
@@ -218,7 +222,7 @@ def _frequency(modes: xarray.Dataset, k: int) -> float | str:
 
 
 def _run(case_file: CaseFile, results: ByRule) -> Table:
-    columns = {
+    columns: dict[str, Any] = {
         "free dofs": "free_dofs",
         "state": "state",
         "secant (degrees)": "secant",
@@ -226,6 +230,8 @@ def _run(case_file: CaseFile, results: ByRule) -> Table:
         "solver": "solver",
         "time (s)": "wall_seconds",
     }
+    if any("internal" in found.attrs for found in results.values()):
+        columns["internal amplitudes"] = "internal"
     return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
@@ -253,6 +259,14 @@ def _notes(modes: xarray.Dataset, case: Case) -> str:
         notes.append(
             "Superlinear hinges have the slope that is equivalent to an oscillation by "
             f"{modes.attrs['secant']:g} degrees: the frequencies are those of that amplitude."
+        )
+    if "internal" in modes.attrs:
+        share = modes["internal_share"].values
+        notes.append(
+            f"Each panel has {modes.attrs['internal']} internal amplitudes beside its nodes, and "
+            "one for each edge without a crease. Shapes are drawn at nodes, which do not show "
+            f"them; they have up to {100.0 * np.nanmax(share):.0f} % of a mode's strain energy "
+            f"(mode {int(modes['mode'].values[np.nanargmax(share)])})."
         )
     if float(modes.attrs["residual"]) > 1e-6:
         notes.append(

@@ -54,7 +54,7 @@ class MotionOutput(ShownSection):
 
     every: Annotated[Any, PlainValidator(_every)] = None
     max_frequency: Positive | None = None
-    animation: Animation = "gif"
+    animation: Animation | None = None
 
 
 class MotionSchema(CaseSchema):
@@ -90,7 +90,7 @@ class MotionAnalysis(Analysis):
     schema = MotionSchema
     needs_density = "a motion needs"
     takes = arguments_of(prepare)
-    files = ("load.png", "motion.png", "energies.png")
+    files = ("load.png", "motion.png", "motion.gif", "motion.mp4", "energies.png")
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -170,11 +170,12 @@ class MotionAnalysis(Analysis):
                 results, nodes, axes=shown.axis, max_frequency=shown.max_frequency
             ),
         )
-        film = album.folder / f"motion.{shown.animation}"
-        yield Picture(
-            plots.animate(case, trajectory, film, scale=scale),
-            f"The motion with mass rule {first}{enlarged}; at rest in gray.",
-        )
+        if shown.animation:
+            film = album.folder / f"motion.{shown.animation}"
+            yield Picture(
+                plots.animate(case, trajectory, film, scale=scale),
+                f"The motion with mass rule {first}{enlarged}; at rest in gray.",
+            )
         yield album.figure(
             "energies",
             f"Energies over time and the error of their balance, mass rule {first}.",

@@ -122,7 +122,7 @@ class PathOutput(ShownSection):
 
     axis: Annotated[Any, one_of(DIRECTIONS)] = None
     shapes: Annotated[int | tuple[int, ...], some_shapes("shapes", "point")] = 4
-    animation: Animation = "gif"
+    animation: Animation | None = None
 
 
 class PathModel(ModelSection):

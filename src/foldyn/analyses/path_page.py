@@ -61,7 +61,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
         f"The deformed sheet{enlarged}; the undeformed one in gray.",
         lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
     )
-    if path.sizes["step"] > 1:
+    if path.sizes["step"] > 1 and case_file.output.animation:
         film = album.folder / f"path.{case_file.output.animation}"
         plots.animate(case, path, film, frames=FRAMES, fps=FPS, scale=scale)
         yield Picture(film, f"Along the path{enlarged}; at rest in gray.")

@@ -44,7 +44,7 @@ def read_case(
     model : {"bars_and_hinges", "shell"}, optional
         Model instead of that of the file. Creases, supports, loads and output stay; what means
         nothing to the other model is left out: keys of [model] that it does not have, the mass
-        rules, and for a shell an explicit method with its step, and a secant amplitude.
+        rules, and for a shell an explicit method with its step, secant and internal amplitudes.
     divisions : int, optional
         Pieces of every edge of a shell, instead of those of the file.
 

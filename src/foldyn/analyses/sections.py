@@ -116,10 +116,12 @@ def _pattern(value: Any) -> dict[str, Any]:
     if HINGES in value and value[HINGES] != FACES:
         if isinstance(value[HINGES], str):
             raise InputError(
-                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one or one per crease',
+                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one, one per crease '
+                "or by name",
                 f".{HINGES}",
             )
-        number_or_list(f".{HINGES}", value[HINGES], "crease")
+        if not isinstance(value[HINGES], Mapping):
+            number_or_list(f".{HINGES}", value[HINGES], "crease")
     return dict(value)
 
 
@@ -208,7 +210,7 @@ def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
 
 
 def _per_crease(value: Any) -> Any:
-    """Accept a number for all creases, one for each, or a table by assignment."""
+    """Accept a number for all creases, one for each, or a table by name."""
     return per_crease(
         "", value if isinstance(value, Mapping) else number_or_list("", value, "crease")
     )

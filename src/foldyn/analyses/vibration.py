@@ -19,12 +19,14 @@ from foldyn.cases.loads import load_from
 from foldyn.cases.models import SHELL
 from foldyn.cases.supports import support_from
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.linear.internal_modes import MOST
 from foldyn.values import show
 
 STATES = ("rest", "equilibrium")
 """States about which a case file may have its structure vibrate, beside a stored one."""
 About = Annotated[str, one_of(STATES)]
 Secant = Annotated[float, Field(gt=0, le=180)] | None
+Internal = Annotated[int, Field(ge=0, le=MOST)]
 TIMELESS = (
     "small vibrations are about one state, in which loads and displacements act in full; leave it "
     "out"
@@ -50,6 +52,12 @@ class VibrationSchema(CaseSchema):
                 f" = {show(self.analysis.secant)}: is for superlinear bends, and a shell has none; "
                 "leave it out",
                 "analysis.secant",
+            )
+        if self.model.kind == SHELL and self.analysis.internal:
+            raise InputError(
+                f" = {show(self.analysis.internal)}: is for the panels of bars and hinges; leave "
+                "it out",
+                "analysis.internal",
             )
         return self
 

@@ -184,9 +184,9 @@ class CreaseDamping(Part):
     ----------
     coefficient : float
         Damping c of a crease, N m s/rad per m of its length L at rest, at least 0.
-    creases : int, sequence of int, or {"all", "mountain", "valley"}
-        Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
-        "valley", or "all", which are all but the flat ones.
+    creases : int, sequence of int, or str
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
+        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
     """
 
     coefficient: float

@@ -140,9 +140,9 @@ class Actuate(Load):
 
     Parameters
     ----------
-    creases : int, sequence of int, or {"all", "mountain", "valley"}
-        Numbers in the order of `pattern.creases`, or all creases with an assignment: "mountain",
-        "valley", or "all", which are all but the flat ones.
+    creases : int, sequence of int, or str
+        Numbers in the order of `pattern.creases`, or a name: "mountain", "valley", "all", which
+        are all but the flat ones, or a family of the pattern (`Pattern.families`), as "zigzag".
     angle : float or sequence of float, optional
         Rest dihedral (degrees, 0 to 360, flat 180) at factor 1, of all these creases or of each.
     history : History or callable, optional

@@ -1,4 +1,4 @@
-"""Selections: nodes by number or, as "zmax and y>0", by place; creases by number or assignment.
+"""Selections: nodes by number or, as "zmax and y>0", by place; creases by number or name.
 
 An expression for nodes is made of
 
@@ -22,13 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError, within
-from foldyn.values import indices, shortened, show, suggest
+from foldyn.patterns.crease_data import crease_rows
+from foldyn.values import indices, shortened, show
 
 TOLERANCE = 1e-9
 """Tolerance of a selection relative to the size of the pattern."""
 
-SELECTIONS: Mapping[str, str] = {"all": "MVU", "mountain": "M", "valley": "V"}
-"""Words for creases, and the assignments that each means."""
+_WORDS = 'one of "all", "mountain", "valley", or a family of the pattern'
 _AXES = {"x": 0, "y": 1, "z": 2}
 _REMEDY = 'write for example "xmin", "zmax and y>0" or "not (x<1 or z==0)"'
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[NDArray, float], NDArray]] = {
@@ -132,17 +132,14 @@ def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
 
 
 def check_creases(name: str, creases: Any) -> str | tuple[int, ...]:
-    """Return a choice of creases, checked but for its range: a word or a tuple of numbers."""
+    """Return a choice of creases, a word or a tuple of numbers, checked but for its range."""
     if isinstance(creases, str):
-        if creases not in SELECTIONS:
-            words = ", ".join(f'"{word}"' for word in SELECTIONS)
+        if not creases.strip():
             raise InputError(
-                f" = {show(creases)}: {suggest(creases, SELECTIONS)}give crease numbers, as in "
-                f"[0, 1], or one of {words}",
-                name,
+                f' = "{creases}": give crease numbers, as in [0, 1], or {_WORDS}', name
             )
         return creases
-    return indices(name, creases, "crease", "or one of " + ", ".join(map(show, SELECTIONS)))
+    return indices(name, creases, "crease", f"or {_WORDS}")
 
 
 def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDArray[np.int64]:
@@ -151,7 +148,7 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
     Parameters
     ----------
     structure : Structure
-        Its folds bound the numbers; its pattern's assignments serve words.
+        Its folds bound the numbers; its pattern's assignments and families serve words.
     creases : str or tuple of int
         As `check_creases` returns them; numbers are kept in the order given.
     name : str
@@ -160,32 +157,21 @@ def resolve_creases(structure: Any, creases: Any, name: str = "creases") -> NDAr
     Raises
     ------
     InputError
-        The structure has no folds, a number is out of range, or no crease has the assignment.
+        The structure has no folds, a number is out of range, or a word means no crease.
     """
     count = len(structure.folds)
     if count == 0:
         raise InputError(
             f"{name} = {show(creases)}: this structure has no folds; give a pattern with creases"
         )
-    if isinstance(creases, str):
-        return _assigned(structure.pattern, creases, name)
-    return in_range(name, creases, count, "crease")
-
-
-def _assigned(pattern: Any, word: str, name: str) -> NDArray[np.int64]:
-    if pattern is None:
+    if not isinstance(creases, str):
+        return in_range(name, creases, count, "crease")
+    if structure.pattern is None:
         raise InputError(
-            f'{name} = "{word}": this structure has no pattern with assignments; give crease '
+            f'{name} = "{creases}": this structure has no pattern with assignments; give crease '
             "numbers"
         )
-    chosen = np.flatnonzero([letter in SELECTIONS[word] for letter in pattern.assignments])
-    if not chosen.size:
-        wanted = "that is not flat" if word == "all" else f"assigned {word}"
-        raise InputError(
-            f'{name} = "{word}": this pattern has no crease {wanted}; give crease numbers, or '
-            "assignments to the pattern"
-        )
-    return chosen
+    return crease_rows(name, creases, structure.pattern)
 
 
 class _Selector:

@@ -18,7 +18,8 @@ from foldyn import __version__
 from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
-from foldyn.cli.options import add_results
+from foldyn.cli.folding import add_fold, run_fold
+from foldyn.cli.options import add_film, add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
@@ -27,7 +28,7 @@ from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-OTHERS = {"convert": convert, "fit": run_fit, "track": track, "study": study}
+OTHERS = {"convert": convert, "fit": run_fit, "fold": run_fold, "track": track, "study": study}
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
@@ -107,6 +108,7 @@ def parser() -> argparse.ArgumentParser:
     _add_secant(fidelity)
 
     add_convert(commands)
+    add_fold(commands)
     add_study(commands)
     add_fit(commands)
     add_track(commands)
@@ -129,6 +131,7 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
 def _add_common(command: argparse.ArgumentParser, results: str) -> None:
     """Add what commands on case files of either model take."""
     _add_case(command, results)
+    add_film(command)
     command.add_argument(
         "--model",
         metavar="bars_and_hinges|shell",
@@ -148,6 +151,12 @@ def _add_state(command: argparse.ArgumentParser) -> None:
         "state of a result (NetCDF)",
     )
     _add_secant(command)
+    command.add_argument(
+        "--internal",
+        type=int,
+        metavar="N",
+        help="internal amplitudes of each panel (scheme n5b8e; default: those of the file)",
+    )
 
 
 def _add_secant(command: argparse.ArgumentParser) -> None:

@@ -17,6 +17,13 @@ def add_results(command: argparse.ArgumentParser, default: str, figures: bool = 
     add_switches(command, figures)
 
 
+def add_film(command: argparse.ArgumentParser) -> None:
+    """Add the film of what moves."""
+    command.add_argument(
+        "--film", choices=("gif", "mp4"), help="write the motion as a film too, beside its page"
+    )
+
+
 def add_switches(command: argparse.ArgumentParser, figures: bool = True) -> None:
     """Add what all commands take that compute; `main` acts on `--force`."""
     if figures:

@@ -6,6 +6,7 @@ import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,6 +49,9 @@ def run(given: Namespace) -> Path:
     folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
     with warnings.catch_warnings(record=True) as caught:  # bad input gets its one message only
         case_file = _read(path, given)
+        if getattr(given, "film", None):
+            output = replace(case_file.output, animation=given.film)
+            case_file = replace(case_file, output=output)
         task = [case_file.computation(mass) for mass in case_file.masses]
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], figures)
@@ -77,7 +81,8 @@ def _read(path: Path, given: Namespace) -> CaseFile:
     model = given.model, given.divisions
     if given.command == "run":
         return read_case(path, *model)
-    keys = {key: getattr(given, key, None) for key in ("count", "method", "state", "secant")}
+    names = ("count", "method", "state", "secant", "internal")
+    keys = {key: getattr(given, key, None) for key in names}
     if getattr(given, "frequencies", None) is not None:
         first, last, count = given.frequencies
         whole = int(count) if count.is_integer() else count

@@ -96,16 +96,27 @@ def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
     q = body.dofs(state)
     change, soft = soft_slopes(case, body, q)
     stiffness = body.tangent(q) if change is None else sparse.csr_array(body.tangent(q) + change)
-    return rows_of(damping, case, stiffness, state)._replace(soft=soft)
+    return rows_of(damping, case, stiffness, mass_of(case), state)._replace(soft=soft)
+
+
+def mass_of(case: Case) -> sparse.csr_array:
+    """Mass (m, m) of all dofs of a case: that of its nodes."""
+    mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
+    mass.resize((case.body.size, case.body.size))
+    return mass
 
 
 def rows_of(
-    damping: ModalDamping, case: Case, stiffness: sparse.csr_array, state: NDArray
-) -> ModalRows:
-    """Modal damping for a stiffness (m, m) at a displacement (n, 3)."""
-    ties, free = case.constraints, np.concatenate([case.free_dofs, case.body.hidden])
-    mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
-    mass.resize(stiffness.shape)
+    damping: ModalDamping, case: Case, stiffness: sparse.csr_array, mass: sparse.csr_array,
+    state: NDArray,
+) -> ModalRows:  # fmt: skip
+    """Modal damping for a stiffness and a mass (m, m) at a displacement (n, 3).
+
+    Dofs behind those of the case's body are free.
+    """
+    ties, body = case.constraints, case.body
+    more = np.arange(body.size, stiffness.shape[0])
+    free = np.concatenate([case.free_dofs, body.hidden, more])
     mass, stiffness = ties.matrix(mass), ties.matrix(stiffness)
     block = sparse.csc_array(mass[free][:, free])
     pencil = Pencil(sparse.csc_array(stiffness[free][:, free]), block)

@@ -48,7 +48,7 @@ class Diagnosis:
 
     def __str__(self) -> str:
         """Text of several lines."""
-        lines = ["size: " + " x ".join(f"{1e3 * length:.4g}" for length in self.size) + " mm"]
+        lines = ["size: " + " x ".join(f"{length:.4g}" for length in self.size) + " m"]
         for title in ("assumptions", "repairs", "doubts"):
             told = getattr(self, title)
             lines += [f"{title}: none"] if not told else [f"{title}:", *(f"  {t}" for t in told)]

@@ -189,11 +189,9 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
-    load = np.zeros_like(drive.vector)
-    load[:, axis] = system.case.nodal_mass
-    inertia = system.projected(load.ravel())
+    inertia = system.inertia[:, axis]
     terms = [Term(inertia, lambda omega: omega**2 - 1j * omega * damping.alpha)]
-    held, springs = np.zeros_like(load), system.case.springs
+    held, springs = np.zeros_like(drive.vector), system.case.springs
     if springs is not None:
         stands = springs.ends[:, 1] < 0
         pull = springs.stiffness[stands] * springs.direction[stands, axis]

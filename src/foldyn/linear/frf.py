@@ -78,6 +78,7 @@ def frf(
     secant: float | None = None,
     amplitude: float = 1.0,
     load_factor: float = 1.0,
+    internal: int = 0,
     progress: bool | Reporter | None = None,
     **options: Any,
 ) -> xarray.Dataset:
@@ -108,6 +109,8 @@ def frf(
         Factor on the drive, for structures whose response depends on it.
     load_factor : float
         How far actuated folds are folded in a given state.
+    internal : int
+        For "direct" and "modal": internal amplitudes of each panel, as of `modes`.
     progress : bool or callable, optional
         True shows a bar; a callable gets a `Progress`: for methods that simulate, of the simulated
         time, for the others of the number of frequencies.
@@ -172,15 +175,22 @@ def frf(
             "of the drive instead",
             "secant",
         )
+    if internal and way.by_amplitude:
+        raise InputError(
+            f" = {internal!r}: internal amplitudes are for small vibrations, and the method "
+            f'{method} goes by the amplitude of the drive; take method = "direct" or "modal", or '
+            "leave it out",
+            "internal",
+        )
     report, close = reporter(progress)
     began = time.perf_counter()
     try:
         if way.linear:
-            system = linearize(case, state, way.secant or secant, load_factor)
+            system = linearize(case, state, way.secant or secant, load_factor, internal)
             _warn_of_instability(system)
             answer = way.compute(system, driven, frequency, chosen, report)
             response, displacement = absolute(system, driven, answer.response), system.displacement
-            own = {"soft_hinges": system.soft}
+            own = {"soft_hinges": system.soft, "internal": system.internal or None}
         else:
             rig = Rig(case, state, load_factor, driven, chosen)
             answer = way.compute(rig, frequency, chosen, report)

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,8 +34,9 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import check_mass
-from foldyn.dynamics.modal_damping import modal_rows, rows_of, soft_slopes
+from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
 from foldyn.errors import FoldynWarning
+from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
 from foldyn.mechanics.body import Body
@@ -57,9 +58,9 @@ class Linearized:
     displacement : (n, 3)
         The state, m.
     free : (nf,)
-        Numbers of the free dofs, increasing: 3 node + axis, and from 3 n on those without mass
-        that a shell has beside the displacements of its nodes. Where constraints tie others to
-        them, `expanded` gives the motion of all.
+        Numbers of the free dofs, increasing: 3 node + axis, from 3 n on those without mass
+        that a shell has beside the displacements of its nodes, and internal amplitudes. Where
+        constraints tie others to them, `expanded` gives the motion of all.
     stiffness, mass, damping : (nf, nf)
         Sparse and symmetric: tangent (N/m), mass (kg) and damping but for that of modes (N s/m):
         alpha M + beta K0, dashpots and creases in the state. The tangent has the symmetric part of
@@ -70,6 +71,8 @@ class Linearized:
     drag : (nf, 3)
         Forces on the free dofs per unit velocity of the whole along x, y, z, but for alpha M: those
         of dashpots to the ground, N s/m.
+    inertia : (nf, 3)
+        Forces on the free dofs per unit acceleration of the whole along x, y, z, kg.
     soft : int
         Hinges of the superlinear law that stand at their rest angle, where their slope vanishes;
         they count without stiffness. 0 with `secant`.
@@ -79,6 +82,10 @@ class Linearized:
         How far the state is from an equilibrium, as a fraction of the forces at play.
     unbalanced : float
         The same in N.
+    internal : int
+        Internal amplitudes of each panel.
+    inner : Amplitudes
+        All of them.
     """
 
     case: Case
@@ -89,10 +96,13 @@ class Linearized:
     damping: sparse.csc_array
     modal: NDArray
     drag: NDArray
+    inertia: NDArray
     soft: int
     secant: float | None
-    residual: float = 0.0
-    unbalanced: float = 0.0
+    residual: float
+    unbalanced: float
+    internal: int
+    inner: Amplitudes = field(repr=False)
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
@@ -101,6 +111,12 @@ class Linearized:
         full = np.zeros((size, motions.shape[1]), motions.dtype)
         full[self.free[on_nodes]] = motions[on_nodes]
         return self.case.constraints.displacement(full)
+
+    def between(self, motions: NDArray) -> NDArray:
+        """Displacements (3q, k) of the points `inner.points` in motions (nf, k)."""
+        full = np.zeros((self.inner.between.shape[1], motions.shape[1]), motions.dtype)
+        full[self.free] = motions
+        return self.inner.between @ self.case.constraints.displacement(full)
 
     def projected(self, force: NDArray) -> NDArray:
         """Forces (nf,) on the free dofs, N, of forces (3n,) on all nodes."""
@@ -115,6 +131,7 @@ def linearize(
     state: State | str | None = None,
     secant: float | None = None,
     load_factor: float = 1.0,
+    internal: int = 0,
 ) -> Linearized:
     """Linearize a case about an equilibrium.
 
@@ -132,11 +149,14 @@ def linearize(
     load_factor : float
         How far actuated folds are folded in a given state, and the factor there of loads that
         depend on the displacement.
+    internal : int
+        How many internal amplitudes each panel has beside its nodes (scheme n5b8e; see `modes`).
 
     Raises
     ------
     InputError
-        Nothing can move; a free node has no mass; a state of another size.
+        Nothing can move; a free node has no mass; a state of another size; internal amplitudes of
+        a structure without them.
     ComputationError
         No equilibrium is found.
 
@@ -149,11 +169,13 @@ def linearize(
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
+    internal = check_internal(case.structure, internal)
     check_mass(case.mass, case.constraints.determined)
     check_fill(case.structure.fill, case.body.size)
     point = operating_point(case, state, load_factor)
     body = point.body
-    free = np.concatenate([case.free_dofs, body.hidden])
+    inner = amplitudes(case.structure, point.displacement, body.size, internal)
+    free = np.concatenate([case.free_dofs, body.hidden, inner.dofs])
     exact = body.tangent(point.dofs)
     change, soft = _slope_change(case, body, point.dofs, amplitude)
     if soft:
@@ -169,16 +191,12 @@ def linearize(
     loads = point.load_stiffness()
     if loads is not None:
         stiffness = sparse.csr_array(stiffness + _symmetric(loads, free))
-    mass = sparse.kron(case.mass, sparse.eye_array(3), format="csr")
-    if len(body.hidden):
-        massless = sparse.csr_array((len(body.hidden), len(body.hidden)))
-        mass = sparse.block_diag([mass, massless], format="csr")
-    mass = sparse.csr_array(mass)
-    ties, more = case.constraints, dampers(case).matrix(point.dofs)
-    damping = case.rayleigh.matrix(mass, _reference(case, exact))
-    whole = np.zeros((body.size, 3))
+    stiffness, mass = inner.stiffened(stiffness), inner.massed(mass_of(case))
+    ties, more = case.constraints, inner.behind(dampers(case).matrix(point.dofs))
+    damping = case.rayleigh.matrix(mass, inner.stiffened(_reference(case, exact)))
+    whole = np.zeros((len(inner.dofs) + body.size, 3))
     whole[: point.displacement.size] = np.tile(np.eye(3), (len(point.displacement), 1))
-    modal = _modal_rows(case, point.displacement, stiffness)
+    modal = _modal_rows(case, point.displacement, stiffness, mass, internal)
     return Linearized(
         case=case,
         displacement=point.displacement,
@@ -188,10 +206,13 @@ def linearize(
         damping=_block(ties.matrix(damping + more if more.nnz else damping), free),
         modal=ties.force(modal.T)[free].T,
         drag=ties.force(more @ whole)[free],
+        inertia=_inertia(case, whole, inner)[free],
         soft=soft,
         secant=None if secant is None else float(secant),
         residual=point.relative,
         unbalanced=point.balance.residual,
+        internal=internal,
+        inner=inner,
     )
 
 
@@ -223,14 +244,30 @@ def _slope_change(
     return (body.soft_tangent(q, change) if change.any() else None), 0
 
 
-def _modal_rows(case: Case, state: NDArray, stiffness: sparse.csr_array) -> NDArray:
+def _inertia(case: Case, whole: NDArray, inner: Amplitudes) -> NDArray:
+    """Forces (m, 3) on the unknowns per unit acceleration of the whole (m, 3)."""
+    load = whole.copy()
+    load[: case.structure.nodes.size] *= np.repeat(case.nodal_mass, 3)[:, None]
+    if len(inner.dofs):
+        load += inner.mass @ whole
+    return np.stack([case.constraints.force(column) for column in load.T], axis=1)
+
+
+def _modal_rows(
+    case: Case, state: NDArray, stiffness: sparse.csr_array, mass: sparse.csr_array, internal: int
+) -> NDArray:
     """Rows (r, m) of the modal damping: of the modes in the state (n, 3), or of those at rest."""
     damping = case.modal_damping
     if damping is not None and damping.state == "start":
-        return rows_of(damping, case, stiffness, state).rows
-    modal = modal_rows(case)
-    modal.warn()
-    return modal.rows
+        return rows_of(damping, case, stiffness, mass, state).rows
+    if damping is None or not internal:
+        modal = modal_rows(case)
+        modal.warn()
+        return np.pad(modal.rows, ((0, 0), (0, stiffness.shape[0] - modal.rows.shape[1])))
+    body, rest = case.body, np.zeros_like(state)
+    inner = amplitudes(case.structure, rest, body.size, internal)
+    stiffness = inner.stiffened(body.tangent(body.dofs(rest)))
+    return rows_of(damping, case, stiffness, inner.massed(mass_of(case)), rest).rows
 
 
 def _reference(case: Case, exact: sparse.csr_array) -> sparse.csr_array:

@@ -45,24 +45,36 @@ def matched(true: Reference, count: int, case: Case, found: xarray.Dataset) -> M
     count : int
         How many modes of the shell.
     case, found : Case, xarray.Dataset
-        The model and its modes, `SPARE` more of them. Shapes are compared at its nodes as far as
-        they are nodes of the shell's mesh.
+        The model and its modes, `SPARE` more of them. Shapes are compared at its nodes, with
+        internal amplitudes also between them, as far as these are nodes of the shell's mesh.
     """
-    seen, shape = true.at(case.structure.nodes)
+    points, weights = _points(case, found)
+    seen, shape = true.at(points)
     wanted = true.frequency[:count]
     frequency, own = elastic(found, count + SPARE)
+    if "between_shape" in found:
+        own = np.concatenate([own, elastic(found, count + SPARE, "between_shape")[1]], axis=1)
     partner, mac = np.full(len(wanted), np.nan), np.zeros(len(wanted))
     if not len(frequency):
         return Matched(partner, partner, mac)
-    for pair in pairs(wanted, shape[:count], frequency, own[:, seen], _weights(case)[seen]):
+    for pair in pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen]):
         mac[pair.first] = pair.mac
         if pair.mac >= LEAST:
             partner[pair.first] = frequency[pair.second]
     return Matched(partner, partner / wanted - 1.0, mac)
 
 
-def _weights(case: Case) -> NDArray:
-    """Weights (n,) of the nodes in the MAC, the same for all mass rules."""
+def _points(case: Case, found: xarray.Dataset) -> tuple[NDArray, NDArray]:
+    """Points (p, 3) where modes are compared, and their weights (p,) in the MAC.
+
+    The nodes, with weights that are the same for all mass rules; with internal amplitudes also
+    points between them, which weigh together as much.
+    """
     structure = case.structure
     even = replace(structure, options=replace(structure.options, mass="mixed_voronoi"))
-    return with_structure(case, even).nodal_mass
+    weights = with_structure(case, even).nodal_mass
+    if "between_shape" not in found:
+        return structure.nodes, weights
+    between = found["between_position"].values
+    more = np.full(len(between), weights.sum() / len(between))
+    return np.concatenate([structure.nodes, between]), np.concatenate([weights, more])

@@ -20,6 +20,7 @@ from scipy.linalg import eigh
 from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
+from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.memory import check_memory
@@ -44,6 +45,7 @@ def modes(
     secant: float | None = None,
     *,
     load_factor: float = 1.0,
+    internal: int = 0,
     verify: bool = True,
     solver: str = "auto",
 ) -> xarray.Dataset:
@@ -66,6 +68,11 @@ def modes(
         rest, then have the slope equivalent to an oscillation of that amplitude.
     load_factor : float
         How far actuated folds are folded in a given state.
+    internal : int
+        How many internal amplitudes (Craig and Bampton) each panel has beside its nodes, 0 to 6:
+        what its plate does between corners, center and creased edges. One comes with each edge
+        without a crease. With the scheme "n5b8e" and the mass "condensed" alone; see
+        `foldyn.linear.internal_modes`.
     verify : bool
         Whether to prove by one more factorization that no mode was missed. It costs about as much
         as the first one; few dofs are solved in full and need no proof.
@@ -80,8 +87,10 @@ def modes(
         (phi' M phi = 1 kg m2, the entry of largest size positive), `rigid`, `rigid_share` (of the
         shape in the space of rigid motions), `damping_ratio` (phi' C phi / (2 omega), nan where
         the frequency is 0 or nan), `participation`, `effective_mass`, and `displacement` of the
-        state. Attributes: `free_mass` (kg along x, y, z), `complete` (how many of the lowest modes
-        are proven to be all there are), `soft_hinges`, `residual` of the state, `rounding` (a
+        state; with internal amplitudes also `internal_share`, their share of the strain energy,
+        which shapes at nodes do not show. Attributes: `free_mass` (kg along x, y, z), `complete`
+        (how many of the lowest modes are proven to be all there are), `soft_hinges`, `residual` of
+        the state, `rounding` (a
         bound on that of the eigenvalues, as a fraction) and facts about the computation.
 
     Raises
@@ -103,7 +112,7 @@ def modes(
         "take fewer",
     )  # fmt: skip
     began = time.perf_counter()
-    linear = linearize(case, state, secant, load_factor)
+    linear = linearize(case, state, secant, load_factor, internal)
     pencil = Pencil(linear.stiffness, linear.mass, solver)
     space, along = rigid_space(linear), _unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
@@ -112,6 +121,7 @@ def modes(
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
         "secant": linear.secant,
+        "internal": linear.internal or None,
         "free_dofs": pencil.finite,
         "free_mass": np.einsum("ia,ia->a", along, linear.mass @ along),
         "residual": linear.residual,
@@ -141,6 +151,7 @@ def _variables(
     factors = shapes.T @ (linear.mass @ along)
     full = linear.expanded(shapes).T
     return {
+        **(_internal(linear, shapes) if linear.internal else {}),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
         "shape": full.reshape(-1, *linear.displacement.shape),
@@ -150,6 +161,20 @@ def _variables(
         "participation": factors,
         "effective_mass": factors**2,
         "displacement": linear.displacement,
+    }
+
+
+def _internal(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
+    """What shapes (nf, k) do between the nodes of panels with internal amplitudes."""
+    inner = linear.free >= linear.case.body.size
+    strain = shapes * (linear.stiffness @ shapes)
+    whole, part = strain.sum(axis=0), strain[inner].sum(axis=0)
+    share = np.divide(part, whole, out=np.zeros_like(whole), where=np.abs(whole) > part)
+    points = linear.inner.points
+    return {
+        "internal_share": share,
+        "between_shape": linear.between(shapes).T.reshape(shapes.shape[1], *points.shape),
+        "between_position": points,
     }
 
 
@@ -166,8 +191,10 @@ def _unit_translations(linear: Linearized) -> NDArray:
     weighted = sparse.kron(linear.case.mass, sparse.eye_array(3), format="csr") @ unit.astype(float)
     pushed = np.stack([linear.projected(each) for each in weighted.T], axis=1)
     out = np.zeros(pushed.shape)
-    mass = sparse.csc_array(linear.mass[on_nodes][:, on_nodes])
-    out[on_nodes] = factorize(mass).solve(pushed[on_nodes])
+    mass = linear.case.constraints.matrix(mass_of(linear.case))
+    nodal = linear.free[on_nodes]
+    own = sparse.csc_array(mass[nodal][:, nodal])
+    out[on_nodes] = factorize(own).solve(pushed[on_nodes])
     return out
 
 

@@ -58,24 +58,28 @@ class Reference:
         return seen, self.shape[:, place[seen]]
 
 
-def elastic(found: xarray.Dataset, count: int | None = None) -> tuple[NDArray, NDArray]:
+def elastic(
+    found: xarray.Dataset, count: int | None = None, shape: str = "shape"
+) -> tuple[NDArray, NDArray]:
     """Frequencies (k,), Hz, and shapes (k, n, 3) of the modes that something resists."""
     kept = np.flatnonzero(found["eigenvalue"].values > 0.0)[:count]
-    return found["frequency"].values[kept], found["shape"].values[kept]
+    return found["frequency"].values[kept], found[shape].values[kept]
 
 
-def modes_at_rest(case: Case, count: int, secant: float | None = None) -> xarray.Dataset:
+def modes_at_rest(
+    case: Case, count: int, secant: float | None = None, internal: int = 0
+) -> xarray.Dataset:
     """At least `count` elastic modes of a case about its rest state, as far as it has as many.
 
     What the case's loads would warn of is left unsaid: none acts at rest.
     """
-    most = len(case.free_dofs)
-    asked = min(count + RIGID, most)
+    asked = min(count + RIGID, len(case.free_dofs))
     while True:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
-            found = modes(case, asked, secant=secant)
+            found = modes(case, asked, secant=secant, internal=internal)
         missing = count - int((found["eigenvalue"].values > 0.0).sum())
+        most = int(found.attrs["free_dofs"])  # with internal amplitudes among them
         if missing <= 0 or asked == most:
             return found
         asked = min(max(asked + missing, 2 * asked), most)

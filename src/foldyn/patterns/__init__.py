@@ -6,23 +6,61 @@ from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.facets import welded
-from foldyn.patterns.generators import eggbox, kresling, miura, simple_fold
+from foldyn.patterns.flat_foldability import FlatFoldability
+from foldyn.patterns.generators.arc_miura import arc_miura
+from foldyn.patterns.generators.curved_pleat import curved_pleat
+from foldyn.patterns.generators.eggbox import eggbox
+from foldyn.patterns.generators.flasher import flasher
+from foldyn.patterns.generators.kresling import kresling
+from foldyn.patterns.generators.miura import miura
+from foldyn.patterns.generators.miura_tube import miura_tube
+from foldyn.patterns.generators.resch import resch
+from foldyn.patterns.generators.simple_fold import simple_fold
+from foldyn.patterns.generators.square_twist import square_twist
+from foldyn.patterns.generators.waterbomb import waterbomb
+from foldyn.patterns.generators.yoshimura import yoshimura
+from foldyn.patterns.generators.zipper_tubes import zipper_tubes
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.thick import thicken
 
 GENERATORS: dict[str, Callable[..., Pattern]] = {
-    generator.__name__: generator for generator in (simple_fold, miura, eggbox, kresling)
+    generator.__name__: generator
+    for generator in (
+        simple_fold,
+        miura,
+        arc_miura,
+        eggbox,
+        kresling,
+        waterbomb,
+        yoshimura,
+        curved_pleat,
+        miura_tube,
+        zipper_tubes,
+        resch,
+        square_twist,
+        flasher,
+    )
 }
 """Generators by the name that case files use (`[pattern] kind`)."""
 
 __all__ = [
     "GENERATORS",
     "Boards",
+    "FlatFoldability",
     "Pattern",
+    "arc_miura",
+    "curved_pleat",
     "eggbox",
+    "flasher",
     "kresling",
     "miura",
+    "miura_tube",
+    "resch",
     "simple_fold",
+    "square_twist",
     "thicken",
+    "waterbomb",
     "welded",
+    "yoshimura",
+    "zipper_tubes",
 ]

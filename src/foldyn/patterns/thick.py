@@ -17,7 +17,7 @@ lines of different heights meet move only with thicknesses that satisfy conditio
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import around, edge_lookup, edge_of
-from foldyn.values import SHORTEST, number_or_list, show
+from foldyn.values import SHORTEST, number, number_or_list, show
 
 SAME = 1e-9  # of the pattern's size: places and heights that count as one
 SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}
@@ -42,7 +43,7 @@ CONDITIONS = (
 def thicken(
     pattern: Pattern,
     thickness: float | Sequence[float],
-    offsets: float | Sequence[float] | None = None,
+    offsets: float | Sequence[float] | Mapping[str, float] | None = None,
 ) -> Pattern:
     """Give the panels of a pattern a thickness, and put each crease at its own height in it.
 
@@ -52,10 +53,12 @@ def thicken(
         Flat or folded, with flat panels; its panels are the middle surfaces of the boards.
     thickness : float or sequence of float
         Thickness (m) of all panels, or of each.
-    offsets : float or sequence of float, optional
+    offsets : float, sequence of float or mapping, optional
         Height (m) of the hinge line of all creases, or of each, above the middle surfaces along
-        their front normals, at most half a thickness in size. By default valleys are hinged in
-        the front face, mountains in the back face, flat creases in the middle.
+        their front normals, at most half a thickness in size; or of those that have a name
+        ("mountain", "valley", "flat", or a family of the pattern), as {"flat": 0.01}. By default
+        valleys are hinged in the front face, mountains in the back face, flat creases in the
+        middle.
 
     Returns
     -------
@@ -129,32 +132,42 @@ def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
 def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float64]:
     """Height (nc, 2) of each crease above the middle of the panel on either side."""
     beside = sizes[pattern.crease_faces]
-    if offsets is None:
-        unknown = [k for k, letter in enumerate(pattern.assignments) if letter not in SIDES]
-        if unknown:
-            raise InputError(
-                f": crease {unknown[0]} is unassigned: give offsets, or make it a mountain, a "
-                "valley or flat",
-                "offsets",
-            )
-        return beside * np.array([SIDES[letter] for letter in pattern.assignments])[:, None]
-    height = np.array(number_or_list("offsets", offsets, "crease"))
+    given, named = _given_heights(offsets, pattern)
+    letters = np.array(pattern.assignments, dtype="<U1")
+    unknown = np.flatnonzero(~named & ~np.isin(letters, list(SIDES)))
+    if unknown.size:
+        raise InputError(
+            f": crease {unknown[0]} is unassigned: give offsets, or make it a mountain, a valley "
+            "or flat",
+            "offsets",
+        )
+    least = 0.5 * beside.min(axis=1, initial=np.inf)
+    beyond = np.flatnonzero(np.abs(given) > least * (1.0 + SAME))
+    if beyond.size:
+        k = beyond[0]
+        raise InputError(
+            f": crease {k} has {given[k]:g} m: must be at most half the thickness of the panels "
+            f"beside it in size, {least[k]:g} m",
+            "offsets",
+        )
+    own = beside * np.array([SIDES.get(letter, 0.0) for letter in letters])[:, None]
+    return np.where(named[:, None], given[:, None], own)
+
+
+def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64], NDArray]:
+    """Height of each crease (nc,), and for which one is given (nc,)."""
     count = len(pattern.creases)
+    if isinstance(offsets, Mapping):
+        each = {word: number(f"offsets.{word}", value) for word, value in offsets.items()}
+        return crease_values("offsets", each, pattern)
+    if offsets is None:
+        return np.zeros(count), np.zeros(count, bool)
+    height = np.array(number_or_list("offsets", offsets, "crease"))
     if height.ndim and len(height) != count:
         raise InputError(
             f": {len(height)} values for {count} creases: give one for each", "offsets"
         )
-    height = np.broadcast_to(height, (count,))
-    least = 0.5 * beside.min(axis=1, initial=np.inf)
-    beyond = np.flatnonzero(np.abs(height) > least * (1.0 + SAME))
-    if beyond.size:
-        k = beyond[0]
-        raise InputError(
-            f": crease {k} has {height[k]:g} m: must be at most half the thickness of the panels "
-            f"beside it in size, {least[k]:g} m",
-            "offsets",
-        )
-    return np.repeat(height[:, None], 2, axis=1)
+    return np.broadcast_to(height, (count,)), np.ones(count, bool)
 
 
 def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float64]]:

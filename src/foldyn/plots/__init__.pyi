@@ -8,6 +8,7 @@ from foldyn.plots.energies import (
     plot_path_energies as plot_path_energies,
 )
 from foldyn.plots.fidelity import plot_fidelity as plot_fidelity
+from foldyn.plots.folding import animate_folding as animate_folding, draw_folding as draw_folding
 from foldyn.plots.frf import plot_frf as plot_frf
 from foldyn.plots.history import plot_history as plot_history
 from foldyn.plots.laws import plot_laws as plot_laws
@@ -22,6 +23,7 @@ from foldyn.plots.path import (
     plot_reaction as plot_reaction,
     total_reaction as total_reaction,
 )
+from foldyn.plots.patterns import draw_patterns as draw_patterns
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.tracks import (
     draw_overlay as draw_overlay,

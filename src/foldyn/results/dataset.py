@@ -17,6 +17,7 @@ from foldyn.cases.document import Document, to_document
 from foldyn.results.quantities import (
     ESTIMATES,
     FIDELITY,
+    INTERNAL,
     MODES,
     MOTION,
     PATH,
@@ -151,7 +152,8 @@ def modes_dataset(
     case : Case
         What vibrates.
     values : mapping of str to array_like
-        The variables of `quantities.MODES`, and the `displacement` (n, 3) of the state, m.
+        The variables of `quantities.MODES`, maybe those of `quantities.INTERNAL`, and the
+        `displacement` (n, 3) of the state, m.
     statistics : mapping
         Facts about the computation, each stored as an attribute.
 
@@ -161,9 +163,13 @@ def modes_dataset(
         The variables, with the coordinate `mode` = 1, 2, ..., and the case as in
         `trajectory_dataset`.
     """
-    data = variables(MODES, "mode", {name: values[name] for name in MODES})
+    known = {**MODES, **{name: own for name, own in INTERNAL.items() if name in values}}
+    data = variables(known, "mode", {name: values[name] for name in known})
     text = "displacement of the state from the rest position"
     data["displacement"] = variable(PLACE, values["displacement"], "m", text)
+    if "between_position" in values:
+        where, text = values["between_position"], "rest position of the points between nodes"
+        data["between_position"] = variable(("between", "axis"), where, "m", text)
     numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
     along = {"mode": ("mode", numbers, {"long_name": "mode"})}
     return result_dataset("modes", case, data, along, statistics)

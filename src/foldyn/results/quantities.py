@@ -65,6 +65,12 @@ MODES: Mapping[str, Quantity] = {
     "participation": Quantity("kg m", "participation factor", ("axis",)),
     "effective_mass": Quantity("kg", "effective mass", ("axis",)),
 }
+INTERNAL: Mapping[str, Quantity] = {
+    "internal_share": Quantity("1", "share of the strain energy in internal amplitudes of panels"),
+    "between_shape": Quantity("m", "mode shape between nodes", ("between", "axis")),
+}
+"""What modes have besides where panels have internal amplitudes: `between` counts the middles of
+edges and spokes, panel by panel."""
 RESPONSES: Mapping[str, Quantity] = {
     "receptance": Quantity("m/N", "displacement per force", PLACE),
     "mobility": Quantity("m/(N s)", "velocity per force", PLACE),

@@ -3,6 +3,7 @@
 from foldyn.algebra.solvers import SOLVERS
 from foldyn.statics.branch import switch_branch
 from foldyn.statics.energy_landscape import Equilibrium, Landscape, landscape
+from foldyn.statics.folding import Folding, fold
 from foldyn.statics.mechanism import mechanisms
 from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.origami import OrigamiProblem
@@ -15,12 +16,14 @@ __all__ = [
     "METHODS",
     "SOLVERS",
     "Equilibrium",
+    "Folding",
     "Landscape",
     "OrigamiProblem",
     "Point",
     "Problem",
     "Settings",
     "Solver",
+    "fold",
     "landscape",
     "mechanisms",
     "switch_branch",

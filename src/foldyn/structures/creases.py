@@ -1,4 +1,4 @@
-"""Stiffness and rest angles of creases: calibrated, or given for all, each or an assignment."""
+"""Stiffness and rest angles of creases: calibrated, or given for all, each, or by name."""
 
 from __future__ import annotations
 
@@ -10,26 +10,27 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
+from foldyn.patterns.crease_data import crease_values
 from foldyn.structures import calibration
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
-from foldyn.values import choice, number, numbers
+from foldyn.values import number, numbers, show
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
-FAMILIES: Mapping[str, str] = {"mountain": "M", "valley": "V", "flat": "F"}
-"""Words for the creases of an assignment."""
 
 
 def per_crease(name: str, value: Any) -> Any:
-    """Return values for creases as a number, a tuple, or a new dict by assignment; None as it is.
+    """Return values for creases as a number, a tuple, or a new dict by word; None as it is.
 
-    A number and a list are checked with the pattern.
+    A number, a list and the words are checked with the pattern.
     """
     if isinstance(value, Mapping):
         if not value:
-            raise InputError(f": give a value by assignment: {', '.join(FAMILIES)}", name)
-        words = [choice(f"{name}: assignment", word, FAMILIES) for word in value]
-        return {word: number(f"{name}.{word}", value[word]) for word in words}
+            raise InputError(": give a value by assignment or family, as { valley = 0.1 }", name)
+        strange = [word for word in value if not isinstance(word, str)]
+        if strange:
+            raise InputError(f": {show(strange[0])} is no assignment or family of creases", name)
+        return {word: number(f"{name}.{word}", value[word]) for word in value}
     if isinstance(value, bool):
         raise InputError(f" = {value}: give a number, one for each crease, or a table", name)
     if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
@@ -96,11 +97,4 @@ def _values(field: str, given: PerCrease, pattern: Pattern) -> tuple[NDArray, ND
                 f"{field}: {array.size} values for {count} creases: give one, or one for each"
             )
         return np.broadcast_to(array, (count,)).copy(), np.ones(count, bool)
-    letters = np.array(pattern.assignments, dtype="<U1")
-    value, chosen = np.zeros(count), np.zeros(count, bool)
-    for word, one in given.items():
-        rows = letters == FAMILIES[word]
-        if not rows.any():
-            raise InputError(f": this pattern has no crease assigned {word}", f"{field}.{word}")
-        value[rows], chosen[rows] = one, True
-    return value, chosen
+    return crease_values(field, given, pattern)

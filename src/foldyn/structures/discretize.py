@@ -15,11 +15,11 @@ from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
 from foldyn.structures import calibration as calibrate
-from foldyn.structures import plate
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
+from foldyn.structures.plate import panel_plates, weld_stiffness
 from foldyn.structures.presets import resolved
 from foldyn.structures.rigid_plates import check_welds, checked_panels
 from foldyn.structures.sheet import Sheet
@@ -71,8 +71,9 @@ def discretize(
         small vibrations (see `foldyn.structures.plate`).
     crease_stiffness : float, sequence or mapping, optional
         Stiffness per length (N m/rad per m) of all creases, of each in the order of
-        `pattern.creases`, or by assignment, as {"mountain": 0.1, "valley": 0.2}, instead of the
-        calibration, which creases of an assignment that is not named ("flat") keep. With "plate"
+        `pattern.creases`, or by name ("mountain", "valley", "flat", or a family of the pattern),
+        as {"mountain": 0.1, "valley": 0.2}, instead of the calibration, which creases that are
+        not named keep. With "plate"
         the panels beside a crease still give way to its moment.
     crease_rest : float, sequence or mapping, optional
         Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
@@ -137,7 +138,7 @@ def discretize(
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
-    welds, onset = plate.weld_stiffness(pattern, sheet), np.zeros(0)
+    welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
     bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates = None
     if options.scheme == "n5b8e":
@@ -148,9 +149,10 @@ def discretize(
         )  # fmt: skip
         bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
     elif options.calibration == "plate":
-        folds = plate.fold_stiffness(folds, pattern, sheet, options.rigid)
-        small = np.concatenate([plate.bend_stiffness(mesh, pattern, sheet), welds])
-        bends, onset = small, plate_onset(small, bends)
+        plated = panel_plates(mesh, pattern, sheet, options.rigid)
+        folds, large = plated.folds(folds), bends
+        bends = np.concatenate([plated.bends, welds])
+        onset = plate_onset(bends, large)
 
     x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)

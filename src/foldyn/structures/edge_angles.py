@@ -27,8 +27,9 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
-from foldyn.structures.condensed_panel import outline, panel_stiffness
+from foldyn.structures.condensed_panel import panel_stiffness
 from foldyn.structures.mesh import Mesh, hinge_angles, lengths
+from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
 STRAIGHT = 3.0
@@ -58,7 +59,8 @@ def edge_plates(
     folds, bends = len(mesh.folds), len(mesh.bends)
     hinge = edge_lookup(pattern.creases)
     hinge |= {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
-    straight = _straight(mesh, pattern, sheet) | set(straight_edges)
+    hinges = np.concatenate([mesh.folds, mesh.welds])
+    panels = outlines(mesh.nodes, mesh.centers, hinges, pattern, sheet, straight_edges, rigid)
     spokes = [len(face) if mesh.centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = folds + np.concatenate([[0], np.cumsum(spokes)])
     rotations = np.full((folds, 2), -1)
@@ -75,13 +77,13 @@ def edge_plates(
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
     for p, face in enumerate(pattern.faces):
-        if p in rigid:
+        panel = panels[p]
+        if panel is None:
             angles.append([])
             continue
         edges = [edge_of(a, b) for a, b in around(face)]
         turned = list(range(first[p], first[p + 1]))
         parts = [np.eye(len(turned))]
-        bowed = [edge in hinge and hinge[edge] >= folds and edge not in straight for edge in edges]
         for k in (hinge[edge] for edge in edges if edge in hinge):
             if k < folds:
                 rotations[k, int(rotations[k, 0] >= 0)] = len(beside)
@@ -92,15 +94,10 @@ def edge_plates(
                 first_side = (k, "turn") not in shared
                 turned += [k, -1 - number(k, "turn")]
                 parts.append(np.array([[0.5, 1.0 if first_side else -1.0]]))
-        for edge in (edge for edge, bow in zip(edges, bowed, strict=True) if bow):
+        for edge in (edge for edge, bow in zip(edges, panel.bowed, strict=True) if bow):
             turned.append(-1 - number(hinge[edge], "bow"))
             parts.append(np.ones((1, 1)))
         own = kinds[kind[p]]
-        center = mesh.nodes[mesh.centers[p]] if mesh.centers[p] >= 0 else None
-        panel = outline(
-            pattern.vertices[list(face)], center,
-            [edge in hinge for edge in edges], [edge in straight for edge in edges], bowed,
-        )  # fmt: skip
         matrix = own.bending_modulus * panel_stiffness(panel, own.poissons_ratio)
         if any(k >= folds + bends for k in turned):
             turns = block_diag(*parts)
@@ -118,14 +115,43 @@ def edge_plates(
     )
 
 
-def _straight(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> set[Edge]:
-    """Creases and welds that stay straight."""
+def outlines(
+    nodes: NDArray, centers: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet,
+    straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
+) -> list[Outline | None]:  # fmt: skip
+    """Outline of each panel; None of a rigid one. Welds count as creases, which may bow.
+
+    Arguments as of `straight_creases` and `edge_plates`.
+    """
+    bent = np.concatenate([pattern.creases, pattern.welds])
+    straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
+    straight |= set(straight_edges)
+    hinged, welds = edge_lookup(bent), edge_lookup(pattern.welds)
+    found: list[Outline | None] = []
+    for p, face in enumerate(pattern.faces):
+        if p in rigid:
+            found.append(None)
+            continue
+        edges = [edge_of(a, b) for a, b in around(face)]
+        found.append(
+            outline(
+                pattern.vertices[list(face)],
+                nodes[centers[p]] if centers[p] >= 0 else None,
+                [edge in hinged for edge in edges],
+                [edge in straight for edge in edges],
+                [edge in welds and edge not in straight for edge in edges],
+            )
+        )
+    return found
+
+
+def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Which creases and welds (nf + nw,) stay straight, for the hinges on them in this order."""
     edges = np.concatenate([pattern.creases, pattern.welds])
     faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
     slender = thickness / lengths(pattern.vertices, edges)
-    turned = hinge_angles(mesh.nodes, np.concatenate([mesh.folds, mesh.welds]))
-    return set(edge_lookup(edges[np.abs(np.sin(turned)) > STRAIGHT * slender]))
+    return np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
 
 
 def plates_model(

@@ -16,8 +16,10 @@ from scipy import sparse
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import around, edge_of
-from foldyn.structures.condensed_panel import outline, panel_mass
+from foldyn.structures.condensed_panel import panel_mass
+from foldyn.structures.panel_plate import outline
 
+TRIANGLE = (np.ones((3, 3)) + np.eye(3)) / 12.0  # of mass 1, linear between its corners
 LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
 
 
@@ -160,8 +162,7 @@ def consistent(surface: Surface) -> sparse.csr_array:
 
     Its rotational inertia is exact about every axis in the plane of a panel.
     """
-    element = (np.ones((3, 3)) + np.eye(3)) / 12.0
-    return _assembled(surface.triangles, surface.triangle_mass, element, surface)
+    return _assembled(surface.triangles, surface.triangle_mass, TRIANGLE, surface)
 
 
 def _assembled(
@@ -219,22 +220,34 @@ def condensed(surface: Surface) -> sparse.csr_array:
     have the consistent matrix of their triangles. The shape hardly depends on Poisson's ratio, for
     which 0.3 is taken.
     """
-    edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
-    creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
     plated = surface.centers >= 0
     rows, columns, values = [], [], []
-    for p in np.flatnonzero(plated).tolist():
-        nodes, face = surface.nodes_of(p), surface.faces[p]
-        straight = [edge_of(a, b) in creases for a, b in around(face)]
-        x = surface.nodes[nodes]
-        panel = outline(x[:-1], x[-1], [False] * len(face), straight)
+    for p, matrix in condensed_panels(surface).items():
+        nodes = surface.nodes_of(p)
         rows.append(np.repeat(nodes, len(nodes)))
         columns.append(np.tile(nodes, len(nodes)))
-        values.append(surface.panel_mass[p] * panel_mass(panel, 0.3).ravel())
+        values.append(matrix.ravel())
     n = len(surface.nodes)
     entries = (_flat(values), (_flat(rows).astype(int), _flat(columns).astype(int)))
     rest = _without(surface, plated)
     return sparse.csr_array(sparse.coo_array(entries, shape=(n, n))) + consistent(rest)
+
+
+def condensed_panels(surface: Surface) -> dict[int, NDArray]:
+    """Matrices (k, k), kg, by the rule condensed: of panels with a center node, by number.
+
+    Their nodes are the corners, then the center.
+    """
+    edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
+    creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
+    found, total = {}, surface.panel_mass
+    for p in np.flatnonzero(surface.centers >= 0).tolist():
+        face = surface.faces[p]
+        straight = [edge_of(a, b) in creases for a, b in around(face)]
+        x = surface.nodes[surface.nodes_of(p)]
+        panel = outline(x[:-1], x[-1], [False] * len(face), straight)
+        found[p] = total[p] * panel_mass(panel, 0.3)
+    return found
 
 
 def _flat(parts: list[NDArray]) -> NDArray:

@@ -2,134 +2,136 @@
 
 With G = E t^3 / (12 (1 - nu^2)) and A the area of a panel:
 
-spoke of a quad (N5B8)      (1 - nu) G A (1/Dp^2 + 1/Dq^2) s, whole spoke; Dp, Dq the diagonals,
-                            s = (A/(W H))^e, W and H the means of opposite edges;
+quads                       bends G k and compliance c of creases such that the nodes move as the
+                            corners of a plate do under forces that twist it and moments on its
+                            creases (`structures.quad_bends`);
 spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the angles by which its
                             spokes turn in the two curvatures without mean, of size 1; p of
                             `POLYGON`, because a plate that only its corners bend is softer;
-diagonal (N4B5)             2 (1 - nu) G A s / D^2, A the area of its two triangles;
-fold of length Lf           1/kf' = 1/kf + sum over its two panels of c A/(G Lf^2), but for panels
-                            that are rigid;
-weld of length Lf           1/k = sum over its two panels of c A/(G Lf^2), a crease that does not
-                            turn; in triangles c = 2/3, which is a third of their height: the sheet
-                            between the middles of two panels.
+its diagonals (N4B5)        2 (1 - nu) G A / D^2, A the area of the two triangles of each;
+fold of length Lf           1/kf' = 1/kf + sum over its two panels of c/G, but for panels that are
+                            rigid; c = `COMPLIANCE` or `TRIANGLE` times A/Lf^2 where not of a quad;
+weld of length Lf           1/k = sum over its two panels of c/G, a crease that does not turn; c as
+                            `WELD` says times A/Lf^2, 2/3 in triangles, which is a third of their
+                            height: the sheet between the middles of two panels.
 
-All four spokes of a quad are alike. The twist of a parallelogram, with its corners at +w and -w in
-turn, then has the stiffness 32 (1 - nu) G s/A, which without s is that of a plate whose edges stay
-straight, and a panel gives way at its center to the moments of its creases about as a plate does,
-which bends about its shorter diagonal. s stands for the edges of skew panels that do not stay
-straight; c for what a crease's moment bends beside it. Both depend on which edges are free.
+Creases and welds between panels that are not in one plane stay straight in these plates, other
+edges may bow.
 Derivation and errors: docs/fidelity.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, edge_of
-from foldyn.structures.mesh import Mesh, double_areas, lengths
+from foldyn.patterns.topology import around, edge_lookup, edge_of
+from foldyn.structures.edge_angles import straight_creases
+from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
+from foldyn.structures.quad_bends import quad_bends
 from foldyn.structures.sheet import Sheet
 
-COMPLIANCE, ALONE = 0.12, 0.19  # c of panels of more than three corners; of quads with one crease
-TRIANGLE = (0.22, 0.6)  # c of triangles without a free edge, and with one or two
-MIDDLE = 2.0 / 3.0  # c of triangles at a weld
+COMPLIANCE = 0.12  # c Lf^2/A of panels of more than four corners
+TRIANGLE = (0.22, 0.6)  # of triangles without a free edge, and with one or two
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-SKEW = (0.18, 0.5, 0.63, 0.84, 3.0)  # e with 0, 1, 2 (opposite), 3, 4 edges free
-OBTUSE, ACUTE = 0.7, 1.2  # e with two creases that meet at an obtuse or at an acute corner
+WELD = {"triangle": 2.0 / 3.0, "alone": 0.19}  # c Lf^2/A at a weld; of quads with no other crease
+Panel = tuple[NDArray, NDArray]  # stiffness of its bends and compliance c of its edges, for G = 1
 
 
-def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Stiffness of each whole bend (N m/rad), in the mesh's order."""
-    bends = np.empty(len(mesh.inner))
-    kinds, kind = sheet.kinds(len(pattern.faces))
-    twists = np.array([(1.0 - own.poissons_ratio) * own.bending_modulus for own in kinds])[kind]
-    first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))
-    free = _free_edges(pattern)
-    for panel, face in enumerate(pattern.faces):
-        rows, twist = slice(first[panel], first[panel + 1]), float(twists[panel])
-        x = pattern.vertices[list(face)]
-        skew = 1.0
-        if len(x) == 4:
-            skew = _skew(x, float(pattern.face_areas[panel]), _creased(face, free))
-        if mesh.centers[panel] < 0:
-            area = _wings(mesh.nodes, mesh.bends[rows])
-            length = lengths(mesh.nodes, mesh.inner[rows])
-            bends[rows] = 2.0 * twist * area * skew / length**2
-        elif len(x) == 4:
-            per_diagonal2 = 1.0 / ((x[:2] - x[2:]) ** 2).sum(axis=1)
-            bends[rows] = twist * pattern.face_areas[panel] * per_diagonal2.sum() * skew
-        else:
-            turns = _twisted(x - mesh.nodes[mesh.centers[panel]])
-            soft = POLYGON[min(len(x), 8) - 5]
-            bends[rows] = 4.0 * twist * pattern.face_areas[panel] * soft / turns
-    return bends
+class Plates(NamedTuple):
+    """What panels that bend as plates give to a structure.
 
-
-def fold_stiffness(
-    crease: NDArray, pattern: Pattern, sheet: Sheet, rigid: str | Sequence[int] | None = None
-) -> NDArray:
-    """Stiffness of whole folds (nf,), N m/rad, from that of the creases alone.
-
-    Each fold acts in series with the two panels that its moment bends; rigid ones do not.
+    Attributes
+    ----------
+    bends : (nh,)
+        Stiffness of whole bends, N m/rad, in the mesh's order.
+    creases : (nf,)
+        By how much both panels of a crease give way to its moment, rad/(N m).
     """
-    share = _given_way(pattern, sheet)
-    stiff = range(len(share)) if isinstance(rigid, str) else rigid or ()
-    share[list(stiff)] = 0.0
-    length = lengths(pattern.vertices, pattern.creases)
-    return crease / (1.0 + crease * share[pattern.crease_faces].sum(axis=1) / length**2)
+
+    bends: NDArray
+    creases: NDArray
+
+    def folds(self, crease: NDArray) -> NDArray:
+        """Stiffness (nf,) of whole folds, N m/rad, from that of the creases alone, in series."""
+        return crease / (1.0 + crease * self.creases)
 
 
-def _given_way(pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Turn c A/G (np,), m2/(N m), of panels at an edge of length 1 under a moment of 1."""
-    free = _free_edges(pattern)
-    share = np.array([_compliance(_creased(face, free)) for face in pattern.faces])
-    return share * pattern.face_areas / _modulus(pattern, sheet)
+def panel_plates(
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, rigid: str | Sequence[int] | None = None
+) -> Plates:
+    """Panels of a mesh as plates; rigid ones do not give way to their creases."""
+    count = len(pattern.faces)
+    number = edge_lookup(np.concatenate([pattern.creases, pattern.welds]))
+    edges = [[number.get(edge_of(a, b), -1) for a, b in around(face)] for face in pattern.faces]
+    modulus, nu = (sheet.values(name, count) for name in ("bending_modulus", "poissons_ratio"))
+    first = np.searchsorted(mesh.inner_panel, np.arange(count + 1))
+    stiff = set(range(count) if isinstance(rigid, str) else rigid or ())
+    quads = _quads(mesh, pattern, sheet, edges)
+    bends, creases = np.empty(len(mesh.inner)), np.zeros(len(pattern.creases))
+    for p in range(count):
+        own = slice(first[p], first[p + 1])
+        stiffness, compliance = quads.get(p) or _other(
+            mesh, pattern, p, own, float(nu[p]), -1 in edges[p]
+        )
+        bends[own] = modulus[p] * stiffness
+        for k, c in zip(edges[p], compliance.tolist(), strict=True):
+            if 0 <= k < len(creases) and p not in stiff:
+                creases[k] += c / modulus[p]
+    return Plates(bends, creases)
 
 
 def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
     """Stiffness of whole welds (nw,), N m/rad: that of the panels on both sides in series."""
-    share = _given_way(pattern, sheet)
-    flat = np.array([len(face) == 3 for face in pattern.faces])
-    share[flat] = (MIDDLE * pattern.face_areas / _modulus(pattern, sheet))[flat]
-    return lengths(pattern.vertices, pattern.welds) ** 2 / share[pattern.weld_faces].sum(axis=1)
+    free = set(edge_lookup(pattern.boundary))
+    modulus = sheet.values("bending_modulus", len(pattern.faces))
+    compliance = np.zeros(len(pattern.welds))
+    for k, both in enumerate(pattern.weld_faces.tolist()):
+        for p in both:
+            edges = [edge_of(a, b) for a, b in around(pattern.faces[p])]
+            alone = len(edges) == 4 and len(free.intersection(edges)) == 3
+            kind = "triangle" if len(edges) == 3 else "alone" if alone else ""
+            c = WELD.get(kind, COMPLIANCE)
+            compliance[k] += c * pattern.face_areas[p] / modulus[p]
+    return lengths(pattern.vertices, pattern.welds) ** 2 / compliance
 
 
-def _modulus(pattern: Pattern, sheet: Sheet) -> NDArray:
-    return sheet.values("bending_modulus", len(pattern.faces))
+def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -> dict[int, Panel]:
+    """Panels of four corners by number; `edges` has the crease or weld on each edge, or -1."""
+    faces = pattern.faces
+    quads = np.array([p for p, face in enumerate(faces) if len(face) == 4], np.int64)
+    corner = np.array([faces[p] for p in quads], np.int64).reshape(-1, 4)
+    crease = np.array([edges[p] for p in quads], np.int64).reshape(-1, 4)
+    hinges = np.concatenate([mesh.folds, mesh.welds])
+    straight = np.append(straight_creases(mesh.nodes, hinges, pattern, sheet), False)
+    x, center = pattern.vertices[corner], mesh.centers[quads]
+    points = np.where((center >= 0)[:, None], mesh.nodes[center], quad_centers(x))
+    cut = mesh.inner[np.searchsorted(mesh.inner_panel, quads)]  # its first bar
+    hinged = np.where(center < 0, (cut != corner[:, :1]).all(axis=1), -1)
+    nu = sheet.values("poissons_ratio", len(faces))[quads]
+    spokes, compliance = quad_bends(x, points, crease >= 0, straight[crease], nu, hinged)
+    bends = [own if hub >= 0 else own.sum() for own, hub in zip(spokes, center, strict=True)]
+    return dict(zip(quads.tolist(), zip(bends, compliance, strict=True), strict=True))
 
 
-def _free_edges(pattern: Pattern) -> set[tuple[int, ...]]:
-    return set(map(tuple, pattern.boundary.tolist()))
-
-
-def _creased(face: tuple[int, ...], free: set[tuple[int, ...]]) -> list[bool]:
-    """Whether each edge of a panel is a crease."""
-    return [edge_of(a, b) not in free for a, b in around(face)]
-
-
-def _compliance(creased: list[bool]) -> float:
-    """Return c of a panel whose edges are creases or free."""
-    if len(creased) == 3:
-        return TRIANGLE[not all(creased)]
-    return ALONE if len(creased) == 4 and sum(creased) == 1 else COMPLIANCE
-
-
-def _skew(x: NDArray, area: float, creased: list[bool]) -> float:
-    """Return s of a quadrilateral with the corners x (4, 3): 1 of a rectangle."""
-    edge = np.roll(x, -1, axis=0) - x
-    length = np.linalg.norm(edge, axis=1)
-    means = 0.25 * (length[0] + length[2]) * (length[1] + length[3])
-    between = [k for k in range(4) if creased[k] and creased[k - 1]]  # corners
-    if sum(creased) == 2 and between:
-        obtuse = edge[between[0]] @ edge[between[0] - 1] > 0.0
-        power = OBTUSE if obtuse else ACUTE
+def _other(mesh: Mesh, pattern: Pattern, p: int, rows: slice, nu: float, free: bool) -> Panel:
+    """A panel of three or of more than four corners; `free` if an edge is."""
+    x, area = pattern.vertices[list(pattern.faces[p])], float(pattern.face_areas[p])
+    shape = area / ((np.roll(x, -1, axis=0) - x) ** 2).sum(axis=1)
+    if len(x) == 3:
+        return np.zeros(0), TRIANGLE[free] * shape
+    if mesh.centers[p] < 0:
+        both = _wings(mesh.nodes, mesh.bends[rows])
+        bends = 2.0 * (1.0 - nu) * both / lengths(mesh.nodes, mesh.inner[rows]) ** 2
     else:
-        power = SKEW[4 - sum(creased)]
-    return float((area / means) ** power)
+        soft = POLYGON[min(len(x), 8) - 5]
+        turns = _twisted(x - mesh.nodes[mesh.centers[p]])
+        bends = np.full(len(x), 4.0 * (1.0 - nu) * area * soft / turns)
+    return bends, COMPLIANCE * shape
 
 
 def _wings(x: NDArray, bends: NDArray) -> NDArray:

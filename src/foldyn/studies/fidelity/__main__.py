@@ -2,8 +2,8 @@
 
     python -m foldyn.studies.fidelity --out FOLDER
 
-writes documented.csv and drawn.csv, by default beside the stored ones, and prints their summaries
-(about three minutes).
+writes documented.csv, drawn.csv and the first five modes of their cases with internal amplitudes,
+by default beside the stored ones, and prints their summaries (about six minutes).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from foldyn.studies.fidelity.cases import documented
 from foldyn.studies.fidelity.drawn import COUNT, SEED, drawn
+from foldyn.studies.fidelity.internal import computed_first, first_table, write_first
 from foldyn.studies.fidelity.large import large_table
 from foldyn.studies.fidelity.statics import statics_table
 from foldyn.studies.fidelity.stored import RESULTS, Modes, computed, table, write
@@ -32,6 +33,9 @@ def main(arguments: list[str] | None = None) -> int:
         found = computed(cases, _tell)
         write(chosen.out / f"{name}.csv", found)
         print(f"\n{name}: {len(cases)} cases\n\n{table(found)}\n")
+        first = computed_first(cases, _tell)
+        write_first(chosen.out / f"{name}_internal.csv", first)
+        print(f"{name}, internal amplitudes\n\n{first_table(first)}\n")
     print(statics_table(), large_table(), sep="\n\n")
     return 0
 

@@ -28,6 +28,7 @@ MODELS: Mapping[str, Mapping[str, Any]] = {
 """Options of `discretize`; all bends are linear. `circumcenter` is refused on many panels, and is
 `mixed_voronoi` on all others."""
 COMPARED = 8  # modes of the shell, at most
+FIRST = 5  # that are compared whatever their frequency
 
 
 class Row(NamedTuple):
@@ -65,12 +66,21 @@ def structure_of(case: FidelityCase, model: str) -> Structure:
 
 def compare(case: FidelityCase, true: Reference, model: str) -> list[Row]:
     """Modes of a case below the limit, by a model beside the shell."""
+    rows = _rows(case, true, model, COMPARED, 0)
+    return [row for row in rows if row.over_plate < BELOW]
+
+
+def first_modes(case: FidelityCase, true: Reference, internal: int) -> list[Row]:
+    """The first modes of a case, by n5b8e with internal amplitudes beside the shell."""
+    return _rows(case, true, "n5b8e, condensed", FIRST, internal)
+
+
+def _rows(case: FidelityCase, true: Reference, model: str, count: int, internal: int) -> list[Row]:
     held = case.case(structure_of(case, model))
-    found = matched(true, COMPARED, held, modes_at_rest(held, COMPARED + SPARE))
+    found = matched(true, count, held, modes_at_rest(held, count + SPARE, internal=internal))
     limit = plate_frequency(case.pattern(), case.sheet)
     rows = zip(true.frequency, found.error, found.mac, strict=False)
     return [
         Row(k, float(shell), float(shell / limit), float(error), float(mac))
         for k, (shell, error, mac) in enumerate(rows, 1)
-        if shell < BELOW * limit
     ]

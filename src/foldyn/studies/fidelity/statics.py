@@ -15,7 +15,7 @@ from foldyn.linear import modes
 from foldyn.linear.fidelity import MODELS
 from foldyn.linear.refinement import extrapolated
 from foldyn.linear.small_loads import small_loads
-from foldyn.patterns.generators import miura
+from foldyn.patterns import miura
 from foldyn.shells import shell
 from foldyn.structures import Sheet, discretize
 from foldyn.structures.discretized import Discretized

@@ -48,9 +48,9 @@ def computed(
     return found
 
 
-def write(path: Path, results: Iterable[Modes]) -> None:
+def write(path: Path, results: Iterable[Modes], models: Iterable[str] = tuple(MODELS)) -> None:
     """Write a table: case, mode, frequency (Hz), the same over the plate's, errors and MAC."""
-    heads = [f"{what}: {model}" for model in MODELS for what in ("error", "mac")]
+    heads = [f"{what}: {model}" for model in models for what in ("error", "mac")]
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["case", "mode", "shell [Hz]", "over plate", *heads])
@@ -62,13 +62,13 @@ def write(path: Path, results: Iterable[Modes]) -> None:
                 out.writerow([modes.case, first.mode, *frequency, *own])
 
 
-def read(path: Path) -> list[Modes]:
+def read(path: Path, models: Iterable[str] = tuple(MODELS)) -> list[Modes]:
     """A table that `write` wrote; cases without modes below the limit are not in it."""
     found: dict[str, Modes] = {}
     with path.open(encoding="utf-8", newline="") as file:
         for line in csv.DictReader(file):
-            modes = found.setdefault(line["case"], Modes(line["case"], {m: [] for m in MODELS}))
-            for model in MODELS:
+            modes = found.setdefault(line["case"], Modes(line["case"], {m: [] for m in models}))
+            for model in models:
                 error, mac = float(line[f"error: {model}"]), float(line[f"mac: {model}"])
                 shell, over_plate = float(line["shell [Hz]"]), float(line["over plate"])
                 modes.rows[model].append(Row(int(line["mode"]), shell, over_plate, error, mac))
@@ -77,7 +77,11 @@ def read(path: Path) -> list[Modes]:
 
 def summary(results: Iterable[Modes], model: str) -> Summary:
     """Errors of a model over a set."""
-    rows = [row for modes in results for row in modes.rows[model]]
+    return summary_of([row for modes in results for row in modes.rows[model]])
+
+
+def summary_of(rows: list[Row]) -> Summary:
+    """Errors of a model in some modes."""
     error = np.array([np.inf if np.isnan(row.error) else abs(row.error) for row in rows])
     alike = np.array([row.mac > ALIKE for row in rows])
     median, ninetieth = np.percentile(error, [50, 90], method="higher")

@@ -1,0 +1,212 @@
+"""Internal amplitudes of the panels of a sheet, in small vibrations about a state (scheme n5b8e).
+
+Each panel moves across itself as `structures.panel_modes` says, with the plate's own mass in place
+of that of the rule condensed:
+
+    M = sum over panels of (1 - n n') x R + n n' x F,    R of the rule, F of the plate,
+
+n the normal of the panel in the state; F also couples the heights of its nodes with the turns of
+its creased edges, which thereby have mass, and with the amplitudes. Amplitudes are dofs behind
+those of the body, m, each with a stiffness of its own and no other. What stresses in a panel do to
+it is left out.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import block_diag
+
+from foldyn.errors import InputError
+from foldyn.structures import Structure
+from foldyn.structures.edge_angles import outlines
+from foldyn.structures.mass import TRIANGLE, condensed_panels
+from foldyn.structures.panel_modes import panel_modes
+from foldyn.structures.panel_plate import Outline
+from foldyn.values import show, whole
+
+MOST = 6  # the meshes of panels have further shapes, but less and less well
+
+
+class Amplitudes(NamedTuple):
+    """What k amplitudes bring to matrices of m dofs, behind which they stand.
+
+    Attributes
+    ----------
+    stiffness : (k,)
+        N/m.
+    mass : (m + k, m + k)
+        What comes to the mass of the nodes, kg.
+    points : (q, 3)
+        Middles of the edges and of the spokes of all panels at rest, one after the other, m.
+    between : (3 q, m + k)
+        Their displacements by all dofs.
+    """
+
+    stiffness: NDArray
+    mass: sparse.csr_array
+    points: NDArray
+    between: sparse.csr_array
+
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        """Their numbers (k,)."""
+        size = self.mass.shape[0]
+        return np.arange(size - len(self.stiffness), size)
+
+    def behind(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """A matrix (m, m) with rows and columns of zeros for them."""
+        if not len(self.stiffness):
+            return matrix
+        none = sparse.csr_array((len(self.stiffness), len(self.stiffness)))
+        return sparse.csr_array(sparse.block_diag([matrix, none], format="csr"))
+
+    def stiffened(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """A stiffness (m, m), N/m, with theirs."""
+        if not len(self.stiffness):
+            return matrix
+        own = sparse.diags_array(self.stiffness)
+        return sparse.csr_array(sparse.block_diag([matrix, own], format="csr"))
+
+    def massed(self, matrix: sparse.csr_array) -> sparse.csr_array:
+        """A mass (m, m), kg, with theirs."""
+        if not len(self.stiffness):
+            return matrix
+        return sparse.csr_array(self.behind(matrix) + self.mass)
+
+
+def check_internal(structure: Any, internal: Any) -> int:
+    """Return the number of internal amplitudes of each panel of a structure.
+
+    Raises
+    ------
+    InputError
+        No number from 0 to 6; amplitudes of a structure that does not have them, as with welds.
+    """
+    count = whole("internal", internal, least=0, most=MOST, what="amplitudes of a panel")
+    if not count:
+        return 0
+    if not isinstance(structure, Structure) or structure.edge_plates is None:
+        raise InputError(
+            f" = {count}: internal amplitudes are those of panels as plates, of the scheme n5b8e; "
+            'discretize with preset = "n5b8e", or leave it out',
+            "internal",
+        )
+    if structure.pattern is not None and len(structure.pattern.welds):
+        raise InputError(
+            f" = {count}: internal amplitudes are those of panels between creases, and the pattern "
+            f"has welds ({len(structure.pattern.welds)}); leave it out, or take a shell",
+            "internal",
+        )
+    if structure.node_mass is not None or structure.options.mass != "condensed":
+        rule = "given by nodes" if structure.node_mass is not None else show(structure.options.mass)
+        raise InputError(
+            f" = {count}: internal amplitudes come with the mass of the plate, and the mass is "
+            f'{rule}; take mass = "condensed", or leave it out',
+            "internal",
+        )
+    return count
+
+
+def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> Amplitudes:
+    """Internal amplitudes of a structure, if any, whose nodes are displaced by (n, 3), m.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of the scheme n5b8e and the mass rule condensed.
+    displacement : (n, 3)
+        The state.
+    size : int
+        Number of the dofs of its body.
+    count : int
+        How many of each panel beside one for each edge without a crease; one more where symmetry
+        makes two alike.
+    """
+    if not count:
+        none = np.zeros((0, 3))
+        return Amplitudes(none[:, 0], _matrix([], size, size), none, _matrix([], 0, size))
+    plates, surface, sheet = structure.edge_plates, structure.surface, structure.sheet
+    assert plates is not None
+    kinds, kind = sheet.kinds(len(surface.faces))
+    rule, total = condensed_panels(surface), surface.panel_mass
+    per_hidden = structure.body.fold_hinges().per_hidden
+    first, stiffness, masses, points, between = size, [np.zeros(0)], [], [np.zeros((0, 3))], []
+    for p, panel in enumerate(_outlines(structure)):
+        if panel is None:
+            continue
+        own, corners = kinds[kind[p]], list(surface.faces[p])
+        modes = panel_modes(panel, own.poissons_ratio, count + panel.creased.count(False))
+        length2 = float(np.linalg.norm(_double_area(structure.nodes[corners])))  # an outline's is 1
+        stiffness.append(own.bending_modulus / length2 * modes.stiffness)
+        normal = _double_area(structure.nodes[corners] + displacement[corners])
+        normal = normal / np.linalg.norm(normal)
+        nodes = np.array(surface.nodes_of(p))
+        angle = plates.angle[plates.start[p] : plates.start[p + 1]]
+        turns = structure.nodes.size - 1 - angle[angle < 0]
+        inner = np.arange(first, first + len(modes.stiffness))
+        first += len(inner)
+        # heights of the nodes, turns of the edges and amplitudes by the dofs
+        height = np.kron(np.eye(len(nodes)), normal)
+        turned = np.sqrt(length2) * per_hidden * np.eye(len(turns))
+        by = block_diag(height, turned, np.eye(len(inner)))
+        mass = total[p] * modes.mass
+        mass[: len(nodes), : len(nodes)] -= rule.get(p, total[p] * TRIANGLE)
+        dofs = np.concatenate([(3 * nodes[:, None] + np.arange(3)).ravel(), turns, inner])
+        masses.append(_entries(dofs, dofs, by.T @ mass @ by))
+        ends = _ends(nodes, len(corners))
+        along = np.kron(0.5 * ends, np.eye(3) - np.outer(normal, normal))
+        across = np.kron(modes.between @ by, normal[:, None])
+        across[:, : along.shape[1]] += along
+        row = 3 * sum(map(len, points)) + np.arange(len(across))
+        between.append(_entries(row, dofs, across))
+        points.append(0.5 * ends @ structure.nodes[nodes])
+    middle = np.concatenate(points)
+    return Amplitudes(
+        np.concatenate(stiffness),
+        _matrix(masses, first, first),
+        middle,
+        _matrix(between, middle.size, first),
+    )
+
+
+def _ends(nodes: NDArray, corners: int) -> NDArray:
+    """Which nodes (q, k) end the edges and the spokes of a panel: ones."""
+    edges = np.eye(corners) + np.roll(np.eye(corners), 1, axis=1)
+    if len(nodes) == corners:
+        return edges
+    spokes = np.column_stack([np.eye(corners), np.ones(corners)])
+    return np.concatenate([np.pad(edges, ((0, 0), (0, 1))), spokes])
+
+
+def _outlines(structure: Structure) -> list[Outline | None]:
+    """Outlines of its panels; None of rigid ones."""
+    options, pattern = structure.options, structure.pattern
+    assert pattern is not None
+    every = range(len(pattern.faces))
+    return outlines(
+        structure.nodes, structure.centers, structure.folds, pattern, structure.sheet,
+        options.straight, every if isinstance(options.rigid, str) else options.rigid or (),
+    )  # fmt: skip
+
+
+def _double_area(x: NDArray) -> NDArray:
+    """Twice the area vector (3,) of a polygon with corners (k, 3)."""
+    arm = x - x.mean(axis=0)
+    return np.cross(arm, np.roll(arm, -1, axis=0)).sum(axis=0)
+
+
+def _entries(rows: NDArray, columns: NDArray, matrix: NDArray) -> NDArray:
+    """Values, rows and columns (3, r * c) of a matrix (r, c)."""
+    r, c = matrix.shape
+    return np.stack([matrix.ravel(), np.repeat(rows, c), np.tile(columns, r)])
+
+
+def _matrix(entries: list[NDArray], rows: int, columns: int) -> sparse.csr_array:
+    """Sum of matrices given by their entries."""
+    value, row, column = np.concatenate([np.zeros((3, 0)), *entries], axis=1)
+    places = (row.astype(np.int64), column.astype(np.int64))
+    return sparse.csr_array(sparse.coo_array((value, places), shape=(rows, columns)))

@@ -1,0 +1,1 @@
+"""Generators of common patterns, each in a file of its own."""

@@ -1,0 +1,102 @@
+"""Checks of the arguments of generators."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from foldyn.errors import InputError
+from foldyn.memory import check_memory
+from foldyn.values import length, number, show, whole
+
+PER_VERTEX = 2200.0
+"""Bytes a vertex of a pattern as it is made: 1800 measured with 10,000 and 40,000 vertices."""
+ROUND = 360.0 * (1.0 + 1e-12)  # degrees
+
+
+def angle_between(name: str, value: Any, low: float, high: float, remedy: str = "") -> float:
+    """Return an angle (degrees) strictly between `low` and `high`; messages end with `remedy`."""
+    angle = number(name, value, unit="degrees")
+    if not low < angle < high:
+        raise InputError(f" = {value}: must be between {low:g} and {high:g} degrees{remedy}.", name)
+    return angle
+
+
+def fold_dihedral(
+    value: Any,
+    *,
+    flat_allowed: bool = True,
+    least: float = 0.0,
+    otherwise: str = "at both of which the sheet closes to a line",
+) -> float:
+    """Return the smaller angle of a fold (degrees), between 0 and 180, 180 only if allowed.
+
+    least : angle (degrees) at which the pattern is closed already.
+    otherwise : what happens at the ends where flat is not allowed.
+    """
+    if flat_allowed and isinstance(value, Real) and value == 180:
+        return 180.0
+    remedy = (
+        ", or 180 (flat)" if flat_allowed else f" ({otherwise})"
+    ) + "; it is the smaller angle of the fold, for valleys and mountains alike"
+    return angle_between("dihedral", value, least, 180.0, remedy)
+
+
+def acute(name: str, value: Any) -> float:
+    """Return an acute angle (degrees) of a panel, in radians."""
+    remedy = "; it is the acute corner of the panel, so give 180 minus an obtuse one"
+    return math.radians(angle_between(name, value, 0.0, 90.0, remedy))
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return a choice between two."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f" = {show(value)}: must be True or False (true or false in TOML)", name)
+    return bool(value)
+
+
+def check_size(fields: str, vertices: int) -> None:
+    """Refuse a pattern that memory cannot hold, before it is made.
+
+    fields : names and values of the arguments that make it large.
+    """
+    size = f"a pattern of {vertices:.3g} vertices"
+    check_memory(fields, size, PER_VERTEX * vertices, "take fewer")
+
+
+def cell_counts(cells: Any, per_cell: int) -> tuple[int, int]:
+    """Return the numbers of cells along x and y of a sheet with some vertices in each."""
+    try:
+        if isinstance(cells, (str, bytes)):
+            raise TypeError
+        along_x, along_y = cells
+    except (TypeError, ValueError):
+        raise InputError(
+            f" = {show(cells)}: must be two integers, the unit cells along x and y.", "cells"
+        ) from None
+    nx, ny = whole("cells[0]", along_x, least=1), whole("cells[1]", along_y, least=1)
+    check_size(f"cells = {show([nx, ny])}", per_cell * nx * ny)
+    return nx, ny
+
+
+def sizes(a: Any, b: Any) -> tuple[float, float]:
+    """Return two lengths (m)."""
+    return length("a", a), length("b", b)
+
+
+def check_turn(name: str, value: Any, turn: float, count: int, what: str) -> None:
+    """Refuse a sheet that rolls up by more than a full turn.
+
+    turn : degrees by which each of `count` rows, or whatever `what` says, turns against the last.
+    """
+    if abs(turn) * count > ROUND:
+        most = math.floor(ROUND / abs(turn))
+        raise InputError(
+            f" = {value}: each of the {count} {what} turns by {abs(turn):.4g} degrees against the "
+            f"last, so that the sheet rolls up by more than a full turn and passes through itself; "
+            f"take at most {most} {what}, or another dihedral",
+            name,
+        )

@@ -1,0 +1,64 @@
+"""A pattern from its panels, the families of its creases and their letters."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from numpy.typing import ArrayLike
+
+from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.topology import Edge, around, edge_of
+
+T = TypeVar("T")
+
+
+def assembled(
+    name: str,
+    vertices: ArrayLike,
+    faces: Sequence[Sequence[int]],
+    families: Mapping[str, Sequence[Edge]],
+    letters: Mapping[str, str] | None = None,
+    angles: Mapping[str, float] | None = None,
+    custom: Mapping[str, Any] | None = None,
+) -> Pattern:
+    """Pattern of which each family may name edges of one panel too, which are left out.
+
+    Parameters
+    ----------
+    name : str
+    vertices : array_like, shape (n, 3) or (n, 2)
+    faces : sequence of sequences of int
+    families : mapping from str to sequences of vertex pairs
+    letters : mapping, optional
+        Assignment of each family.
+    angles : mapping, optional
+        Angle (rad) to fold each family to, valleys positive.
+    custom : mapping, optional
+        As `Pattern` takes it.
+
+    Returns
+    -------
+    Pattern
+    """
+    panels = Counter(edge_of(a, b) for face in faces for a, b in around(face))
+    creases = {
+        family: inner
+        for family, pairs in families.items()
+        if (inner := [edge_of(*pair) for pair in pairs if panels[edge_of(*pair)] == 2])
+    }
+
+    def each(values: Mapping[str, T]) -> dict[Edge, T]:
+        return {pair: values[f] for f, pairs in creases.items() if f in values for pair in pairs}
+
+    rim = {pair: "B" for pair, count in panels.items() if count == 1}
+    return Pattern(
+        vertices,
+        faces,
+        rim | each(letters) if letters else None,
+        name,
+        fold_angles=each(angles) if angles else None,
+        families=creases,
+        custom=custom,
+    )

@@ -1,0 +1,60 @@
+"""Sheets of quadrilaterals in rows and columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.topology import Edge
+
+
+def indices(columns: int, rows: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Numbers i along x and j along y of the vertices, shape (columns + 1, rows + 1)."""
+    i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij")
+    return i, j
+
+
+def lines(columns: int, rows: int) -> tuple[list[Edge], list[Edge]]:
+    """Creases along x, those from (i, j) to (i + 1, j), and along y, from (i, j) to (i, j + 1)."""
+    step = rows + 1
+    along_x = [(i * step + j, (i + 1) * step + j) for j in range(1, rows) for i in range(columns)]
+    along_y = [(i * step + j, i * step + j + 1) for i in range(1, columns) for j in range(rows)]
+    return along_x, along_y
+
+
+def sheet(
+    name: str,
+    places: Sequence[ArrayLike],
+    families: tuple[str, str],
+    assignments: Mapping[Edge, str] | Sequence[str] | None = None,
+) -> Pattern:
+    """Sheet of quadrilaterals, front to +z, panels along x first.
+
+    Parameters
+    ----------
+    name : str
+    places : three arrays, each broadcast to shape (columns + 1, rows + 1)
+        Coordinates of vertex (i, j), which is number i (rows + 1) + j.
+    families : tuple of two str
+        What to call the creases along x and those along y.
+    assignments : mapping or sequence of str, optional
+        As `Pattern` takes them.
+
+    Returns
+    -------
+    Pattern
+    """
+    vertices = np.stack(np.broadcast_arrays(*places), axis=-1).astype(np.float64)
+    columns, rows = vertices.shape[0] - 1, vertices.shape[1] - 1
+    step = rows + 1
+    faces = [
+        (m * step + n, (m + 1) * step + n, (m + 1) * step + n + 1, m * step + n + 1)
+        for n in range(rows)
+        for m in range(columns)
+    ]
+    both = zip(families, lines(columns, rows), strict=True)
+    groups = {family: pairs for family, pairs in both if pairs}
+    return Pattern(vertices.reshape(-1, 3), faces, assignments, name, families=groups)

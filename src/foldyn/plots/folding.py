@@ -1,0 +1,141 @@
+"""Pictures of a pattern that folds: states side by side, and an animation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.plots import scene
+from foldyn.plots.scene import Sheet3D, View
+from foldyn.plots.sheet import DrawnSheet, edge_keys, rest_keys, side_by_side
+from foldyn.plots.writers import checked_file, filmed
+from foldyn.statics.folding import Folding
+from foldyn.structures.mesh import n4b5
+
+_WIDTH = 6.0  # inches
+
+
+def draw_folding(
+    folding: Folding,
+    states: int | Sequence[int] = 3,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Figure:
+    """Draw a pattern in states on its way, over the first one in gray.
+
+    Parameters
+    ----------
+    folding : Folding
+        Of `foldyn.fold`.
+    states : int or sequence of int
+        How many, spread evenly over the steps with the first and the last among them; or their
+        numbers, negative ones from the end.
+    view : tuple of float
+        Elevation above the xy plane and azimuth around z (degrees).
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        No such state.
+    """
+    positions = folding.path["position"].values
+    last = len(positions) - 1
+    if isinstance(states, int | np.integer):
+        if states < 1:
+            raise InputError(f"states: {states}; give at least one")
+        numbers = np.unique(np.linspace(0 if states > 1 else last, last, states).round())
+        chosen = [int(number) for number in numbers]
+    else:
+        for number in states:
+            if not -len(positions) <= number <= last:
+                raise InputError(f"states: {number}; there are states 0 to {last}")
+        chosen = [int(number) % len(positions) for number in states]
+    sheet = _sheet(folding, positions[0])
+    captions = [_caption(folding, number) for number in chosen]
+    notes = rest_keys(state="first state")
+    return side_by_side(sheet, positions[chosen], captions, View(*view), notes, title)[0]
+
+
+def animate_folding(
+    folding: Folding,
+    path: str | PathLike[str],
+    frames: int = 60,
+    fps: int = 20,
+    view: tuple[float, float] = (28.0, -60.0),
+    title: str = "",
+) -> Path:
+    """Write a GIF or an MP4 of a pattern that folds.
+
+    Parameters
+    ----------
+    folding : Folding
+        Of `foldyn.fold`.
+    path : path-like
+        File to write, ending in .gif or .mp4. An MP4 needs ffmpeg: on the PATH, or through the
+        package imageio-ffmpeg.
+    frames : int
+        Number of pictures, evenly spread over the steps, straight in between.
+    fps : int
+        Pictures per second, 1 to 50 in a GIF and 1 to 60 in an MP4.
+    view, title
+        As in `draw_folding`.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        Fewer than two frames, a rate out of range, a path that is no GIF or MP4 in an existing
+        directory, or an MP4 without ffmpeg.
+    ComputationError
+        ffmpeg could not write the file.
+    """
+    path = checked_file(path, frames, fps)
+    positions = folding.path["position"].values
+    sheet, sight = _sheet(folding, positions[0]), View(*view)
+    keys = edge_keys(sheet)
+    figure, axes = scene.view_figure(
+        positions.reshape(-1, 3), sight, title, -(-len(keys) // 3), _WIDTH
+    )
+    drawn = DrawnSheet(axes, sheet, positions[0], sight)
+    scene.style.finish(figure, keys)
+    with filmed(figure, path, fps) as writer:
+        for place in np.linspace(0.0, len(positions) - 1.0, frames):
+            before = min(int(place), len(positions) - 2)
+            part = place - before
+            drawn.move((1.0 - part) * positions[before] + part * positions[before + 1])
+            writer.grab_frame()
+    return path
+
+
+def _sheet(folding: Folding, nodes: NDArray) -> Sheet3D:
+    """The pattern at the positions of its first state."""
+    pattern = folding.pattern
+    return Sheet3D(pattern, None, None, nodes, n4b5(pattern).triangles)
+
+
+def _caption(folding: Folding, number: int) -> str:
+    """Text below a state: how far its creases have turned."""
+    turned = np.abs(np.degrees(folding.path["fold_angle"].values[number]))
+    letters = np.array(folding.assignments)
+    folded = turned[(letters == "M") | (letters == "V")]
+    if not folded.size:
+        folded = turned
+    if folded.max() < 0.05:
+        return "flat"
+    return f"{folded.min():.0f} to {folded.max():.0f} degrees"

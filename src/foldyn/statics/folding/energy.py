@@ -1,0 +1,172 @@
+"""The energy that folding makes least: stiff panels, soft creases with moving rest angles.
+
+Panels are cut into triangles. With l and L the length of a bar now and in the flat panel, theta the
+fold angle of a hinge (pi less its dihedral) and all lengths in units of the mean bar,
+
+    E = 1/2 sum L (l/L - 1)^2 + 1/2 b sum L (theta - theta0)^2   bars, bends within panels
+      + 1/2 c sum L (theta - theta*)^2                           driven creases
+      + 1/2 s sum L (shortfall^2 + excess^2)                     mountains and valleys,
+
+where a mountain or valley falls short if it has turned its own way by less than a margin, and
+exceeds if it has turned by more than is allowed, at most 180 degrees: beyond, its panels have
+passed each other. This is the energy of bars and hinges with linear laws; s is a law that pushes
+back from one side. It is a sum of squares, so that the Gauss-Newton matrix is positive semidefinite
+everywhere. The tangent stiffness is not: at the flat state it is singular in every direction that
+folds.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.hinge_rows import dihedrals_and_gradients
+from foldyn.patterns import Pattern
+from foldyn.structures.mesh import lengths, n4b5
+
+SIGNS = {"M": -1.0, "V": 1.0, "F": 0.0, "U": 0.0}
+"""Sign of the fold angle of each assignment; 0 where either way is right."""
+
+
+class Stiffness(NamedTuple):
+    """Stiffnesses of hinges, over that of the bars."""
+
+    bends: float
+    creases: float
+    sides: float
+
+
+class Aim(NamedTuple):
+    """Rest angles (nc,) of creases, nan where free, and their least and most turns (nc,), rad."""
+
+    angles: NDArray
+    least: NDArray
+    most: NDArray
+
+
+class Shape(NamedTuple):
+    """A state: positions (n, 3) in units of the mean bar, turns (nh,), strains (nb,), energy."""
+
+    x: NDArray
+    turns: NDArray
+    strains: NDArray
+    energy: float
+
+
+class Evaluated(NamedTuple):
+    """A shape with the gradient of its energy (m,) and its Gauss-Newton matrix (m, m)."""
+
+    shape: Shape
+    gradient: NDArray
+    matrix: sparse.csc_array
+
+
+class FoldEnergy:
+    """The energy of a pattern, of which welds and flat creases that nothing drives are bends.
+
+    Attributes
+    ----------
+    signs : (nc,)
+        Sign of the fold angle of each crease, 0 for flat and unassigned ones.
+    stiff : (nc,)
+        Whether a crease belongs to a panel.
+    bends : int
+        How many hinges lie within panels or on welds; those of the creases follow.
+    size : float
+        Mean length of the bars, m.
+    """
+
+    def __init__(self, pattern: Pattern, stiff: NDArray) -> None:
+        mesh = n4b5(pattern)
+        bars = np.concatenate([mesh.inner, pattern.edges])
+        hinges = np.concatenate([mesh.bends, mesh.welds, mesh.folds])
+        self.triangles, self.triangle_panel = mesh.triangles, mesh.triangle_panel
+        self.diagonals, self.diagonal_panel = mesh.inner, mesh.inner_panel
+        self.bends, self.stiff = len(mesh.bends) + len(mesh.welds), stiff
+        self.signs = np.where(stiff, 0.0, [SIGNS[letter] for letter in pattern.assignments])
+        self.size = float(lengths(pattern.vertices, bars).mean())
+        self.center = pattern.vertices.mean(axis=0)
+        x = (pattern.vertices - self.center) / self.size
+        self._bars, self._hinges = bars, np.ascontiguousarray(hinges, np.uint32)
+        self._length, self._axis = lengths(x, bars), lengths(x, hinges[:, :2])
+        columns = [_dofs(bars), _dofs(hinges)]
+        rows = [np.repeat(np.arange(len(bars)), 6)]
+        rows.append(len(bars) + np.repeat(np.arange(len(hinges)), 12))
+        self._places = np.concatenate(rows), np.concatenate([c.ravel() for c in columns])
+        self._shape = len(bars) + len(hinges), x.size
+        turns, _ = self._turns(x, np.zeros(len(hinges)))
+        # the letter, not the geometry, says which way a closed crease has turned
+        closed = np.abs(np.abs(turns[self.bends :]) - math.pi) < 1e-9
+        turns[self.bends :][closed] = math.pi * self.signs[closed]
+        self.rest = turns.copy()
+        self.start = Shape(x, turns, np.zeros(len(bars)), 0.0)
+
+    def creases(self, turns: NDArray) -> NDArray:
+        """Fold angles (nc,), rad, of creases among those of all hinges."""
+        return turns[self.bends :]
+
+    def bent(self, turns: NDArray) -> NDArray:
+        """By how much (rad) hinges within panels have turned, flat creases among them."""
+        stiff = np.concatenate([np.ones(self.bends, bool), self.stiff])
+        return np.abs(turns - self.rest)[stiff]
+
+    def place(self, x: NDArray) -> NDArray:
+        """Positions (n, 3), m."""
+        return x * self.size + self.center
+
+    def moved(self, shape: Shape, x: NDArray) -> Shape:
+        """Shape at other positions, none of whose hinges has turned by more than pi."""
+        strains, _ = self._stretch(x)
+        turns, _ = self._turns(x, shape.turns)
+        return Shape(x, turns, strains, math.nan)
+
+    def evaluated(self, near: Shape, x: NDArray, aim: Aim, stiffness: Stiffness) -> Evaluated:
+        """Energy, gradient and matrix at positions x (n, 3) near a shape."""
+        strains, along = self._stretch(x)
+        turns, gradients = self._turns(x, near.turns)
+        driven = ~np.isnan(aim.angles) & ~self.stiff
+        weight = np.full(len(turns), stiffness.bends)
+        weight[self.bends :] = np.where(
+            self.stiff, stiffness.bends, np.where(driven, stiffness.creases, 0.0)
+        )
+        rest = self.rest.copy()
+        rest[self.bends :][driven] = aim.angles[driven]
+        own = self.signs * self.creases(turns)
+        beyond = np.minimum(own - aim.least, 0.0) + np.maximum(own - aim.most, 0.0)
+        beyond = np.where(self.signs != 0.0, beyond, 0.0)
+        offset = turns - rest
+        pull, slope = weight * offset, weight
+        slope[self.bends :] += stiffness.sides * (beyond != 0.0)
+        twice = self._length @ strains**2 + self._axis @ (pull * offset)
+        twice += stiffness.sides * (self._axis[self.bends :] @ beyond**2)
+        pull[self.bends :] += stiffness.sides * self.signs * beyond
+        jacobian = sparse.csr_array(
+            (np.concatenate([np.hstack([-along, along]).ravel(), gradients.ravel()]), self._places),
+            self._shape,
+        )
+        gradient = jacobian.T @ np.concatenate([self._length * strains, self._axis * pull])
+        scale = np.sqrt(np.concatenate([self._length, self._axis * slope]))
+        scaled = sparse.csr_array(jacobian.multiply(scale[:, None]))
+        matrix = sparse.csc_array(scaled.T @ scaled)
+        return Evaluated(Shape(x, turns, strains, 0.5 * float(twice)), gradient, matrix)
+
+    def _stretch(self, x: NDArray) -> tuple[NDArray, NDArray]:
+        """Strains (nb,) of bars and their gradients (nb, 3) with respect to the second end."""
+        span = x[self._bars[:, 1]] - x[self._bars[:, 0]]
+        length = np.linalg.norm(span, axis=1)
+        return length / self._length - 1.0, span / (length * self._length)[:, None]
+
+    def _turns(self, x: NDArray, near: NDArray) -> tuple[NDArray, NDArray]:
+        """Turns (nh,) within pi of those `near`, and their gradients (nh, 12)."""
+        dihedral, gradient = dihedrals_and_gradients(np.ascontiguousarray(x), self._hinges)
+        turns = math.pi - dihedral
+        return turns + 2.0 * math.pi * np.round((near - turns) / (2.0 * math.pi)), -gradient
+
+
+def _dofs(rows: NDArray) -> NDArray:
+    """Numbers of the coordinates (k, 3 p) of the nodes in rows (k, p)."""
+    return (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)

@@ -1,0 +1,367 @@
+"""`fold`: from a flat or partly folded pattern to a folded one."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.patterns import Pattern
+from foldyn.patterns.crossings import crossing_panels
+from foldyn.statics.folding.energy import FoldEnergy
+from foldyn.statics.folding.record import folded_pattern, path_of
+from foldyn.statics.folding.targets import fold_targets, full_angles
+from foldyn.statics.folding.ways import (
+    ISOMETRIC,
+    PAPER,
+    PLANE,
+    PLATES,
+    Way,
+    from_folded,
+    from_pattern,
+    largest_strain,
+    wrong_ways,
+)
+from foldyn.values import choice, whole
+
+if TYPE_CHECKING:
+    import xarray
+
+MOST_SHOWN = 8  # creases and pairs of panels that a text names
+SHUT = 1e-3  # rad from 180 degrees: a crease counts as closed
+CRUMPLED = 0.1  # strain beyond which a state is taken only where there is no other
+STARTS = ("auto", "pattern", "folded")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Folding:
+    """A folded pattern, the way to it, and how good it is.
+
+    Attributes
+    ----------
+    pattern : Pattern
+        The folded state, free of stress: its shape is the shape at rest. Vertices, assignments,
+        families, fold angles to reach and further data are those of the pattern that was folded.
+        Panels that have bent are cut along their bends, which are flat creases ("F").
+    assignments : tuple of str
+        Letters of the creases that the path, the targets and the angles have, which are those of
+        the pattern that was folded.
+    path : xarray.Dataset
+        The states on the way, with dimensions step, node, axis and crease: `position` (m),
+        `fold_angle` (rad, valleys positive), `strain` and `bend` (rad), the largest of a bar and of
+        a panel, and `share`, how far along the way a state is, from 0 to 1.
+    targets : ndarray, shape (nc,)
+        Fold angle (rad) that each crease was to reach; nan where it was free.
+    angles : ndarray, shape (nc,)
+        Fold angle (rad) that it has reached.
+    wrong : tuple of int
+        Mountains and valleys that have not turned their own way.
+    strain, bend : float
+        What is left in the folded state: the largest strain of a bar, and the largest turn (rad)
+        within a panel.
+    crossings : ndarray of int, shape (k, 2)
+        Pairs of panels that pass through each other in the folded state.
+    first_crossings : mapping
+        For each step of the path with crossings that are not in the step before, those pairs.
+    started_from : {"pattern", "folded"}
+        Whether the path begins at the pattern as it was, or at the folded state that rotations of
+        the panels give, from which it was opened.
+    """
+
+    pattern: Pattern
+    assignments: tuple[str, ...]
+    path: xarray.Dataset
+    targets: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    wrong: tuple[int, ...]
+    strain: float
+    bend: float
+    crossings: NDArray[np.int64]
+    first_crossings: dict[int, NDArray[np.int64]]
+    started_from: str
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Folding {self.kind}, {self._turned}, strain {self.strain:.2g}>"
+
+    @property
+    def kind(self) -> Literal["rigid", "bent", "stretched"]:
+        """Whether the panels stay plane, bend without strain, or are stretched."""
+        if self.strain > ISOMETRIC:
+            return "stretched"
+        return "bent" if self.bend > PLANE else "rigid"
+
+    @property
+    def error(self) -> float:
+        """Largest difference (rad) of a crease from its target; 0 where there is none."""
+        given = ~np.isnan(self.targets)
+        return float(np.abs(self.angles - self.targets)[given].max(initial=0.0))
+
+    @property
+    def rigid_path(self) -> bool:
+        """Whether panels stay plane and unstrained at every step."""
+        strained = self.path["strain"].values > ISOMETRIC
+        return not (strained | (self.path["bend"].values > PLANE)).any()
+
+    @property
+    def closed(self) -> NDArray[np.int64]:
+        """Creases (k,) that are closed, so that panels lie upon each other."""
+        return np.flatnonzero(np.abs(self.angles) > math.pi - SHUT)
+
+    @property
+    def _turned(self) -> str:
+        total = sum(letter in "MV" for letter in self.assignments)
+        return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
+
+    def report(self) -> str:
+        """Text of a few lines: which creases turn, strain left, panels that cross."""
+        lines = [self._turned]
+        if self.wrong:
+            lines[0] += f"; not {_listed([str(k) for k in self.wrong])}"
+        steps = len(self.path["step"]) - 1
+        if self.kind == "rigid":
+            way = "at every step" if self.rigid_path else "in the folded state, not on the way"
+            lines.append(f"rigidly foldable: panels are plane and unstrained {way}")
+        elif self.kind == "bent":
+            lines.append(
+                f"folds without strain if panels bend, by up to {math.degrees(self.bend):.3g} "
+                "degrees"
+            )
+        else:
+            lines.append(
+                f"does not fold without strain: {self.strain:.2g} are left, the largest, with "
+                f"panels bent by up to {math.degrees(self.bend):.3g} degrees"
+            )
+        if not np.isnan(self.targets).all():
+            lines.append(f"angles differ from those wanted by up to {math.degrees(self.error):.3g}")
+            lines[-1] += " degrees"
+        if self.started_from == "folded":
+            lines.append("the path opens from the folded state, which rotations of the panels give")
+        if len(self.closed):
+            order = "in the order in which they have come"
+            if self.first_crossings:
+                order = "in an order that is not known, since panels cross"
+            lines.append(
+                f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
+            )
+        if self.first_crossings:
+            step, pairs = min(self.first_crossings.items())
+            shown = _listed([f"{a} and {b}" for a, b in pairs.tolist()])
+            now = f"{len(self.crossings)} pairs" if len(self.crossings) else "none"
+            lines.append(
+                f"panels cross: from step {step} of {steps} on ({shown}); in the folded state {now}"
+            )
+        else:
+            lines.append("no panels cross")
+        return "\n".join(lines)
+
+
+def fold(
+    pattern: Pattern,
+    angles: Any = None,
+    fraction: float | str | None = None,
+    *,
+    steps: int = 20,
+    start: Literal["auto", "pattern", "folded"] = "auto",
+    progress: Callable[[int, int], None] | None = None,
+) -> Folding:
+    """Fold a flat or partly folded pattern.
+
+    Creases are springs whose rest angles move to the ones wanted, in panels that are stiff (see
+    `foldyn.statics.folding.energy`); mountains and valleys are pushed back where they would turn
+    the other way. Then the springs are let go, so that what is left is an isometric state near by,
+    where there is one. Where panels do not stay plane, or creases turn the wrong way, panels that
+    bend more easily are tried as well.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    angles : float, mapping or sequence, optional
+        Fold angles (degrees, 0 flat, 180 closed). One number is the size for all mountains and
+        valleys, each its own way. A mapping gives creases by assignment ("mountain", "valley",
+        "all") or family, by size, and by pairs of vertices, valleys positive: {"zigzag": 90, (3,
+        4): -60}. A sequence has one for each crease, valleys positive. A pattern with the same
+        creases, such as another frame of a file, gives the angles of its state. Creases that are
+        left out, or None, are free: mountains and valleys turn their way as far as the others make
+        them, flat ones belong to the panels.
+    fraction : float or str, optional
+        Instead, 0.8 or "80%" of `pattern.fold_angles`, and of 180 degrees for mountains and valleys
+        that have none. Without either the pattern is folded to its own fold angles.
+    steps : int
+        States on the way, 1 to 1000.
+    start : {"auto", "pattern", "folded"}
+        Where the path begins. "folded" takes the state that rotations of the panels by the full
+        angles give, where they close, and opens it to the angles wanted. "auto" folds the pattern
+        as it is, and where creases turn the wrong way tries the folded state as well.
+    progress : callable, optional
+        Called with a step and the count of steps, which begin again where another way is tried.
+
+    Returns
+    -------
+    Folding
+
+    Raises
+    ------
+    InputError
+        An argument out of range; angles that contradict the assignments or close a crease.
+
+    Warns
+    -----
+    FoldynWarning
+        Mountains or valleys that have not turned their own way; panels that cross.
+
+    Notes
+    -----
+    A pattern of one degree of freedom with an angle for one crease is folded to rounding. Angles
+    that no state has all at once (180 degrees times a fraction, of a Miura-ori) are met as nearly
+    as springs of the same stiffness per length do.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> flat = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["V"])
+    >>> folding = fd.fold(flat, 90)
+    >>> folding.kind, folding.pattern.dihedrals.round(6)
+    ('rigid', array([1.570796]))
+    """
+    if not isinstance(pattern, Pattern):
+        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    if pattern.boards is not None:
+        raise InputError(
+            ": has thick panels, which hinge off its planes; fold the thin pattern, then thicken",
+            "pattern",
+        )
+    if not len(pattern.creases):
+        raise InputError(": has no creases to fold", "pattern")
+    steps = whole("steps", steps, least=1, most=1000)
+    choice("start", start, STARTS)
+    targets = fold_targets(pattern, angles, fraction)
+    letters = np.array(pattern.assignments)
+    energy = FoldEnergy(pattern, (letters == "F") & (np.nan_to_num(targets) == 0.0))
+
+    def tell(step: int) -> None:
+        if progress is not None:
+            progress(step, steps)
+
+    way = _best_way(pattern, energy, targets, steps, start, tell)
+    folding = _result(pattern, energy, way, targets)
+    _warn(folding)
+    return folding
+
+
+def _best_way(
+    pattern: Pattern, energy: FoldEnergy, targets: NDArray, steps: int, start: str,
+    tell: Callable[[int], None],
+) -> Way:  # fmt: skip
+    """The way with the fewest creases that turn the wrong way, without strain, near the targets.
+
+    From the folded state only if that comes nearer to the targets.
+    """
+
+    def cost(way: Way) -> tuple[bool, int, bool, float]:
+        strain, wrong = _strain(way), len(_wrong(energy, way, targets))
+        return strain > CRUMPLED, wrong, strain > ISOMETRIC, _off(energy, way, targets)
+
+    best = None
+    if start != "folded":
+        best = from_pattern(energy, PLATES, targets, steps, tell)
+        if any(cost(best)[:3]) or _bend(energy, best) > PLANE:
+            best = min(best, from_pattern(energy, PAPER, targets, steps, tell), key=cost)
+        if start == "pattern" or not any(cost(best)[:2]):
+            return best
+    way = from_folded(energy, pattern, full_angles(pattern), targets, steps, tell)
+    if best is not None:
+        if way is None or _off(energy, way, targets) >= _off(energy, best, targets):
+            return best
+        return min(best, way, key=cost)
+    if way is None:
+        raise InputError(
+            ' = "folded": the panels do not close when they are rotated by the full angles about '
+            'the creases, or the pattern is not flat; take "pattern"',
+            "start",
+        )
+    return way
+
+
+def _off(energy: FoldEnergy, way: Way, targets: NDArray) -> float:
+    """Mean difference (rad) of the creases from their targets; 0 where there are none."""
+    off = np.abs(energy.creases(way.shapes[-1].turns) - targets)
+    return float(np.nansum(off) / max(1, np.isfinite(off).sum()))
+
+
+def _bend(energy: FoldEnergy, way: Way) -> float:
+    return float(energy.bent(way.shapes[-1].turns).max(initial=0.0))
+
+
+def _wrong(energy: FoldEnergy, way: Way, targets: NDArray) -> NDArray[np.int64]:
+    return wrong_ways(energy, way.shapes[-1].turns, targets)
+
+
+def _strain(way: Way) -> float:
+    return largest_strain(way.shapes[-1])
+
+
+def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:
+    """Measure the states of a way."""
+    path = path_of(pattern, energy, way)
+    crossed = [
+        _crossed(pattern, energy, x, turns)
+        for x, turns in zip(path["position"].values, path["fold_angle"].values, strict=True)
+    ]
+    first, before = {}, set()
+    for step, pairs in enumerate(crossed):
+        now = set(map(tuple, pairs.tolist()))
+        if now - before:
+            first[step] = np.array(sorted(now - before))
+        before = now
+    last = way.shapes[-1]
+    return Folding(
+        pattern=folded_pattern(pattern, energy, last, path["position"].values[-1]),
+        assignments=pattern.assignments,
+        path=path,
+        targets=targets,
+        angles=energy.creases(last.turns).copy(),
+        wrong=tuple(_wrong(energy, way, targets).tolist()),
+        strain=_strain(way),
+        bend=_bend(energy, way),
+        crossings=crossed[-1],
+        first_crossings=first,
+        started_from=way.origin,
+    )
+
+
+def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -> NDArray[np.int64]:
+    """Pairs of panels that cross in a state, neighbors whose crease has passed 180 degrees too."""
+    beyond = pattern.crease_faces[np.abs(turns) > math.pi + PLANE]
+    pairs = crossing_panels(x, energy.triangles, energy.triangle_panel)
+    return np.unique(np.concatenate([pairs, np.sort(beyond, axis=1)]), axis=0)
+
+
+def _warn(folding: Folding) -> None:
+    if folding.wrong:
+        pairs = folding.path["crease_vertices"].values[list(folding.wrong)].tolist()
+        named = zip(folding.wrong, pairs, strict=True)
+        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in named])
+        warnings.warn(
+            f"{len(folding.wrong)} mountains or valleys do not turn their way: creases {shown}",
+            FoldynWarning,
+            stacklevel=3,
+        )
+    if len(folding.crossings):
+        shown = _listed([f"{a} and {b}" for a, b in folding.crossings.tolist()])
+        warnings.warn(
+            f"panels pass through each other in the folded state: {shown}",
+            FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def _listed(items: Sequence[str]) -> str:
+    more = f" and {len(items) - MOST_SHOWN} more" if len(items) > MOST_SHOWN else ""
+    return ", ".join(items[:MOST_SHOWN]) + more

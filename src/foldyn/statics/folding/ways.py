@@ -1,0 +1,143 @@
+"""The way from the start to the angles wanted, step by step, and what is left without springs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.patterns import Pattern
+from foldyn.statics.folding.energy import Aim, FoldEnergy, Shape, Stiffness
+from foldyn.statics.folding.minimum import minimum
+from foldyn.statics.folding.starts import FIRST_TURN, ajar, composed, opened
+
+PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels that hardly bend
+PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # and some that do, driven harder
+CLOSED = Stiffness(bends=0.3, creases=1e-3, sides=10.0)  # so that closed creases stay within 180
+AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
+FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
+WEAKER = (1e-3, 1e-6, 1e-9)  # springs of the creases, while what they held is let go
+HELD = 0.2  # of what creases have turned: change by which a state counts as kept
+TURNED = 1e-3  # rad, least turn that counts as one
+ISOMETRIC = 1e-9  # strain
+PLANE = 1e-6  # rad, bend of a panel
+CLOSES = 0.02  # of the size of the pattern: gap that a start from the folded state may have
+
+
+class Way(NamedTuple):
+    """Shapes from the first to the last, their shares of the way, and where it began."""
+
+    shapes: list[Shape]
+    shares: list[float]
+    origin: str  # "pattern" or "folded"
+
+
+def wrong_ways(energy: FoldEnergy, turns: NDArray, targets: NDArray) -> NDArray[np.int64]:
+    """Mountains and valleys that have not turned their own way, unless they are to stay flat."""
+    flat = np.abs(np.nan_to_num(targets, nan=1.0)) <= TURNED
+    late = energy.signs * energy.creases(turns) <= TURNED
+    return np.flatnonzero((energy.signs != 0.0) & late & ~flat)
+
+
+def from_pattern(
+    energy: FoldEnergy, stiffness: Stiffness, targets: NDArray, steps: int,
+    progress: Callable[[int], None],
+) -> Way:  # fmt: skip
+    """Fold from the pattern as it is."""
+    first = energy.creases(energy.start.turns)
+    start = opened(energy, stiffness)
+    states, shares = _followed(
+        energy, stiffness, energy.start, start, (first, targets), steps, progress
+    )
+    return Way(states, shares, "pattern")
+
+
+def from_folded(
+    energy: FoldEnergy, pattern: Pattern, full: NDArray, targets: NDArray, steps: int,
+    progress: Callable[[int], None],
+) -> Way | None:  # fmt: skip
+    """Open from the folded state; None where the panels of a flat pattern do not close in it."""
+    folded = np.nan_to_num(full)
+    if (np.abs(energy.start.turns) > PLANE).any():
+        return None
+    vertices, gap = composed(pattern, folded)
+    if gap > CLOSES * pattern.size:
+        return None
+    turns = np.concatenate([np.zeros(energy.bends), folded])
+    x = (vertices - vertices.mean(axis=0)) / energy.size
+    shape = energy.moved(energy.start._replace(turns=turns), x)
+    start = ajar(energy, shape)
+    states, shares = _followed(
+        energy, CLOSED, shape, start, (folded, targets), steps, progress, AJAR
+    )
+    return Way(states, shares, "folded")
+
+
+def _followed(
+    energy: FoldEnergy, stiffness: Stiffness, first: Shape, shape: Shape,
+    angles: tuple[NDArray, NDArray], steps: int, progress: Callable[[int], None],
+    most: float = math.pi,
+) -> tuple[list[Shape], list[float]]:  # fmt: skip
+    """Follow the least energy from `shape` while the rest angles go from the first to the second.
+
+    Where springs cannot be let go at a step, that is not tried again before the last one.
+    """
+    shapes, shares, lets_go = [first], [0.0], True
+    for k in range(1, steps + 1):
+        aimed = angles[0] + (angles[1] - angles[0]) * (k / steps)
+        last = k == steps
+        aim = _aim(energy, aimed, most)
+        shape = minimum(energy, shape, aim, stiffness, settled=1e-10 if last else 1e-4)
+        kept = relaxed(energy, stiffness, shape, aim, angles[0]) if lets_go or last else None
+        lets_go = kept is not None
+        shapes.append(shape if kept is None else kept)
+        shares.append(k / steps)
+        progress(k)
+    return shapes, shares
+
+
+def relaxed(
+    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray
+) -> Shape | None:
+    """The shape without the springs of its creases, if it stays near.
+
+    How near is measured by how far the creases have turned since the `first` state.
+
+    First panels stay as stiff as they are, so that they end plane if the pattern can be folded
+    rigidly; failing that they bend as they like, as thin paper does.
+    """
+    wrong = len(wrong_ways(energy, shape.turns, aim.angles))
+    turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
+    aim = aim._replace(least=np.zeros_like(energy.signs))
+    for thin in (False, True):
+        kept = shape
+        for weaker in WEAKER:
+            weak = stiffness._replace(
+                bends=stiffness.bends * (weaker if thin else 1.0),
+                creases=stiffness.creases * weaker,
+            )
+            settled = 1e-10 if weaker == WEAKER[-1] else 1e-6
+            before = largest_strain(kept)
+            kept = minimum(energy, kept, aim, weak, settled=settled)
+            moved = np.abs(energy.creases(kept.turns - shape.turns)).sum()
+            if moved > HELD * turned or largest_strain(kept) > max(ISOMETRIC, 0.3 * before):
+                break  # elsewhere, or strained by more than the springs
+        else:
+            if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
+                return kept
+    return None
+
+
+def largest_strain(shape: Shape) -> float:
+    """Largest size of a bar's strain."""
+    return float(np.abs(shape.strains).max(initial=0.0))
+
+
+def _aim(energy: FoldEnergy, angles: NDArray, most: float) -> Aim:
+    """Angles with the least and the most turns of mountains and valleys on their way there."""
+    least = np.where(np.isnan(angles), FREE_MARGIN, np.minimum(FIRST_TURN, 0.5 * np.abs(angles)))
+    turned = np.abs(np.nan_to_num(angles))
+    return Aim(angles, np.where(energy.signs == 0.0, 0.0, least), np.maximum(most, turned))

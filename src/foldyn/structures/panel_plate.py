@@ -1,0 +1,215 @@
+"""A panel as a thin plate of small triangles: outline, mesh, stiffness, mass, and what is held.
+
+The triangles have constant curvature (Morley; in `mechanics.triangle`). Their unknowns are the
+heights of the points and the slopes across the sides.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn.mechanics.triangle import triangle_stiffness
+
+DIGITS = 9  # to which panels have the same shape
+Rows = tuple[tuple[float, float], ...]
+
+
+class Outline(NamedTuple):
+    """A panel: corners in its plane, counter-clockwise from the front, and how its edges are held.
+
+    Edge k runs from corner k to corner k + 1.
+    """
+
+    corners: Rows  # m
+    center: tuple[float, float] | None  # m; None in a triangle
+    creased: tuple[bool, ...]
+    straight: tuple[bool, ...]
+    bowed: tuple[bool, ...]
+
+
+def outline(
+    x: NDArray,
+    center: NDArray | None,
+    creased: list[bool],
+    straight: list[bool],
+    bowed: list[bool] | None = None,
+) -> Outline:
+    """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis."""
+    bowed = [False] * len(x) if bowed is None else bowed
+    middle = x.mean(axis=0)
+    points = x if center is None else np.concatenate([x, center[None]])
+    _, _, axes = np.linalg.svd(x - middle)
+    normal = np.cross(x - middle, np.roll(x, -1, axis=0) - middle).sum(axis=0)
+    plane = axes[:2] if np.cross(axes[0], axes[1]) @ normal > 0.0 else axes[1::-1]
+    flat = (points - middle) @ plane.T
+    edge = flat[1] - flat[0]
+    e = edge / np.linalg.norm(edge)
+    flat = flat @ np.array([[e[0], -e[1]], [e[1], e[0]]]) / np.sqrt(np.linalg.norm(normal))
+    rows = tuple((float(a), float(b)) for a, b in flat.round(DIGITS) + 0.0)
+    hub = None if center is None else rows[-1]
+    return Outline(rows[: len(x)], hub, tuple(creased), tuple(straight), tuple(bowed))
+
+
+def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
+    """Triangles of the panel: the one at edge k has the number k."""
+    if len(points) == corners:
+        return [(0, 1, 2)] * 3
+    return [(k, (k + 1) % corners, corners) for k in range(corners)]
+
+
+class PanelPlate:
+    """A panel as a plate of small triangles; n pieces of each edge, G = 1.
+
+    Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
+    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (of points on straight
+    edges off the line between its ends) are linear functions of them: coefficients by number.
+    """
+
+    def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
+        x = np.array(panel.corners)
+        self.points, self.triangles, at, edges = _meshed(x, panel.center, n)
+        side, sign, ends = _sides(self.triangles)
+        self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
+        number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
+        self.heights = [{node: 1.0} for node in at.tolist()]
+        self.slopes, self.bows, self.lines = [], [], []
+        for k, nodes in enumerate(edge.tolist() for edge in edges):
+            if panel.creased[k]:
+                mean = {
+                    number[min(a, b), max(a, b)]: (1.0 if a < b else -1.0) / n
+                    for a, b in pairwise(nodes)
+                }
+                self.slopes.append(mean)
+            if panel.bowed[k]:
+                share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
+                ends = 0.5 * (1 - n) * share  # the line between them takes them off
+                inner = {node: share for node in nodes[1:-1]}
+                self.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
+            if panel.straight[k]:
+                for step in range(1, n):
+                    part = step / n
+                    self.lines.append({nodes[step]: 1.0, nodes[0]: part - 1.0, nodes[-1]: -part})
+
+    def solved(self, held: list[dict[int, float]]) -> tuple[NDArray, NDArray]:
+        """Unknowns (size, k) where one of the k held functions is 1; the stiffness (k, k).
+
+        The heights come first among the held functions: with them the rest is positive definite.
+        """
+        size, count = len(self.stiffness.indptr) - 1, len(self.heights)
+        first = np.array([next(iter(entries)) for entries in self.heights])
+        others = np.setdiff1d(np.arange(size), first)
+        inner = sparse.csc_array(self.stiffness[others][:, others])
+        factor = splu(inner, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+        rows = _rows([*held[count:], *self.lines], size)
+        both = self.stiffness[others][:, first].toarray()
+        given, multipliers = rows[:, first].toarray(), rows[:, others]
+        loose = factor.solve(np.column_stack([both, multipliers.T.toarray()]))
+        # unknowns x = -loose_h h + loose_c m, where C x + C_h h = g
+        moved, pulled = loose[:, :count], loose[:, count:]
+        wanted = np.zeros((len(given), len(held)))
+        wanted[:, :count] = multipliers @ moved - given
+        wanted[: len(held) - count, count:] = np.eye(len(held) - count)
+        force = np.linalg.solve(multipliers @ pulled, wanted)
+        found = np.zeros((size, len(held)))
+        found[first, :count] = np.eye(count)
+        found[others] = pulled @ force
+        found[others, :count] -= moved
+        return found, found.T @ (self.stiffness @ found)
+
+    @property
+    def mass(self) -> sparse.csr_array:
+        """Mass matrix of the unknowns, of a panel of mass 1; slopes have none."""
+        corners = self.points[self.triangles]
+        area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+        element = (np.ones((3, 3)) + np.eye(3)) / 12.0
+        block = (area / area.sum())[:, None, None] * element
+        rows, columns = np.repeat(self.triangles, 3, axis=1), np.tile(self.triangles, (1, 3))
+        entries = (block.ravel(), (rows.ravel(), columns.ravel()))
+        return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
+
+
+def _rows(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
+    """Rows (k, size) of linear functions, given by their coefficients."""
+    row = np.repeat(np.arange(len(functions)), [len(entries) for entries in functions])
+    column = [place for entries in functions for place in entries]
+    value = [factor for entries in functions for factor in entries.values()]
+    return sparse.csr_array((value, (row, column)), shape=(len(functions), size))
+
+
+def mass_of(points: NDArray, triangles: NDArray, heights: NDArray) -> NDArray:
+    """Mass matrix (k, k) of shapes with heights (points or more, k) that triangles join."""
+    shape, corners = heights[triangles], points[triangles]
+    area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    element = (np.ones((3, 3)) + np.eye(3)) / 12.0
+    return np.einsum("tak,ab,tbl,t->kl", shape, element, shape, area / area.sum())
+
+
+def _meshed(
+    x: NDArray, center: tuple[float, float] | None, n: int
+) -> tuple[NDArray, NDArray, NDArray, list[NDArray]]:
+    """Points (p, 2), triangles, those at corners and center, and those along each edge."""
+    points = x if center is None else np.concatenate([x, [center]])
+    facets = [(0, 1, 2)] if center is None else facets_of(points, len(x))
+    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
+    kept = i + j <= n
+    i, j = i[kept], j[kept]  # parts of the way from the first corner to the others, in n-ths
+    place = np.full((n + 1, n + 1), -1)
+    place[i, j] = np.arange(len(i))
+    up = np.argwhere(np.add.outer(np.arange(n + 1), np.arange(n + 1)) < n)
+    down = up[up.sum(axis=1) < n - 1]
+    small = np.concatenate(
+        [
+            np.stack([place[*(up + step).T] for step in ((0, 0), (1, 0), (0, 1))], axis=1),
+            np.stack([place[*(down + step).T] for step in ((1, 0), (1, 1), (0, 1))], axis=1),
+        ]
+    )
+    weights = np.column_stack([n - i - j, i, j]) / n
+    everywhere = np.concatenate([weights @ points[list(facet)] for facet in facets])
+    _, first, same = np.unique(everywhere.round(7), axis=0, return_index=True, return_inverse=True)
+    same = same.ravel()
+    triangles = np.concatenate([same[small + k * len(i)] for k in range(len(facets))])
+    nodes = everywhere[first]
+
+    def found(wanted: NDArray) -> NDArray:
+        apart = np.linalg.norm(nodes[None] - wanted[:, None], axis=2)
+        return apart.argmin(axis=1)
+
+    steps = np.linspace(0.0, 1.0, n + 1)[:, None]
+    edges = [found(a + steps * (b - a)) for a, b in zip(x, np.roll(x, -1, axis=0), strict=True)]
+    return nodes, triangles, found(points), edges
+
+
+def _sides(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Number and sign (nt, 3) of the triangles' sides, positive from low to high; ends (s, 2)."""
+    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
+    ends, side = np.unique(np.sort(pairs, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
+    sign = np.where(pairs[:, :, 0] < pairs[:, :, 1], 1.0, -1.0)
+    return side.reshape(-1, 3), sign, ends
+
+
+def _plate(
+    points: NDArray, triangles: NDArray, side: NDArray, sign: NDArray, poissons_ratio: float
+) -> sparse.csr_array:
+    """Stiffness of heights of the points and slopes across the sides, for G = 1."""
+    corners = points[triangles]
+    flat = np.concatenate([corners, np.zeros((*triangles.shape, 1))], axis=2)
+    bending = triangle_stiffness(flat, poissons_ratio, 1.0, 1.0)[1]
+    along = np.roll(corners, -1, axis=1) - corners
+    outward = np.stack([along[:, :, 1], -along[:, :, 0]], axis=2)
+    outward /= np.linalg.norm(along, axis=2)[:, :, None]
+    inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
+    gradient = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
+    turns = np.zeros((len(triangles), 3, 6))  # of the sheet at each side, beta
+    turns[:, :, :3] = -outward @ gradient
+    turns[:, np.arange(3), 3 + np.arange(3)] = sign
+    block = np.einsum("tka,tkl,tlb->tab", turns, bending, turns)
+    dofs = np.concatenate([triangles, len(points) + side], axis=1)
+    rows, columns = np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel()
+    size = len(points) + int(side.max()) + 1
+    return sparse.csr_array(sparse.coo_array((block.ravel(), (rows, columns)), shape=(size, size)))

@@ -1,0 +1,129 @@
+"""Arrays inside a page: whole numbers, their differences over time, deflated.
+
+What changes over time is stored as a sum of a few shapes times their histories (a singular value
+decomposition, "proper orthogonal decomposition" in the literature of motions): a page with 20
+shapes of a motion has all of its samples at every node in the space of some pictures. Histories
+change little from sample to sample, so that differences of their rounded values pack well: once or
+twice, whichever is smaller. Bytes of equal weight stand together. The page's `data.js` undoes all
+of this.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_TYPES = {"i1": "i8", "i2": "i16", "u1": "u8", "u2": "u16", "u4": "u32", "f4": "f32"}
+"""Names of the page for kinds of numbers."""
+
+
+LARGEST = 2**15 - 1
+
+
+@dataclass
+class Arrays:
+    """Arrays of a page, by name.
+
+    Attributes
+    ----------
+    about : dict
+        What the page must know of each: "type", "shape", "differences" and "step".
+    packed : dict of bytes
+        Their content, deflated.
+    """
+
+    about: dict[str, dict[str, Any]] = field(default_factory=dict)
+    packed: dict[str, bytes] = field(default_factory=dict)
+
+    def exact(self, name: str, values: ArrayLike, kind: str) -> str:
+        """Add an array of numbers of a kind, such as "f4" or "u4"; return its name."""
+        return self._add(name, np.asarray(values).astype(kind))
+
+    def changing(self, name: str, values: NDArray, tolerance: float) -> dict[str, Any]:
+        """Add values (t, ...) over time, to within a tolerance of their largest; say what they are.
+
+        Either "shapes" and "histories", whose product they are, or the "values" themselves where
+        that takes less room.
+        """
+        flat = np.nan_to_num(np.asarray(values, float).reshape(len(values), -1))
+        about: dict[str, Any] = {"shape": list(np.shape(values))}
+        step = 2.0 * max(tolerance, 0.5 / LARGEST) * (float(np.abs(flat).max(initial=0.0)) or 1.0)
+        whole = np.rint(flat / step).astype(np.int16)
+        histories, shapes, sizes = factors(flat, 0.5 * step)
+        if not len(sizes) or histories.size + shapes.size >= flat.size:
+            return about | {"values": self._add(name, whole, 2, step)}
+        return about | {
+            "histories": self._add(f"{name}.histories", histories, 2),
+            "shapes": self._add(f"{name}.shapes", shapes),
+            "sizes": sizes.tolist(),
+        }
+
+    def html(self, key: str) -> str:
+        """All of them as elements of a page that browsers do not show, named key.name."""
+        return "\n".join(
+            f'<script type="text/plain" data-array="{key}.{name}">'
+            f"{base64.b64encode(content).decode()}</script>"
+            for name, content in self.packed.items()
+        )
+
+    def _add(self, name: str, values: NDArray, differences: int = 0, step: float = 1.0) -> str:
+        passes, content = min(
+            ((k, _deflated(_differences(values, k))) for k in range(differences + 1)),
+            key=lambda found: len(found[1]),
+        )
+        self.about[name] = {
+            "type": _TYPES[values.dtype.str[1:]],
+            "shape": list(values.shape),
+            "differences": passes,
+            "step": step,
+        }
+        self.packed[name] = content
+        return name
+
+
+def factors(values: NDArray, error: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Histories (t, r), shapes (r, m) and sizes (r,) whose sum of products is near values (t, m).
+
+    Whole numbers of 16 bits, those of small parts being small, as all have about the same absolute
+    accuracy.
+
+    error : the largest that is allowed.
+    """
+    left, size, right = np.linalg.svd(values, full_matrices=False)
+    reach = np.abs(right).max(axis=1, initial=1e-300)
+    left, right = left * (size * reach), right / reach[:, None]
+    swing, step = np.abs(left).max(axis=0), error
+    while True:
+        step = max(step, float(swing.max()) / LARGEST)
+        kept = swing > 0.5 * step
+        levels = np.ceil(swing[kept] / step)
+        histories = np.rint(left[:, kept] / step).astype(np.int16)
+        shapes = np.rint(right[kept] * levels[:, None]).astype(np.int16)
+        sizes = step / levels
+        off = np.abs(values - (histories * sizes) @ shapes).max(initial=0.0)
+        if off <= error or step <= 2.0 * float(swing.max()) / LARGEST:
+            return histories, shapes, sizes
+        step *= max(0.5, 0.9 * error / off)
+
+
+def _differences(values: NDArray, passes: int) -> NDArray:
+    """Differences from sample to sample, which wrap around as the page's sums do."""
+    for _ in range(passes):
+        after = values.copy()
+        after[1:] -= values[:-1]
+        values = after
+    return values
+
+
+def _deflated(values: NDArray) -> bytes:
+    """Columns over time one after the other, their bytes of equal weight together, deflated."""
+    columns = values.reshape(len(values), -1).T if values.ndim > 1 else values
+    whole = np.ascontiguousarray(columns).reshape(-1)
+    weights = whole.view(np.uint8).reshape(-1, whole.itemsize).T
+    deflate = zlib.compressobj(6, zlib.DEFLATED, -15)
+    return deflate.compress(weights.tobytes()) + deflate.flush()

@@ -1,0 +1,75 @@
+"""A structure and what acts on it, as a page draws them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.structures.discretized import Discretized
+from foldyn.viewer.arrays import Arrays
+
+KINDS = "MVFUB"
+"""Kinds of edges by number: mountain, valley, flat, unassigned, boundary."""
+
+
+def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
+    """Description of a case's sheet at rest, whose arrays are added with names that begin with key.
+
+    "nodes" (n, 3), m; "triangles" (t, 3) and the "panel" of each; "edges" (k, 2), pieces of the
+    pattern's edges, with their "kind", the "crease" they belong to and how far "along" it they
+    begin and end (k, 2), m; "bars" (b, 2) of bars and hinges; "held" and "loads", see below.
+    """
+    structure = case.structure
+    pairs, kind, edge, along = edge_pieces(structure)
+    out: dict[str, Any] = {
+        "nodes": arrays.exact(f"{key}.nodes", structure.nodes, "f4"),
+        "triangles": arrays.exact(f"{key}.triangles", structure.triangles, "u4"),
+        "panel": arrays.exact(f"{key}.panel", structure.triangle_panel, "u4"),
+        "edges": arrays.exact(f"{key}.edges", pairs, "u4"),
+        "kind": arrays.exact(f"{key}.kind", kind, "u1"),
+        "crease": arrays.exact(f"{key}.crease", edge, "u4"),
+        "along": arrays.exact(f"{key}.along", along, "f4"),
+        "vertices": len(structure.pattern.vertices),
+        "creases": structure.pattern.creases.tolist(),
+        "held": held(case),
+        "loads": load_arrows(case),
+    }
+    if structure.bar_law is not None:
+        out["bars"] = arrays.exact(f"{key}.bars", structure.bars, "u4")
+    return out
+
+
+def edge_pieces(structure: Discretized) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Pieces (k, 2) of the pattern's edges, the kind of each, its edge, and its ends along it.
+
+    Welds are left out.
+    """
+    pattern = structure.pattern
+    letters = [*pattern.assignments, *"B" * len(pattern.boundary)]
+    rows = np.asarray(structure.edge_nodes)[: len(letters)]
+    pairs = np.stack([rows[:, :-1], rows[:, 1:]], axis=2)
+    length = np.linalg.norm(np.diff(structure.nodes[pairs], axis=2)[:, :, 0], axis=2)
+    end = np.cumsum(length, axis=1)
+    edge = np.repeat(np.arange(len(rows)), pairs.shape[1])
+    kind = np.array([KINDS.index(letter) for letter in letters])[edge]
+    return pairs.reshape(-1, 2), kind, edge, np.stack([end - length, end], axis=2).reshape(-1, 2)
+
+
+def held(case: Case) -> list[list[Any]]:
+    """Nodes that supports hold or move, with their axes: [[4, "xz"], ...]."""
+    fixed = np.asarray(case.fixed).reshape(-1, 3)
+    axes = np.array(["x", "y", "z"])
+    return [[int(node), "".join(axes[fixed[node]])] for node in np.flatnonzero(fixed.any(axis=1))]
+
+
+def load_arrows(case: Case) -> list[list[Any]]:
+    """Nodes with forces, and these over the largest: [[7, [1.0, 0.0, 0.0]], ...]; not gravity."""
+    forces = np.zeros_like(case.structure.nodes)
+    for vectors, _ in case.force_terms:
+        forces += vectors
+    size = np.linalg.norm(forces, axis=1)
+    relative = (forces / (size.max(initial=0.0) or 1.0)).round(4)
+    return [[int(node), relative[node].tolist()] for node in np.flatnonzero(size)]

@@ -1,0 +1,167 @@
+// Charts beside the view, drawn by uPlot: the moment shown is a line or a point in them.
+/* global uPlot */
+import { number } from "./numbers.js";
+
+const css = (element, name) => getComputedStyle(element).getPropertyValue(name).trim();
+
+export class Chart {
+  // curves: { name, color, dash, x, y, stable? }; options: `seek` is told the place that a reader
+  // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic.
+  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, range = null }) {
+    Object.assign(this, { host, curves, free });
+    host.setAttribute("role", "img");
+    host.setAttribute("aria-label", label);
+    const axis = (text, size) => ({
+      label: text, size, labelSize: 20, labelGap: 0, gap: 4,
+      stroke: () => css(host, "--ink"),
+      grid: { stroke: () => css(host, "--grid"), width: 1 },
+      ticks: { stroke: () => css(host, "--grid"), size: 4 },
+      font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif",
+      values: (_, ticks) => ticks.map((value) => (value === null ? "" : number(value, 4))),
+    });
+    const series = curves.map((curve, k) => ({
+      label: curve.name, stroke: curve.color, dash: curve.dash, width: 1.6, points: { show: false },
+      ...(free ? {
+        facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }],
+        paths: (plot) => this.walk(plot, this.curves[k]),
+      } : {}),
+    }));
+    this.plot = new uPlot({
+      mode: free ? 2 : 1,
+      width: Math.max(200, host.clientWidth), height: 190, padding: [10, 12, 0, 0],
+      cursor: { show: !free, drag: { x: false, y: false }, points: { size: 6 } },
+      legend: { show: false },
+      scales: {
+        x: { time: false, ...(range ? { range: () => range } : {}) },
+        y: log ? { distr: 3 } : {},
+      },
+      axes: [axis(xlabel, 30), axis(ylabel, 54)],
+      series: [free ? {} : { label: xlabel }, ...series],
+      hooks: { draw: [() => this.mark()] },
+    }, free ? [null, ...curves.map(({ x, y }) => [x, y])] : aligned(curves), host);
+    if (seek) this.point(seek);
+  }
+
+  point(seek) {
+    const { over } = this.plot;
+    over.classList.add("seek");
+    const point = (event) => {
+      if (!event.buttons) return;
+      const box = over.getBoundingClientRect();
+      seek(this.nearest(event.clientX - box.left, event.clientY - box.top));
+    };
+    over.addEventListener("pointerdown", (event) => {
+      over.setPointerCapture(event.pointerId);
+      point(event);
+    });
+    over.addEventListener("pointermove", point);
+  }
+
+  // Value at a place of the chart, or the number of the nearest point of the first curve.
+  nearest(px, py) {
+    if (!this.free) return this.plot.posToVal(px, "x");
+    let [best, least] = [0, Infinity];
+    const { x, y } = this.curves[0];
+    for (let k = 0; k < x.length; k++) {
+      const apart = Math.hypot(this.plot.valToPos(x[k], "x") - px, this.plot.valToPos(y[k], "y") - py);
+      if (apart < least) [best, least] = [k, apart];
+    }
+    return best;
+  }
+
+  // A curve that turns back, dashed where it is unstable.
+  walk(plot, { x, y, stable, color }) {
+    const { ctx } = plot;
+    const at = (k) => [plot.valToPos(x[k], "x", true), plot.valToPos(y[k], "y", true)];
+    ctx.save();
+    ctx.lineWidth = 1.8 * devicePixelRatio;
+    ctx.strokeStyle = color;
+    for (let k = 1, start = 0; k <= x.length; k++) {
+      const kind = (j) => !stable || (stable[j - 1] && stable[j]);
+      if (k < x.length && k > start + 1 && kind(k) === kind(k - 1)) continue;
+      if (k - 1 > start) {
+        ctx.setLineDash(kind(start + 1) ? [] : [5 * devicePixelRatio, 4 * devicePixelRatio]);
+        ctx.beginPath();
+        for (let j = start; j < k; j++) ctx.lineTo(...at(j));
+        ctx.stroke();
+        start = k - 1;
+      }
+    }
+    ctx.restore();
+    return null;
+  }
+
+  // Where the moment is: a value along the curves, and the curves' values there.
+  show(x, values = []) {
+    this.now = { x, values };
+    this.plot.redraw(false, false);
+  }
+
+  mark() {
+    if (!this.now) return;
+    const { ctx, bbox } = this.plot;
+    ctx.save();
+    ctx.setLineDash([]);
+    ctx.lineWidth = devicePixelRatio;
+    ctx.strokeStyle = css(this.host, "--ink");
+    const across = this.plot.valToPos(this.now.x, "x", true);
+    if (!this.free) {
+      ctx.beginPath();
+      ctx.moveTo(across, bbox.top);
+      ctx.lineTo(across, bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    this.now.values.forEach((value, k) => {
+      if (!Number.isFinite(value)) return;
+      ctx.fillStyle = this.curves[k].color;
+      ctx.beginPath();
+      ctx.arc(across, this.plot.valToPos(value, "y", true), 4.5 * devicePixelRatio, 0, 7);
+      ctx.fill();
+    });
+    ctx.restore();
+  }
+
+  resize() {
+    const width = Math.max(200, this.host.clientWidth);
+    if (width !== this.plot.width) this.plot.setSize({ width, height: this.plot.height });
+  }
+
+  remove() {
+    this.plot.destroy();
+  }
+}
+
+// Columns of curves over one horizontal axis.
+function aligned(curves) {
+  const same = curves.every(({ x }) => x.length === curves[0].x.length
+    && x.every((value, k) => value === curves[0].x[k]));
+  if (same) return [curves[0].x, ...curves.map(({ y }) => y)];
+  return uPlot.join(curves.map(({ x, y }) => [x, y]), curves.map(() => [2]));
+}
+
+// A row of names with their lines.
+export function keys(curves) {
+  const row = document.createElement("p");
+  row.className = "keys";
+  for (const { name, color, dash } of curves) {
+    const item = document.createElement("span");
+    item.append(line(color, dash), name);
+    row.append(item);
+  }
+  return row;
+}
+
+export function line(color, dash = [], width = 2.5) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("width", "30");
+  svg.setAttribute("height", "8");
+  svg.setAttribute("aria-hidden", "true");
+  const stroke = document.createElementNS("http://www.w3.org/2000/svg", "line");
+  const attributes = {
+    x1: 0, y1: 4, x2: 30, y2: 4, stroke: color, "stroke-width": width,
+    "stroke-dasharray": dash.join(" "),
+  };
+  for (const [name, value] of Object.entries(attributes)) stroke.setAttribute(name, value);
+  svg.append(stroke);
+  return svg;
+}

@@ -1,0 +1,111 @@
+"""`foldyn fold`: files in, files out, what it says, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.formats import Frame
+
+FLAP = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["M"], "flap")
+
+
+@pytest.fixture
+def flap(workplace):
+    """A file with a square that folds on its diagonal, its second frame folded by 40 degrees."""
+    folded = fd.fold(FLAP, 40, steps=2).pattern
+    fd.write_pattern("flap.fold", FLAP, [Frame("half", folded.vertices)])
+    return "flap.fold"
+
+
+def turned(file: str) -> float:
+    pattern = fd.read_pattern(file)
+    return 180.0 - math.degrees(pattern.dihedrals[0])
+
+
+def test_a_pattern_is_folded_by_a_fraction(workplace, flap) -> None:
+    told = workplace.call("fold", flap, "--to", "50%", "--steps", "3")
+    assert (told.status, told.err) == (0, "")
+    assert told.new == ["flap-folded.fold", "flap-folded.gif", "flap-folded.png"]
+    assert turned("flap-folded.fold") == pytest.approx(-90.0)
+    assert told.out.startswith("1 of 1 mountains and valleys turn their way\nrigidly foldable")
+    assert "no panels cross\nwrote flap-folded.fold\nwrote flap-folded.png, flap-fol" in told.out
+    # the states on the way are frames
+    for frame, angle in ((0, -90), (1, 0), (2, -30), (3, -60), (4, -90)):
+        state = fd.read_pattern("flap-folded.fold", frame=frame)
+        assert 180 - math.degrees(state.dihedrals[0]) == pytest.approx(angle, abs=1e-6)
+
+
+def test_a_pattern_is_folded_by_a_file_of_angles(workplace, flap) -> None:
+    workplace.write("# a flap\nmountain, 20\n0 2 -70  # refines it\n\n", "angles.txt")
+    out = ("--out", "b/bent.obj", "--steps", "2", "--no-figures", "--quiet")
+    told = workplace.call("fold", flap, "--angles", "angles.txt", *out)
+    assert (told.status, told.err, told.out) == (0, "", "")
+    vertices = fd.read_pattern("b/bent.obj").vertices
+    apart = np.linalg.norm(vertices[1] - vertices[3])
+    assert apart == pytest.approx(math.sqrt(2.0) * math.cos(math.radians(35.0)))
+
+
+def test_a_pattern_is_folded_to_another_frame(workplace, flap) -> None:
+    told = workplace.call("fold", flap, "--to-frame", "half", "--steps", "2", "--no-figures")
+    assert told.status == 0
+    assert turned("flap-folded.fold") == pytest.approx(-40.0)
+
+
+def test_creases_that_do_not_turn_are_told_and_kept(workplace) -> None:
+    way = np.radians([0, 40, 140, 280])
+    rim = np.column_stack([np.cos(way), np.sin(way)])
+    faces = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1)]
+    vertex = fd.Pattern(np.vstack([[0, 0], rim]), faces, ["V", "V", "M", "V"])
+    fd.write_pattern("vertex.fold", vertex)
+    told = workplace.call("fold", "vertex.fold", "--to", "50%", "--steps", "3", "--no-figures")
+    assert told.status == 0
+    assert "foldyn: warning: 2 mountains or valleys do not turn their way: creases " in told.err
+    assert "2 of 4 mountains and valleys turn their way; not " in told.out
+    assert told.new == ["vertex-folded.fold"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("none.fold", "--to", "50%"), "none.fold"),
+        (("flap.fold",), "fraction: missing; give it"),
+        (("flap.fold", "--to", "150%"), "fraction = 1.5"),
+        (
+            ("flap.fold", "--to", "50%", "--out", "flap.xyz"),
+            "--out flap.xyz: name a file that ends",
+        ),
+        (("flap.fold", "--to", "50%", "--steps", "0"), "steps = 0"),
+        (("flap.fold", "--to", "50%", "--start", "flat"), 'start = "flat"'),
+        (("flap.fold", "--angles", "wrong.txt"), "wrong.txt: line 2: 'valley'"),
+        (("flap.fold", "--angles", "twice.txt"), "twice.txt: line 2: mountain is given twice"),
+        (("flap.fold", "--angles", "empty.txt"), "empty.txt: is empty"),
+        (("flap.fold", "--angles", "other.txt"), "angles: (0, 1) is not a crease"),
+        (("flap.fold", "--to-frame", "9"), "9"),
+    ],
+)
+def test_bad_input_has_status_2_and_writes_nothing(workplace, flap, arguments, message) -> None:
+    workplace.write("mountain 20\nvalley\n", "wrong.txt")
+    workplace.write("mountain 20\nmountain 30\n", "twice.txt")
+    workplace.write("# nothing\n", "empty.txt")
+    workplace.write("0 1 30\n", "other.txt")
+    before = workplace.contents()
+    told = workplace.call("fold", *arguments)
+    assert told.status == 2 and message in told.err and told.err.count("\n") == 1
+    assert workplace.contents() == before
+
+
+def test_a_folded_pattern_has_modes(workplace, flap) -> None:
+    assert workplace.call("fold", flap, "--to", "50%", "--steps", "2", "--no-figures").status == 0
+    workplace.write(
+        '[pattern]\nfile = "flap-folded.fold"\n[sheet]\nyoungs_modulus = 1e9\n'
+        "poissons_ratio = 0.2\nthickness = 1e-3\ndensity = 700\n"
+        '[[supports]]\nnodes = [0, 1, 2]\naxes = "xyz"\n[analysis]\nkind = "modes"\ncount = 1\n'
+    )
+    told = workplace.call("modes", "case.toml", "--no-figures")
+    assert told.status == 0
+    pattern = fd.load("case-modes/result.nc")
+    assert float(pattern.frequency[0]) > 0.0

@@ -1,0 +1,271 @@
+"""Internal amplitudes of panels (Craig and Bampton) in modes and frequency responses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.linear import linearize
+from foldyn.linear.matched import matched
+from foldyn.linear.reference import elastic, modes_at_rest, reference_modes
+
+SHEET = fd.Sheet(1e6, 0.3, 0.01, density=1000.0)
+SQUARE = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
+FOLD = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=90)
+
+
+def edged(pattern, **options):
+    return fd.discretize(pattern, SHEET, preset="n5b8e", **{"fold_law": "linear", **options})
+
+
+def miura(turn=None, **case):
+    pattern = fd.patterns.miura(cells=(1, 1), panel_angle=60, dihedral=80)
+    if turn is not None:
+        pattern = fd.Pattern(pattern.vertices @ turn.T, pattern.faces, pattern.assignments)
+    return fd.Case(edged(pattern), **case)
+
+
+def true(pattern, supports, count=5, **options):
+    """The first frequencies of the shell, extrapolated."""
+    shells = (fd.shell(pattern, SHEET, n, mass="consistent", fold_law="linear", **options)
+              for n in (4, 8))  # fmt: skip
+    return reference_modes(*(fd.Case(s, supports(s)) for s in shells), count).frequency
+
+
+def frequencies(case, internal, count=None):
+    most = len(case.free_dofs)
+    return elastic(fd.modes(case, count or most, internal=internal))[0]
+
+
+# ---------------------------------------------------------------------------- beside the shell
+
+
+def test_a_free_square_panel():
+    """Its first five modes: those of a plate, the last three of which bars and hinges lack."""
+    expected = true(SQUARE, lambda s: [])
+    side = 13.468 / (2 * np.pi) * np.sqrt(SHEET.bending_modulus / 10.0)  # of 10 kg/m2
+    assert expected[0] == pytest.approx(side, rel=2e-3)  # Leissa 1973
+    case = fd.Case(edged(SQUARE))
+    without, found = (frequencies(case, k)[:5] / expected - 1.0 for k in (0, 3))
+    np.testing.assert_allclose(found, 0.0, atol=0.05)
+    assert np.abs(without[1:]).min() > 0.25
+
+
+def test_a_panel_held_along_an_edge():
+    """Beside a crease, whose other panel is free."""
+
+    def along(s):
+        rows = [row for row in s.edge_nodes if {int(row[0]), int(row[-1])} == {0, 1}]
+        return [fd.Fix(np.unique(rows).tolist())]
+
+    expected = true(FOLD, along)
+    case = fd.Case(edged(FOLD, straight=[(0, 1)]), along(edged(FOLD)))
+    without, found = (frequencies(case, k)[:5] / expected - 1.0 for k in (0, 3))
+    np.testing.assert_allclose(found, 0.0, atol=0.035)
+    assert without[4] > 0.2
+
+
+def test_a_panel_that_swings_on_a_rigid_one():
+    expected = true(FOLD, lambda s: [fd.Fix([0, 1, 2, 3])], rigid=[0])
+    case = fd.Case(edged(FOLD, rigid=[0]), [fd.Fix([0, 1, 2, 3])])
+    without, found = (frequencies(case, k)[:5] / expected - 1.0 for k in (0, 3))
+    np.testing.assert_allclose(found, 0.0, atol=0.04)
+    assert without[2:].min() > 0.2
+
+
+def test_shapes_between_the_nodes():
+    """As the shell's in the middles of edges and spokes, where modes may not move any node."""
+    shells = [fd.Case(fd.shell(SQUARE, SHEET, n, mass="consistent")) for n in (4, 8)]
+    expected = reference_modes(*shells, 6)
+    case = fd.Case(edged(SQUARE))
+    found = modes_at_rest(case, 16, internal=3)
+    paired = matched(expected, 6, case, found)
+    assert paired.mac[:5].min() > 0.98
+    seen, shape = expected.at(found.between_position.values)
+    np.testing.assert_array_equal(seen, np.arange(8))
+    first, other = found.between_shape.values[6], shape[0]
+    size = np.abs(other).max()
+    np.testing.assert_allclose(first * np.sign((first * other).sum()), other, atol=0.02 * size)
+
+
+def test_points_between_the_nodes_move_with_rigid_motions():
+    case = miura()
+    found = fd.modes(case, 6, internal=3)
+    x, y = case.structure.nodes, found.between_position.values
+    for shape, between in zip(found["shape"].values, found.between_shape.values, strict=True):
+        motion = np.linalg.lstsq(np.c_[np.ones(len(x)), x], shape, rcond=None)[0]
+        np.testing.assert_allclose(between, np.c_[np.ones(len(y)), y] @ motion, atol=1e-8)
+
+
+# ---------------------------------------------------------------------------- matrices
+
+
+@pytest.mark.parametrize("internal", [1, 3])
+def test_matrices(internal):
+    case = miura()
+    linear, plain = linearize(case, internal=internal), linearize(case)
+    mass, stiffness = linear.mass.toarray(), linear.stiffness.toarray()
+    np.testing.assert_allclose(mass, mass.T, atol=1e-14 * np.abs(mass).max())
+    np.testing.assert_allclose(stiffness, stiffness.T, atol=1e-14 * np.abs(stiffness).max())
+    assert np.linalg.eigvalsh(mass).min() > 0.0
+    size = len(plain.free)
+    np.testing.assert_array_equal(stiffness[:size, :size], plain.stiffness.toarray())
+    assert not stiffness[:size, size:].any()
+    inner = stiffness[size:, size:]
+    assert (np.diag(inner) > 0.0).all()
+    np.testing.assert_array_equal(inner, np.diag(np.diag(inner)))
+    # two free edges of each of the four panels
+    assert len(inner) == 4 * (internal + 2)
+
+
+def test_translations_and_rotations_have_their_mass():
+    """The whole moves without deformation: its mass and its inertia are those of the nodes."""
+    case = miura()
+    linear = linearize(case, internal=3)
+    x = case.structure.nodes
+    motions = np.zeros((len(linear.free), 6))
+    for c, axis in enumerate(np.eye(3)):
+        motions[: x.size, c] = np.tile(axis, len(x))
+        motions[: x.size, 3 + c] = np.cross(axis, x).ravel()
+    mass = np.kron(case.mass.toarray(), np.eye(3))
+    expected = motions[: x.size].T @ mass @ motions[: x.size]
+    np.testing.assert_allclose(motions.T @ (linear.mass @ motions), expected, atol=1e-9)
+    np.testing.assert_allclose(np.diag(expected)[:3], case.total_mass)
+    np.testing.assert_allclose(linear.inertia, linear.mass @ motions[:, :3], atol=1e-12)
+
+
+def test_rigid_motions_are_modes():
+    found = fd.modes(miura(), 10, internal=3)
+    np.testing.assert_array_equal(found.rigid.values, np.arange(10) < 6)
+    np.testing.assert_array_equal(found.internal_share.values[:6], 0.0)
+    assert (found.internal_share.values[6:] > 0.0).all()
+    assert (found.internal_share.values < 1.0).all()
+
+
+def test_more_amplitudes_lower_all_frequencies():
+    """More shapes of one plate, with its own mass: Rayleigh and Ritz."""
+    case = miura()
+    found = [frequencies(case, k, 20) for k in (1, 2, 3, 6)]
+    for more, less in zip(found[1:], found, strict=False):
+        assert (more <= less * (1.0 + 1e-9)).all()
+        assert more[-1] < less[-1]
+    free = fd.Case(edged(SQUARE))  # no edge turns: the mass is the same without them
+    assert (frequencies(free, 1, 10) < frequencies(free, 0, 10)).all()
+
+
+def test_without_amplitudes_nothing_changes():
+    case = miura(damping=fd.Rayleigh(0.1, 1e-4))
+    one, other = fd.modes(case, 12), fd.modes(case, 12, internal=0)
+    for name in one.data_vars:
+        if one[name].dtype.kind == "f":
+            np.testing.assert_array_equal(one[name], other[name])
+    assert "internal_share" not in other
+    assert "internal" not in other.attrs
+
+
+def test_a_turned_pattern():
+    a, b = 0.7, 1.1
+    turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ np.array(
+        [[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]
+    )
+    one, other = (frequencies(miura(by), 3, 14) for by in (None, turn))
+    np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_a_turned_state():
+    """Amplitudes act along the normals of the panels in the state."""
+    case = miura()
+    a = 1.0
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    x = case.structure.nodes
+    moved = fd.State(displacement=x @ turn.T - x)
+    one, other = (fd.modes(case, 14, state, internal=3).frequency for state in (None, moved))
+    np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
+
+
+def test_effective_masses_add_up():
+    held = miura(supports=[fd.Fix("xmin")])
+    size = len(held.free_dofs) + 8 + 20  # edges that turn, amplitudes
+    found = fd.modes(held, size, internal=3)
+    assert (found.effective_mass.sum("mode") <= found.free_mass * (1.0 + 1e-9)).all()
+    np.testing.assert_allclose(found.effective_mass.sum("mode"), found.free_mass, rtol=1e-6)
+
+
+def test_rigid_panels_have_none():
+    rigid = fd.Case(edged(FOLD, rigid="all"))
+    np.testing.assert_array_equal(frequencies(rigid, 3, 7), frequencies(rigid, 0, 7))
+
+
+# ---------------------------------------------------------------------------- responses
+
+
+DAMPED = [fd.Rayleigh(0.02, 1e-4), fd.ModalDamping(0.02), fd.ModalDamping(0.02, state="start")]
+
+
+@pytest.mark.parametrize("damping", DAMPED)
+def test_responses_are_sums_of_modes(damping):
+    case = miura(supports=[fd.Fix("xmin")], damping=damping)
+    found = fd.modes(case, 12, internal=3)
+    ratios = found.damping_ratio.values
+    if isinstance(damping, fd.ModalDamping):
+        np.testing.assert_allclose(ratios, 0.02, rtol=1e-6)
+    peak = float(found.frequency[0])
+    f = peak * np.array([0.5, 0.95, 1.0, 1.05, 4.0])
+    force = fd.Force([8], (0.3, 0.1, 1.0))
+    direct, modal = (
+        fd.frf(case, force, f, method=method, internal=3).receptance.values
+        for method in ("direct", "modal")
+    )
+    np.testing.assert_allclose(direct, modal, atol=1e-7 * np.abs(direct).max())
+    size = np.abs(direct).max(axis=(1, 2))
+    assert size[2] > size[[0, 1, 3, 4]].max()
+
+
+def test_a_base_moves_all_that_stands_on_it():
+    """Slowly as a whole; and as forces of inertia say: x = t + H (w^2 M t)."""
+    case = miura(supports=[fd.Fix("xmin")], damping=fd.Rayleigh(0.05))
+    still = fd.frf(case, fd.BaseMotion("z"), [0.0], internal=3).transmissibility.values[0]
+    np.testing.assert_allclose(still[:, 2], 1.0, atol=1e-9)
+    np.testing.assert_allclose(still[:, :2], 0.0, atol=1e-9)
+    linear, omega = linearize(case, internal=3), 2 * np.pi * 0.3
+    impedance = (linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping).toarray()
+    load = (omega**2 - 1j * omega * 0.05) * linear.inertia[:, 2]
+    moved = linear.expanded(np.linalg.solve(impedance, load)[:, None]).reshape(-1, 3)
+    moved[:, 2] += 1.0
+    found = fd.frf(case, fd.BaseMotion("z"), [0.3], internal=3).transmissibility.values[0]
+    np.testing.assert_allclose(found, moved, atol=1e-8 * np.abs(moved).max())
+
+
+# ---------------------------------------------------------------------------- messages
+
+
+def test_what_is_refused():
+    case = miura()
+    with pytest.raises(InputError, match="internal = 7: must be at most 6"):
+        fd.modes(case, 4, internal=7)
+    with pytest.raises(InputError, match="internal = -1: must be a whole number, at least 0"):
+        fd.modes(case, 4, internal=-1)
+    with pytest.raises(InputError, match=r'internal = 2: .* discretize with preset = "n5b8e"'):
+        fd.modes(fd.Case(fd.discretize(FOLD, SHEET)), 4, internal=2)
+    with pytest.raises(InputError, match=r"internal = 2: .*scheme n5b8e"):
+        fd.modes(fd.Case(fd.shell(FOLD, SHEET, 4)), 4, internal=2)
+    with pytest.raises(InputError, match='the mass is "bubble"; take mass = "condensed"'):
+        fd.modes(fd.Case(edged(FOLD, mass="bubble")), 4, internal=2)
+    with pytest.raises(InputError, match="the mass is given by nodes"):
+        fd.modes(fd.Case(replace(edged(FOLD), node_mass=np.ones(8))), 4, internal=2)
+    with pytest.raises(InputError, match=r'internal = 3: .* method = "direct" or "modal"'):
+        fd.frf(case, fd.Force([8], (0, 0, 1)), [1.0], method="harmonic", internal=3)
+
+
+def test_results_are_kept(tmp_path):
+    found = fd.modes(miura(), 8, internal=3)
+    fd.save(found, tmp_path / "modes.nc")
+    again = fd.load(tmp_path / "modes.nc")
+    assert again.attrs["internal"] == 3
+    np.testing.assert_array_equal(again.internal_share, found.internal_share)
+    case = fd.case_of(again)
+    np.testing.assert_allclose(fd.modes(case, 8, internal=3).frequency, found.frequency)

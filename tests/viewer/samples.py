@@ -1,0 +1,41 @@
+"""Small results of each kind, and the pages that show them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import foldyn as fd
+from foldyn.report import write_report
+from foldyn.viewer import stage
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+
+
+def case(loaded=True, **options):
+    pattern = fd.patterns.simple_fold(1.0, 1.0, 90)
+    laws = {"fold_law": "linear", "bend_law": "linear"}
+    structure = fd.discretize(pattern, SHEET, preset="herkal", **{**laws, **options})
+    supports = [fd.Fix([4, 5]), fd.Fix([0, 1], axes="z")]
+    push = fd.Force([0, 1], (-1e-3, 0.0, 0.0), history=fd.HalfSine(0.5))
+    return fd.Case(structure, supports, [push] if loaded else [], fd.Rayleigh(alpha=0.1))
+
+
+@cache
+def results(kind):
+    if kind == "motion":
+        rules = ("circumcenter", "panel")
+        return {rule: fd.simulate(case(mass=rule), 3.0, every=0.01) for rule in rules}
+    if kind == "path":
+        return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
+    if kind == "modes":
+        return {"fold": fd.modes(case(loaded=False), 4)}
+    drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]
+    frequencies = [0.2 * k for k in range(1, 40)]
+    return {"fold": fd.frf(case(loaded=False), drive, frequencies)}
+
+
+def page(kind, folder):
+    shown = results(kind)
+    cases = {name: fd.case_of(result) for name, result in shown.items()}
+    part = stage(shown, cases, f"A {kind}", [0])
+    return write_report(folder / f"{kind}.html", f"A {kind}", [part])

@@ -1,0 +1,188 @@
+"""Pages in a real browser, with WebGL2 and without; skipped where none is found."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples import case, page, results
+
+playwright = pytest.importorskip("playwright.sync_api")
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
+KINDS = ("motion", "path", "modes", "response")
+SHAKY = ("GL Driver Message", "GPU stall")  # of software rendering
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+        chromium = started.chromium.launch(executable_path=BROWSER, args=arguments)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    return {kind: page(kind, folder) for kind in KINDS}
+
+
+@pytest.fixture
+def opened(browser, pages, request):
+    """Opens a page; what it complained of and asked for is in `errors` and `asked`."""
+    contexts = []
+
+    def open_page(kind, width=1400, plain=False, **options):
+        context = browser.new_context(
+            viewport={"width": width, "height": 900}, offline=True, **options
+        )
+        contexts.append(context)
+        tab = context.new_page()
+        tab.errors, tab.asked = [], []
+        tab.on("pageerror", lambda error: tab.errors.append(str(error)))
+        tab.on(
+            "console",
+            lambda m: (
+                m.type in ("error", "warning")
+                and not any(word in m.text for word in SHAKY)
+                and tab.errors.append(m.text)
+            ),
+        )
+        tab.on("request", lambda asked: tab.asked.append(asked.url))
+        tab.goto(f"file://{pages[kind]}" + ("?plain" if plain else ""))
+        tab.wait_for_selector(".foldyn[data-ready='1']")
+        return tab
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+PAGE = "document.querySelector('.foldyn').page"
+
+
+@pytest.mark.parametrize("plain", [False, True], ids=["webgl", "canvas"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_opens_alone_and_draws(opened, kind, plain):
+    tab = opened(kind, plain=plain)
+    painter = tab.get_attribute(".foldyn", "data-painter")
+    assert painter == "canvas" if plain else painter in ("webgl", "canvas")
+    tab.wait_for_timeout(200)
+    assert tab.errors == []
+    assert [url for url in tab.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    drawn = tab.evaluate(
+        f"""(() => {{ const p = {PAGE}; p.play(false); p.draw();
+        const c = document.createElement('canvas');
+        c.width = p.view.canvas.width; c.height = p.view.canvas.height;
+        const x = c.getContext('2d'); x.drawImage(p.view.canvas, 0, 0);
+        return new Set(new Uint32Array(x.getImageData(0, 0, c.width, c.height).data.buffer)).size
+        }})()"""
+    )
+    assert drawn > 5  # paper in several shades, lines
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("kind", KINDS)
+def test_fits_the_window(opened, kind, width):
+    tab = opened(kind, width)
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("plain", [False, True], ids=["webgl", "canvas"])
+def test_positions_are_those_of_the_result(opened, plain):
+    tab = opened("motion", plain=plain)
+    result = results("motion")["panel"]
+    for sample in (0, 57, 211):
+        got = tab.evaluate(
+            f"""(() => {{ const p = {PAGE}; p.play(false);
+            p.moment = {float(result["time"][sample])!r}; p.draw();
+            return Array.from(p.results[1].positions) }})()"""
+        )
+        nodes = case().structure.nodes
+        wanted = nodes + result["displacement"].values[sample]
+        assert np.abs(np.reshape(got, (-1, 3)) - wanted).max() < 1e-4 * np.ptp(nodes, axis=0).max()
+
+
+def test_colors_are_levels_of_the_values(opened):
+    tab = opened("motion")
+    tab.select_option(".field", "displacement")
+    result = results("motion")["circumcenter"]
+    sizes = np.linalg.norm(result["displacement"].values, axis=2)
+    top = max(
+        float(np.linalg.norm(r["displacement"], axis=2).max()) for r in results("motion").values()
+    )
+    got = tab.evaluate(
+        f"""(() => {{ const p = {PAGE}; p.play(false);
+        p.moment = {float(result["time"][120])!r}; p.draw();
+        return Array.from(p.results[0].shown.levels) }})()"""
+    )
+    assert np.abs(np.array(got) - sizes[120] / top).max() < 2e-3
+    assert "displacement" in tab.inner_text(".legend")
+
+
+def test_plays_scrubs_and_picks_by_keys_and_mouse(opened):
+    tab = opened("motion")
+    assert tab.get_attribute(".toggle", "aria-label") == "Pause"
+    tab.focus("canvas.over")
+    tab.keyboard.press("Space")
+    assert tab.get_attribute(".toggle", "aria-label") == "Play"
+    tab.evaluate("document.querySelector('.scrub').value = 500")
+    tab.dispatch_event(".scrub", "input")
+    assert tab.evaluate(f"{PAGE}.moment") == pytest.approx(1.5, abs=0.01)
+    before = tab.evaluate(f"{PAGE}.camera.azimuth")
+    tab.focus("canvas.over")
+    tab.keyboard.press("ArrowRight")
+    assert tab.evaluate(f"{PAGE}.camera.azimuth") == before + 5
+    x, y = tab.evaluate(
+        f"""(() => {{ const p = {PAGE}; p.draw(); const v = p.view.views()[0];
+        const at = p.camera.projector(v); const n = p.results[0].positions.subarray(9, 12);
+        return at(...n, [0, 0, 0]).slice(0, 2) }})()"""
+    )
+    tab.click("canvas.over", position={"x": x, "y": y})
+    assert tab.evaluate(f"{PAGE}.node") == 3
+    assert "Node 3 moved by" in tab.inner_text(".status")
+    assert "node 3" in tab.get_attribute(".charts [role=img]", "aria-label")
+    tab.keyboard.press("n")
+    assert tab.evaluate(f"{PAGE}.node") == 4
+
+
+def test_the_spectrum_has_the_peak_of_the_motion(opened):
+    tab = opened("motion")
+    frequency, amplitude = tab.evaluate(
+        f"(() => {{ const c = {PAGE}.plots[1].curves[0];"
+        "return [Array.from(c.x), Array.from(c.y)] })()"
+    )
+    result = results("motion")["circumcenter"]
+    axis = tab.evaluate(f"{PAGE}.axis")
+    values = result["displacement"].values[:, 0, axis]
+    t = result["time"].values
+    window = np.hanning(len(t)) * (values - values.mean())
+    peak = frequency[int(np.argmax(amplitude))]
+
+    def at(f):
+        return abs(np.sum(window * np.exp(-2j * np.pi * f * t)))
+
+    assert at(peak) > 0.98 * max(map(at, np.linspace(0.05, frequency[-1], 2000)))
+
+
+def test_still_for_those_who_ask_for_it_and_dark(opened):
+    tab = opened("motion", reduced_motion="reduce", color_scheme="dark")
+    assert tab.evaluate(f"{PAGE}.playing") is False
+    assert tab.evaluate("document.documentElement.classList.contains('dark')")
+
+
+def test_saves_curves_and_pictures(opened):
+    tab = opened("motion", accept_downloads=True)
+    with tab.expect_download() as curves:
+        tab.click(".save-curves")
+    text = Path(curves.value.path()).read_text("utf-8")
+    assert text.startswith('"time (s)"') and len(text.splitlines()) > 250
+    with tab.expect_download() as picture:
+        tab.click(".save-picture")
+    assert Path(picture.value.path()).read_bytes().startswith(b"\x89PNG")

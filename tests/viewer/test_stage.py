@@ -1,0 +1,102 @@
+"""What pages hold of results: positions to the accuracy promised, all parts that are drawn."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from decode import changing, decoded
+from samples import page, results
+
+import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.viewer import stage
+from foldyn.viewer.sheet import edge_pieces
+from foldyn.viewer.stage import OF_SIZE
+
+
+def staged(kind):
+    shown = results(kind)
+    cases = {name: fd.case_of(result) for name, result in shown.items()}
+    return stage(shown, cases, "title", [0]), shown, cases
+
+
+@pytest.mark.parametrize("kind", ["motion", "path"])
+def test_positions_are_those_of_the_result(kind):
+    part, shown, cases = staged(kind)
+    for about, (name, result) in zip(part.about["results"], shown.items(), strict=True):
+        u = changing(part.arrays, about["displacement"])
+        true = result["displacement"].transpose(..., "node", "axis").values
+        size = cases[name].structure.pattern.size
+        assert about["name"] == name
+        assert np.abs(u - true).max() <= OF_SIZE * size
+    sheet = part.about["sheets"][part.about["results"][0]["sheet"]]
+    assert np.array_equal(
+        decoded(part.arrays, sheet["nodes"]), case_nodes(cases).astype(np.float32)
+    )
+
+
+def case_nodes(cases):
+    return next(iter(cases.values())).structure.nodes
+
+
+def test_results_of_one_pattern_share_their_sheet_only_if_it_is_the_same():
+    part, _, _ = staged("motion")
+    assert {about["sheet"] for about in part.about["results"]} <= set(part.about["sheets"])
+
+
+def test_strains_and_moments_are_those_of_the_structure():
+    part, shown, cases = staged("motion")
+    about = part.about["results"][0]
+    case, u = next(iter(cases.values())), next(iter(shown.values()))["displacement"].values
+    structure = case.structure
+    x = structure.nodes + u[37]
+    i, j = structure.bars.T
+    strain = np.linalg.norm(x[j] - x[i], axis=1) / structure.bar_length - 1.0
+    found = changing(part.arrays, about["fields"]["bar_strain"]["values"])
+    assert np.abs(found[37] - strain).max() <= 5e-3 * np.abs(found).max()
+    turn = structure.dihedrals(u[37])[0] - structure.fold_rest
+    moment = changing(part.arrays, about["fields"]["fold_moment"]["values"])[37]
+    assert np.allclose(moment, structure.fold_stiffness * turn, atol=5e-3 * np.abs(moment).max())
+
+
+def test_a_response_holds_its_real_and_imaginary_parts():
+    part, shown, _ = staged("response")
+    values = changing(part.arrays, part.about["results"][0]["displacement"])
+    true = next(iter(shown.values()))["receptance"].transpose("frequency", "node", "axis").values
+    assert np.abs(values[:, 0] + 1j * values[:, 1] - true).max() < 2e-4 * np.abs(true).max()
+
+
+def test_modes_say_what_they_do():
+    part, shown, _ = staged("modes")
+    modes = shown["fold"]
+    frequencies = [about["frequency"] for about in part.about["results"]]
+    assert np.array_equal(frequencies, modes["frequency"].values)
+    assert all(about["what"] for about in part.about["results"])
+
+
+def test_pages_name_all_their_arrays_and_let_nothing_in(tmp_path):
+    for kind in ("motion", "path", "modes", "response"):
+        text = page(kind, tmp_path).read_text("utf-8")
+        about = json.loads(
+            re.search(r'<script type="application/json"[^>]*>(.*)</script>', text)[1]
+        )
+        held = set(re.findall(r'data-array="stage-1\.([^"]+)"', text))
+        assert held == set(about["arrays"])
+        policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
+        assert "default-src 'none'" in policy and "unsafe" not in policy
+        assert "http://" not in re.sub(r"http://www\.w3\.org\S*", "", text)
+
+
+def test_other_datasets_are_refused():
+    with pytest.raises(InputError, match="no motion, path, modes or frequency response"):
+        stage({"a": results("motion")["panel"].isel(time=0)}, {}, "t", [0])
+
+
+def test_welds_are_not_drawn():
+    square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
+    made = fd.discretize(fd.welded(square, join=False), fd.Sheet(1e9, 0.3, 1e-3, 700.0))
+    pairs, kind, _, _ = edge_pieces(made)
+    assert len(pairs) == len(kind) == len(made.pattern.boundary)
