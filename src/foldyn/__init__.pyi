@@ -79,7 +79,7 @@ from foldyn.materials import (
     HingeLaw as HingeLaw,
     PlateSuperlinear as PlateSuperlinear,
 )
-from foldyn.patterns import Pattern as Pattern, thicken as thicken
+from foldyn.patterns import Pattern as Pattern, thicken as thicken, welded as welded
 from foldyn.results import (
     Quantity as Quantity,
     case_of as case_of,

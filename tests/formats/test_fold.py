@@ -83,7 +83,7 @@ def test_real_files(name, tmp_path):
     path = SAMPLES / name
     if not path.exists():
         pytest.skip(f"{name} is not here")
-    p, diagnosis = diagnose(path, unit="m")
+    p, diagnosis = diagnose(path, unit="m", facets="hinge")
     assert diagnosis.assumptions == ()
     # the box gives valleys where its faces, seen from their front, have mountains
     assert any("turn" in doubt for doubt in diagnosis.doubts) == ("box" in name)
@@ -266,7 +266,9 @@ def test_a_cut_becomes_two_edges_aloud(file):
 
 
 def test_a_join_is_flat(file):
-    assert read_pattern(file(edges_assignment=["J", "B", "B"])).assignments == ("F",)
+    assert read_pattern(file(edges_assignment=["J", "B", "B"]), facets="hinge").assignments == (
+        "F",
+    )
 
 
 def test_lists_by_element_are_left_out_aloud(file):

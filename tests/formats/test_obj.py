@@ -27,7 +27,7 @@ def read(tmp_path):
 
     def made(text):
         (tmp_path / "x.obj").write_text(text)
-        return diagnose(tmp_path / "x.obj")
+        return diagnose(tmp_path / "x.obj", facets="hinge")
 
     return made
 

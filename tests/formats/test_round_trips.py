@@ -89,7 +89,7 @@ def test_flat_patterns_of_every_generator(kind, extension, tmp_path):
     known = LETTERS.get(extension, "MVFU")
     p = p.changed(assignments=[known[k % len(known)] for k in range(len(p.creases))])
     write_pattern(tmp_path / f"x{extension}", p)
-    assert_alike(p, diagnose(tmp_path / f"x{extension}").pattern)
+    assert_alike(p, diagnose(tmp_path / f"x{extension}", facets="hinge").pattern)
 
 
 @pytest.mark.parametrize("extension", BOTH)
@@ -99,7 +99,7 @@ def test_random_flat_patterns(extension, seed, tmp_path_factory):
     p = planar(seed, LETTERS.get(extension, "MVFU"), extension in ANGLED)
     path = tmp_path_factory.mktemp("trip") / f"x{extension}"
     write_pattern(path, p)
-    assert_alike(p, diagnose(path).pattern)
+    assert_alike(p, diagnose(path, facets="hinge").pattern)
 
 
 @pytest.mark.parametrize("extension", FOLDED)
@@ -121,7 +121,9 @@ def test_angles_to_fold_to_survive_on_folded_patterns(extension, tmp_path):
     wanted = [-1.5 if letter == "M" else 1.25 for letter in p.assignments]
     p = p.changed(fold_angles=[*wanted[:-1], None])
     write_pattern(tmp_path / f"x{extension}", p)
-    np.testing.assert_allclose(read_pattern(tmp_path / f"x{extension}").fold_angles, p.fold_angles)
+    np.testing.assert_allclose(
+        read_pattern(tmp_path / f"x{extension}", facets="hinge").fold_angles, p.fold_angles
+    )
 
 
 @pytest.mark.parametrize("extension", [".svg", ".dxf", ".cp"])
@@ -157,7 +159,7 @@ def test_cuts_survive(tmp_path):
     )  # fmt: skip
     for extension in (".fold", ".obj", ".svg", ".dxf"):
         write_pattern(tmp_path / f"x{extension}", p)
-        q = diagnose(tmp_path / f"x{extension}").pattern
+        q = diagnose(tmp_path / f"x{extension}", facets="hinge").pattern
         assert (len(q.vertices), len(q.faces), len(q.creases)) == (8, 4, 3), extension
         assert sorted(q.assignments) == ["M", "V", "V"]
 
@@ -167,11 +169,11 @@ def test_real_files_in_every_suitable_format(path, tmp_path):
     """Flat ones in all formats, folded ones in those of panels."""
     if path is None or path.suffix not in FORMATS:
         pytest.skip("no file of a pattern")
-    p = diagnose(path, unit="mm").pattern
+    p = diagnose(path, unit="mm", facets="hinge").pattern
     is_flat = not p.vertices[:, 2].any() and (np.abs(p.dihedrals - np.pi) < 1e-6).all()
     for extension in BOTH if is_flat else FOLDED:
         if not set(p.assignments) <= set(LETTERS.get(extension, "MVFU")):
             continue
         q = p if extension in ANGLED else p.changed(fold_angles=None)
         write_pattern(tmp_path / f"x{extension}", q)
-        assert_alike(q, diagnose(tmp_path / f"x{extension}").pattern)
+        assert_alike(q, diagnose(tmp_path / f"x{extension}", facets="hinge").pattern)

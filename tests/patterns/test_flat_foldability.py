@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foldyn.patterns import Pattern, eggbox, kresling, miura
+from foldyn.patterns import Pattern, eggbox, kresling, miura, welded
 from foldyn.patterns.flat_foldability import flat_foldability
 
 
@@ -103,3 +103,12 @@ def test_no_vertex_inside():
 def test_panels_that_meet_in_a_point_alone_have_no_vertex_inside():
     vertices = [[0, 0], [1, 0], [1, 1], [-1, 0], [-1, -1]]
     assert len(flat_foldability(Pattern(vertices, [[0, 1, 2], [0, 3, 4]])).vertices) == 0
+
+
+def test_welds_count_as_lines_that_do_not_fold():
+    pattern = vertex([60, 40, 50, 120, 90], "MFMMV")
+    line = welded(pattern, join=False)
+    assert len(line.welds) == 1
+    found, expected = flat_foldability(line), flat_foldability(pattern)
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(getattr(found, name), values)

@@ -309,3 +309,13 @@ def test_what_cannot_be_folded_is_refused():
             fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], ["U"], families={"a": [(0, 2)]}), {"a": 9}
         )
     assert math.degrees(fd.fold(unassigned, [40], steps=2).angles[0]) == pytest.approx(40)
+
+
+def test_welds_stay_flat_where_they_can():
+    points = [(x, y) for x in range(5) for y in (0, 1)]
+    faces = [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(4)]
+    strip = fd.Pattern(points, faces, {(4, 5): "V", (2, 3): "F", (6, 7): "F"})
+    folding = fd.fold(fd.welded(strip, join=False), {"valley": 90.0})
+    assert folding.pattern.welds.tolist() == [[2, 3], [6, 7]]
+    np.testing.assert_allclose(np.degrees(folding.pattern.dihedrals), 90.0)
+    np.testing.assert_allclose(np.degrees(folding.pattern.weld_dihedrals), 180.0)

@@ -13,6 +13,7 @@ from samples import page, results
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.viewer import stage
+from foldyn.viewer.sheet import edge_pieces
 from foldyn.viewer.stage import OF_SIZE
 
 
@@ -92,3 +93,10 @@ def test_pages_name_all_their_arrays_and_let_nothing_in(tmp_path):
 def test_other_datasets_are_refused():
     with pytest.raises(InputError, match="no motion, path, modes or frequency response"):
         stage({"a": results("motion")["panel"].isel(time=0)}, {}, "t", [0])
+
+
+def test_welds_are_not_drawn():
+    square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
+    made = fd.discretize(fd.welded(square, join=False), fd.Sheet(1e9, 0.3, 1e-3, 700.0))
+    pairs, kind, _, _ = edge_pieces(made)
+    assert len(pairs) == len(kind) == len(made.pattern.boundary)

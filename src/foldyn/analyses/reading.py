@@ -16,14 +16,15 @@ from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.messages import describe, dotted
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.analyses.sections import FACES, HINGES, READING
+from foldyn.analyses.sections import FACES, FACETS, HINGES, READING
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.formats import read_pattern
+from foldyn.formats.facets import HINGE, WELD
 from foldyn.input_files import from_toml, read_text
-from foldyn.patterns import GENERATORS, Pattern, thicken
+from foldyn.patterns import GENERATORS, Pattern, thicken, welded
 from foldyn.structures import Sheet, sheet_from
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
@@ -138,7 +139,8 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
         faults.add(InputError(f": missing; {kind.needs_density} it (kg/m3)", "sheet.density"))
     with within("", path):
         with faults.collected(), within("model: "):
-            default = model.options(**schema.model.options).mass
+            welds = bool(len(getattr(pattern, "welds", ())))  # no pattern where it is at fault
+            default = model.options(welds=welds, **schema.model.options).mass
         faults.tell()
         masses = list(schema.model.mass or [default])[: None if kind.by_mass else 1]
         if schema.model.kind == SHELL:
@@ -230,18 +232,25 @@ def _values(document: Mapping[str, Any]) -> Iterator[tuple[tuple[str | int, ...]
 
 def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
     if "kind" in table:
-        arguments = {name: table[name] for name in table if name not in ("kind", HINGES)}
+        arguments = {name: table[name] for name in table if name not in ("kind", FACETS, HINGES)}
         with within("pattern"):
-            return call_from(GENERATORS[table["kind"]], arguments)
+            return _facets(call_from(GENERATORS[table["kind"]], arguments), table)
     if "file" in table:
         with within(f'pattern.file = "{table["file"]}": '):
             return read_pattern(folder / table["file"], *(table.get(key) for key in READING))
     with within("pattern: "):
-        return Pattern(
+        pattern = Pattern(
             table["vertices"], table["faces"], table.get("assignments"),
             fold_angles=np.radians(table["fold_angles"]) if "fold_angles" in table else None,
             families=table.get("families"),
         )  # fmt: skip
+        return _facets(pattern, table)
+
+
+def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
+    """The pattern with its flat creases as the case file wants them: hinges if it says nothing."""
+    wanted = table.get(FACETS, HINGE)
+    return pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

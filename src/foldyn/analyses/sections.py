@@ -32,6 +32,7 @@ from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import support_from
 from foldyn.errors import Faults, InputError, within
+from foldyn.formats.facets import FACETS as KINDS_OF_FACETS
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
 from foldyn.plots import ANIMATIONS
@@ -43,7 +44,9 @@ from foldyn.values import MOST, choice, indices, nearest, number_or_list, number
 
 HINGES, FACES = "hinge_offset", "faces"
 """Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
-READING = ("scale", "unit", "frame")
+FACETS = "facets"
+"""Key of [pattern] for what lines assigned "F" are."""
+READING = ("scale", "unit", "frame", FACETS)
 """Keys of [pattern] beside `file`: arguments of `read_pattern`."""
 INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
 """Keys of [pattern] for a pattern that the case file holds."""
@@ -104,10 +107,12 @@ def _pattern(value: Any) -> dict[str, Any]:
         if not isinstance(value["file"], str) or not value["file"]:
             raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
     else:
-        check_keys(value, [*INLINE, HINGES])
+        check_keys(value, [*INLINE, FACETS, HINGES])
         if "faces" not in value:
             raise InputError(".faces: missing; give the vertex numbers of every panel")
         _inline(value)
+    if FACETS in value:
+        choice(f".{FACETS}", value[FACETS], KINDS_OF_FACETS)
     if HINGES in value and value[HINGES] != FACES:
         if isinstance(value[HINGES], str):
             raise InputError(
@@ -128,7 +133,7 @@ def _check_generator(value: Mapping[str, Any]) -> None:
     meant = nearest(kind, GENERATORS) if isinstance(kind, str) else None
     if meant is not None:
         with faults.collected():
-            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind", HINGES])
+            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind", FACETS, HINGES])
     faults.tell()
 
 

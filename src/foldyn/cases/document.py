@@ -169,6 +169,8 @@ class _Writer:
         table: dict[str, Any] = {}
         if not np.isnan(pattern.fold_angles).all():
             table["fold_angles"] = self._store("fold_angles", pattern.fold_angles)
+        if len(pattern.welds):
+            table["welds"] = self._store("welds", pattern.welds)
         if pattern.families:
             table["families"] = [
                 {"name": name, "creases": self._store(f"tables_family{i}_creases", rows)}
@@ -320,7 +322,7 @@ def _stored_pattern(table: Mapping[str, Any]) -> Pattern:
         boards = Boards(table["face_offsets"], table["board_corners"], table["board_thickness"])
     pattern = Pattern(
         table["vertices"], faces, letters, table["name"], boards, table.get("fold_angles"),
-        custom=json.loads(table.get("custom", "{}")),
+        custom=json.loads(table.get("custom", "{}")), welds=table.get("welds", ()),
     )  # fmt: skip
     if "families" not in table:
         return pattern

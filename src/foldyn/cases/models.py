@@ -24,7 +24,8 @@ class Model:
     make : callable
         ``make(pattern, sheet, **options)`` gives the structure.
     options : callable
-        ``options(**given)`` gives all its options, the defaults of what is not given among them.
+        ``options(welds=..., **given)`` gives all its options, the defaults of what is not given
+        among them; welds says whether the pattern has some.
     masses : iterable of str
         Distributions of mass that it offers.
     name : str
@@ -42,7 +43,11 @@ class Model:
         return tuple(signature(self.make).parameters)[2:]
 
 
+def _of_shells(welds: bool = False, **given: Any) -> ShellOptions:
+    return ShellOptions(**given)
+
+
 MODELS: Mapping[str, Model] = {
     BARS_AND_HINGES: Model(discretize, resolved, MASS_RULES, "bars and hinges"),
-    SHELL: Model(shell, ShellOptions, MASSES, "a shell"),
+    SHELL: Model(shell, _of_shells, MASSES, "a shell"),
 }

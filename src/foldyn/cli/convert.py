@@ -64,8 +64,8 @@ def _pattern(given: argparse.Namespace, source: Path) -> tuple[Pattern, Sequence
         raise InputError(": only for results (.nc); leave it out", "--every")
     frame = int(given.frame) if given.frame and given.frame.isdecimal() else given.frame
     if not given.check:
-        return read_pattern(source, given.scale, given.unit, frame), ()
-    pattern, diagnosis = diagnose(source, given.scale, given.unit, frame)
+        return read_pattern(source, given.scale, given.unit, frame, "line"), ()
+    pattern, diagnosis = diagnose(source, given.scale, given.unit, frame, "line")
     print(f"{source}: {pattern!r}")
     print(diagnosis)
     return pattern, ()

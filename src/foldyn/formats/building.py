@@ -19,7 +19,7 @@ from foldyn.formats.panels import Panels
 from foldyn.formats.planar import MOST_LINES, Lines, too_many
 from foldyn.patterns import Pattern
 from foldyn.patterns.flat_foldability import flat_foldability
-from foldyn.patterns.topology import Edge, Faces
+from foldyn.patterns.topology import Edge, Faces, edge_lookup
 from foldyn.values import LONGEST, SHORTEST, number
 
 _FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
@@ -90,8 +90,16 @@ def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) 
             tuple(notes.repairs),
             tuple(notes.doubts),
             flat_foldability(pattern),
+            _facets(pattern, panels),
         ),
     )
+
+
+def _facets(pattern: Pattern, panels: Panels) -> tuple[Edge, ...]:
+    """Creases that are drawn as flat, and to stay so."""
+    folded = edge_lookup(pattern.creases[np.nan_to_num(pattern.fold_angles) != 0.0])
+    drawn = [(a, b) for a, b in pattern.creases.tolist() if panels.letters.get((a, b)) == "F"]
+    return tuple(edge for edge in drawn if edge not in folded)
 
 
 def _lines(drawing: Drawing, unit: float, notes: Notes) -> Lines:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from foldyn.patterns.flat_foldability import FlatFoldability
+from foldyn.patterns.topology import Edge
 
 ROUNDING = np.radians(0.1)
 """Departure of angles (rad) that the digits of a file leave."""
@@ -34,6 +35,8 @@ class Diagnosis:
         What may not be as intended.
     vertices : FlatFoldability
         Maekawa's and Kawasaki's conditions at the vertices inside.
+    facets : tuple of pairs of int
+        Flat creases that the file itself assigns "F", and that are not to be folded.
     """
 
     size: tuple[float, float, float]
@@ -41,6 +44,7 @@ class Diagnosis:
     repairs: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     vertices: FlatFoldability = field(default_factory=_nothing)
+    facets: tuple[Edge, ...] = ()
 
     def __str__(self) -> str:
         """Text of several lines."""

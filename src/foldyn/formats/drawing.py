@@ -41,6 +41,9 @@ class Drawing:
         What the reader put right, took for granted, and is not sure of, in words.
     families : mapping
         Names for groups of lines, each with pairs of vertex numbers.
+    welds : sequence, optional
+        Pairs of vertex numbers of the lines across which the sheet runs on, of a file that says
+        it of each of its flat lines.
     custom : mapping
         Further data, kept.
     """
@@ -59,4 +62,5 @@ class Drawing:
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     families: Mapping[str, Sequence[tuple[int, int]]] = field(default_factory=dict)
+    welds: Sequence[tuple[int, int]] | None = None
     custom: Mapping[str, Any] = field(default_factory=dict)

@@ -7,12 +7,13 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.formats import cp, cp_writer, dxf, dxf_writer, fold, obj, opx, stl, svg, svg_writer
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
+from foldyn.formats.facets import with_facets
 from foldyn.formats.frames import Frame
 from foldyn.formats.kept import with_families, without_repetition
 from foldyn.formats.units import METERS
@@ -74,6 +75,7 @@ def read_pattern(
     scale: float | None = None,
     unit: str | None = None,
     frame: int | str | None = None,
+    facets: Literal["weld", "line", "hinge"] | None = None,
 ) -> Pattern:
     """Read a pattern from a file; its extension determines the format.
 
@@ -88,6 +90,11 @@ def read_pattern(
         says nothing is taken to be in meters.
     frame : int or str, optional
         Number or title of a frame, of a file that has several.
+    facets : {"weld", "line", "hinge"}, optional
+        What lines assigned "F" are. "weld": facets of a sheet that runs on across them; panels are
+        joined, as `welded` does. "line": facets, which stay as the `welds` of the pattern. "hinge":
+        creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
+        with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
 
     Returns
     -------
@@ -105,7 +112,7 @@ def read_pattern(
     FoldynWarning
         What was assumed, with the pattern's size, what was repaired, and what may not be meant.
     """
-    pattern, diagnosis = diagnose(path, scale, unit, frame)
+    pattern, diagnosis = diagnose(path, scale, unit, frame, facets)
     size = " x ".join(f"{length:.4g}" for length in diagnosis.size)
     for told in (
         diagnosis.assumptions and f"{'; '.join(diagnosis.assumptions)}; the sheet is {size} m",
@@ -122,6 +129,7 @@ def diagnose(
     scale: float | None = None,
     unit: str | None = None,
     frame: int | str | None = None,
+    facets: Literal["weld", "line", "hinge"] | None = None,
 ) -> Built:
     """Read a pattern as `read_pattern` does, and return what it says of it instead of warning.
 
@@ -147,7 +155,8 @@ def diagnose(
     with within("", file):
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
         made = built(drawing, meters=meters, scale=factor)
-        return with_families(without_repetition(made), drawing)
+        made = with_families(without_repetition(made), drawing)
+        return with_facets(made, drawing, facets)
 
 
 def write_pattern(

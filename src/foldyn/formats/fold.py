@@ -28,6 +28,8 @@ from foldyn.values import choice, show
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
 """Key of the families of creases, as lists of vertex pairs by name."""
+WELDS = "foldyn:welds"
+"""Key of the flat edges that are no hinges, as vertex pairs; the other flat ones are."""
 _OLD = {"edges_foldAngles": "edges_foldAngle", "edges_lengths": "edges_length"}  # spec 1.0
 _COMMA = re.compile(r'("(?:[^"\\]|\\.)*+")|,(?=\s*+[\]}])')
 _OF_ELEMENTS = re.compile(r"(?:vertices|edges|faces)_")
@@ -76,7 +78,8 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
     return Drawing(
         vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
         places=places, repairs=tuple(repairs),
-        families=_families(fields.get(FAMILIES, {}), len(vertices)), custom=custom,
+        families=_families(fields.get(FAMILIES, {}), len(vertices)),
+        welds=_welds(fields, len(vertices)), custom=custom,
     )  # fmt: skip
 
 
@@ -269,7 +272,7 @@ def _angle(e: int, angle: Any) -> float:
 
 def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Data of other programs, and the keys of those that would not fit a repaired pattern."""
-    keys = [key for key in fields if ":" in key and key != FAMILIES]
+    keys = [key for key in fields if ":" in key and key not in (FAMILIES, WELDS)]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
     return {key: fields[key] for key in keys if key not in dropped}, dropped
 
@@ -282,6 +285,13 @@ def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
         name: [_pair(f"{FAMILIES}[{show(name)}][{k}]", pair, count) for k, pair in enumerate(pairs)]
         for name, pairs in given.items()
     }
+
+
+def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
+    """Vertex pairs of the welds; None in a file that says nothing of them."""
+    if WELDS not in fields:
+        return None
+    return [_pair(f"{WELDS}[{k}]", pair, count) for k, pair in enumerate(_list(fields, WELDS))]
 
 
 def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
@@ -323,6 +333,7 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
         "edges_assignment": [letter for _, letter, _ in edges],
         **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
         **({FAMILIES: _named(pattern)} if pattern.families else {}),
+        **({WELDS: pattern.welds.tolist()} if any(letter == "F" for _, letter, _ in edges) else {}),
         **pattern.custom,
     }
     lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in fields.items()]

@@ -44,15 +44,19 @@ def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
 def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
     """Every edge with its letter ("B" on the boundary, "C" on a cut) and the angle to fold it to.
 
+    Welds are "F", as facets are in all formats.
+
     The angle (rad) is NaN where none is given, and on the boundary.
     """
-    row = edge_lookup(pattern.creases)
+    row, welds = edge_lookup(pattern.creases), edge_lookup(pattern.welds)
     pairs = seams(pattern.vertices, pattern.faces, pattern.face_normals, pattern.boundary)
     cuts = {edge for pair in pairs for edge in pair}
     told = []
     for a, b in pattern.edges.tolist():
         k = row.get((a, b))
-        if k is None:
+        if (a, b) in welds:
+            told.append(((a, b), "F", np.nan))
+        elif k is None:
             told.append(((a, b), "C" if (a, b) in cuts else "B", np.nan))
         else:
             told.append(((a, b), pattern.assignments[k], float(pattern.fold_angles[k])))

@@ -84,7 +84,7 @@ def check_internal(structure: Any, internal: Any) -> int:
     Raises
     ------
     InputError
-        No number from 0 to 6; amplitudes of a structure that does not have them.
+        No number from 0 to 6; amplitudes of a structure that does not have them, as with welds.
     """
     count = whole("internal", internal, least=0, most=MOST, what="amplitudes of a panel")
     if not count:
@@ -93,6 +93,12 @@ def check_internal(structure: Any, internal: Any) -> int:
         raise InputError(
             f" = {count}: internal amplitudes are those of panels as plates, of the scheme n5b8e; "
             'discretize with preset = "n5b8e", or leave it out',
+            "internal",
+        )
+    if structure.pattern is not None and len(structure.pattern.welds):
+        raise InputError(
+            f" = {count}: internal amplitudes are those of panels between creases, and the pattern "
+            f"has welds ({len(structure.pattern.welds)}); leave it out, or take a shell",
             "internal",
         )
     if structure.node_mass is not None or structure.options.mass != "condensed":

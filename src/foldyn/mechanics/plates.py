@@ -34,6 +34,7 @@ class BarsPlates(NamedTuple):
     bars: BarsHinges  # without hinges
     rotations: int  # r
     per_reach: float  # rotation (rad) of a dof of 1 m, 1/m
+    rotation_hinge: NDArray  # (r,) row in `hinges` that each rotation lies at
     hinges: NDArray  # (nf + nb, 4) of the folds, then of the bends
     fold_rotations: NDArray  # (nf, 2) -1 where there is none
     fold_stiffness: NDArray  # (nf,) N m/rad
@@ -170,6 +171,7 @@ def turn_moments(model, x, couple, work):
     """Moments of all hinges, and forces (r,) on the dofs of rotations, at known dihedrals."""
     turn_folds(model, x, work)
     couple[:] = 0.0
+    work.moment[:] = 0.0
     for f in range(model.fold_rest.size):
         moment = fold_moment(model, work, f)
         work.moment[f] = moment
@@ -186,7 +188,7 @@ def turn_moments(model, x, couple, work):
                 moment += model.stiffness[model.entry[p] + k * count + m] * work.turn[m]
             h = model.angle[model.start[p] + k]
             if h >= 0:
-                work.moment[h] = moment
+                work.moment[h] += moment  # of two plates at a weld
             else:
                 couple[-1 - h] += model.per_reach * moment
 

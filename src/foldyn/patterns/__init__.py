@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.facets import welded
 from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.generators.arc_miura import arc_miura
 from foldyn.patterns.generators.curved_pleat import curved_pleat
@@ -59,6 +60,7 @@ __all__ = [
     "square_twist",
     "thicken",
     "waterbomb",
+    "welded",
     "yoshimura",
     "zipper_tubes",
 ]

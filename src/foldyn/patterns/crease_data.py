@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,26 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.patterns.topology import Edge, edge_lookup, edge_of
+from foldyn.patterns.topology import edge_lookup, vertex_pair
 from foldyn.values import show, suggest
 
 ASSIGNED: Mapping[str, str] = {
     "all": "MVU", "mountain": "M", "valley": "V", "flat": "F", "unassigned": "U",
 }  # fmt: skip
 """Words that stand for creases of every pattern, and the letters that each means."""
-
-
-def vertex_pair(field: str, key: Any) -> Edge:
-    """Edge (low, high) that a pair of vertex numbers names."""
-    try:
-        if isinstance(key, str):
-            raise TypeError
-        a, b = (operator.index(v) for v in key)
-    except (TypeError, ValueError):
-        raise InputError(
-            f": key {key!r} is not a pair of vertex numbers; write (0, 1)", field
-        ) from None
-    return edge_of(a, b)
 
 
 def fold_angles(given: Any, creases: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -81,6 +81,7 @@ def flat_foldability(pattern: Pattern) -> FlatFoldability:
         One row for each vertex inside.
     """
     letter = dict(zip(map(tuple, pattern.creases.tolist()), pattern.assignments, strict=True))
+    letter |= dict.fromkeys(map(tuple, pattern.welds.tolist()), "F")  # nothing folds there
     outer = set(pattern.boundary.ravel().tolist())
     rows = []
     for vertex, corners in _corners(pattern).items():

@@ -13,9 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns import crease_data
 from foldyn.patterns.boards import Boards
-from foldyn.patterns.crease_data import vertex_pair
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
-from foldyn.patterns.topology import Edge, build_topology, checked_faces, edge_lookup
+from foldyn.patterns.topology import (
+    Edge,
+    Topology,
+    build_topology,
+    checked_faces,
+    edge_lookup,
+    vertex_pair,
+)
 from foldyn.patterns.transforms import Transforms
 from foldyn.values import LONGEST, SHORTEST
 
@@ -53,6 +59,9 @@ class Pattern(Transforms):
         Names for groups of creases, each with vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
     custom : mapping, optional
         Further data of a file that Foldyn does not read, kept to be written again.
+    welds : sequence of (vertex, vertex)
+        Edges of two panels across which the sheet runs on: they are no creases but lines in it,
+        as along the facets of a curved panel; see `welded`.
 
     Attributes
     ----------
@@ -66,10 +75,12 @@ class Pattern(Transforms):
         For each face, whether its winding was reversed. A reversed face keeps its first
         vertex: (v1, v2, v3, v4) becomes (v1, v4, v3, v2).
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        All edges, those shared by two faces, and those of one face, as (low, high) vertex
-        pairs in lexicographic order.
+        All edges, those shared by two faces but for welds, and those of one face, as (low, high)
+        vertex pairs in lexicographic order.
     crease_faces : ndarray of int, shape (nc, 2)
         The face that runs along the crease from low to high, and the one from high to low.
+    welds, weld_faces, weld_dihedrals
+        The same as `creases`, `crease_faces` and `dihedrals` of welds.
     dihedrals : ndarray, shape (nc,)
         Angle between the two panels across each crease (rad, 0 to 2 pi) seen from the front:
         pi when flat, below pi on a valley, above on a mountain. Where panels coincide the
@@ -110,12 +121,15 @@ class Pattern(Transforms):
     fold_angles: NDArray[np.float64]
     families: Mapping[str, NDArray[np.int64]]
     custom: Mapping[str, Any]
+    welds: NDArray[np.int64]
     flipped: tuple[bool, ...] = field(init=False)
     edges: NDArray[np.int64] = field(init=False)
     creases: NDArray[np.int64] = field(init=False)
     boundary: NDArray[np.int64] = field(init=False)
     crease_faces: NDArray[np.int64] = field(init=False)
+    weld_faces: NDArray[np.int64] = field(init=False)
     dihedrals: NDArray[np.float64] = field(init=False)
+    weld_dihedrals: NDArray[np.float64] = field(init=False)
     flat_dihedrals: NDArray[np.float64] = field(init=False)
     face_areas: NDArray[np.float64] = field(init=False)
     face_normals: NDArray[np.float64] = field(init=False)
@@ -132,17 +146,25 @@ class Pattern(Transforms):
         fold_angles: Mapping[tuple[int, int], float] | ArrayLike | None = None,
         families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
         custom: Mapping[str, Any] | None = None,
+        welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
     ) -> None:
         if not isinstance(name, str):
             raise InputError(f"name = {name!r}: give a string.")
         points = _checked_vertices(vertices)
-        topology = build_topology(checked_faces(faces, len(points)), len(points))
+        topology = build_topology(checked_faces(faces, len(points)), len(points), welds)
         geometry = face_geometry(points, topology.faces)
         normals = geometry.face_normals
         graph = topology.creases, topology.crease_faces
         dihedrals, closed = crease_dihedrals(points, normals, *graph)
-        given, open_edges = _given_letters(assignments, topology.creases, topology.boundary)
+        given, open_edges = _given_letters(assignments, topology)
         dihedrals[closed & (given == "M")] = 2 * np.pi
+        bent, shut = crease_dihedrals(points, normals, topology.welds, topology.weld_faces)
+        if shut.any():
+            raise InputError(
+                f": the panels at {tuple(topology.welds[shut][0].tolist())} lie upon each other; "
+                "a sheet cannot run on there: make it a crease",
+                "welds",
+            )
         apart, flat = dihedrals, np.full(len(dihedrals), np.pi)
         if boards is not None:
             boards.check(topology.faces)
@@ -162,6 +184,7 @@ class Pattern(Transforms):
             "families": crease_data.families(families, topology.creases),
             "custom": dict(custom or {}),
             "dihedrals": dihedrals,
+            "weld_dihedrals": bent,
             "flat_dihedrals": flat,
             "size": float(np.linalg.norm(np.ptp(points, axis=0))),
         }
@@ -170,12 +193,18 @@ class Pattern(Transforms):
                 value.setflags(write=False)
             object.__setattr__(self, key, value)
 
+    @property
+    def lines(self) -> NDArray[np.int64]:
+        """All edges by what they are, shape (m, 2): creases, then boundary edges, then welds."""
+        return np.concatenate([self.creases, self.boundary, self.welds]).reshape(-1, 2)
+
     def __repr__(self) -> str:
         """One line: name and counts."""
         label = f"{self.name!r}: " if self.name else ""
+        welds = f", {len(self.welds)} welds" if len(self.welds) else ""
         return (
             f"<Pattern {label}{len(self.vertices)} vertices, {len(self.faces)} faces, "
-            f"{len(self.creases)} creases>"
+            f"{len(self.creases)} creases{welds}>"
         )
 
 
@@ -216,16 +245,16 @@ def _letters(dihedrals: NDArray[np.float64]) -> NDArray[np.str_]:
     return np.select([dihedrals < np.pi - _FLAT, dihedrals > np.pi + _FLAT], ["V", "M"], "F")
 
 
-def _given_letters(
-    assignments: Any, creases: NDArray[np.int64], boundary: NDArray[np.int64]
-) -> tuple[NDArray[np.str_], set[Edge]]:
+def _given_letters(assignments: Any, topology: Topology) -> tuple[NDArray[np.str_], set[Edge]]:
     """Letter given for each crease, "" where there is none, and the edges given as "B"."""
+    creases = topology.creases
     given = np.full(len(creases), "", dtype="<U1")
     boundary_edges: set[Edge] = set()
     if assignments is None:
         return given, boundary_edges
     if isinstance(assignments, Mapping):
-        row, rim = edge_lookup(creases), edge_lookup(boundary)
+        row, rim = edge_lookup(creases), edge_lookup(topology.boundary)
+        welds = edge_lookup(topology.welds)
         before: dict[Edge, Any] = {}
         for key, letter in assignments.items():
             pair = vertex_pair("assignments", key)
@@ -236,6 +265,12 @@ def _given_letters(
                 )
             if pair in row:
                 given[row[pair]] = _checked_letter(letter, pair)
+            elif pair in welds:
+                if letter != "F":
+                    raise InputError(
+                        f'assignments: edge {pair} is {letter!r} but welded; give "F", leave it '
+                        "out, or take it from the welds."
+                    )
             elif pair not in rim:
                 raise InputError(
                     f"assignments: {pair} is not an edge of any face; name the two vertices of "

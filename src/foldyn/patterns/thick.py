@@ -116,6 +116,13 @@ def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
         )
     if not (sizes >= SHORTEST).all():
         raise InputError(f" = {show(given)}: must be greater than 0", "thickness")
+    if len(pattern.welds):
+        one, two = pattern.weld_faces[0].tolist()
+        raise InputError(
+            f": panels {one} and {two} are welded to one sheet, and boards are not; make the weld "
+            "a crease",
+            "pattern",
+        )
     bent = np.flatnonzero(pattern.face_planarity > SAME)
     if bent.size:
         raise InputError(f": panel {bent[0]} is not flat, and a board is; cut it in two", "pattern")

@@ -26,9 +26,12 @@ class Topology(NamedTuple):
     flipped : tuple of bool
         For each face, whether the winding given was reversed.
     edges, creases, boundary : ndarray of int, shape (m, 2)
-        Vertex pairs (low, high) in lexicographic order: all edges, those of two faces, of one.
+        Vertex pairs (low, high) in lexicographic order: all edges, those of two faces but for
+        welds, of one.
     crease_faces : ndarray of int, shape (nc, 2)
         For each crease the face that runs low to high and the face that runs high to low.
+    welds, weld_faces : ndarray of int, shape (nw, 2)
+        The same of edges of two faces across which the sheet runs on.
     """
 
     faces: Faces
@@ -37,6 +40,8 @@ class Topology(NamedTuple):
     creases: NDArray[np.int64]
     boundary: NDArray[np.int64]
     crease_faces: NDArray[np.int64]
+    welds: NDArray[np.int64]
+    weld_faces: NDArray[np.int64]
 
 
 def checked_faces(faces: Any, n_vertices: int) -> Faces:
@@ -113,7 +118,7 @@ def _checked_face(f: int, face: Any, n_vertices: int) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def build_topology(faces: Faces, n_vertices: int) -> Topology:
+def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     """Edges, creases and a consistent winding of checked faces.
 
     Each connected component is walked from its lowest-numbered face, whose winding stays;
@@ -126,6 +131,8 @@ def build_topology(faces: Faces, n_vertices: int) -> Topology:
         Faces that passed `checked_faces`.
     n_vertices : int
         Number of vertices.
+    welds : sequence of (vertex, vertex)
+        Edges of two faces across which the sheet runs on.
 
     Returns
     -------
@@ -135,7 +142,8 @@ def build_topology(faces: Faces, n_vertices: int) -> Topology:
     Raises
     ------
     InputError
-        An edge of more than two faces, or a surface with only one side.
+        An edge of more than two faces, a surface with only one side, or a weld that is no edge of
+        two faces.
     """
     sizes = np.array([len(face) for face in faces])
     owner = np.repeat(np.arange(len(faces)), sizes)
@@ -167,7 +175,22 @@ def build_topology(faces: Faces, n_vertices: int) -> Topology:
     lower_runs_forward = forward[shared] ^ reverse[pairs[:, 0]]
     crease_faces = np.where(lower_runs_forward[:, None], pairs, pairs[:, ::-1])
     flipped = tuple(bool(turn) for turn in reverse)
-    return Topology(wound, flipped, edges, creases, edges[count == 1], crease_faces)
+    welded = _welded(welds, creases)
+    return Topology(
+        wound, flipped, edges, creases[~welded], edges[count == 1], crease_faces[~welded],
+        creases[welded], crease_faces[welded],
+    )  # fmt: skip
+
+
+def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
+    """Which of the edges of two faces (k, 2) are `welds`, pairs of vertices."""
+    row, chosen = edge_lookup(shared), np.zeros(len(shared), bool)
+    for pair in welds:
+        edge = vertex_pair("welds", pair)
+        if edge not in row:
+            raise InputError(f": {edge} is not an edge of two panels; leave it out", "welds")
+        chosen[row[edge]] = True
+    return chosen
 
 
 def _reversals(n_faces: int, pairs: NDArray, clash: NDArray, creases: NDArray) -> NDArray:
@@ -211,6 +234,19 @@ def edge_lookup(edges: NDArray) -> dict[Edge, int]:
 def edge_of(a: int, b: int) -> Edge:
     """Vertex pair (low, high) of an edge."""
     return (a, b) if a < b else (b, a)
+
+
+def vertex_pair(field: str, key: Any) -> Edge:
+    """Edge (low, high) that a pair of vertex numbers names."""
+    try:
+        if isinstance(key, str):
+            raise TypeError
+        a, b = (operator.index(v) for v in key)
+    except (TypeError, ValueError):
+        raise InputError(
+            f": key {key!r} is not a pair of vertex numbers; write (0, 1)", field
+        ) from None
+    return edge_of(a, b)
 
 
 def around(face: Sequence[int]) -> Iterator[Edge]:

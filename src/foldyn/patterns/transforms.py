@@ -39,6 +39,7 @@ class Transforms:
         flipped: tuple[bool, ...]
         creases: NDArray[np.int64]
         boundary: NDArray[np.int64]
+        welds: NDArray[np.int64]
         crease_faces: NDArray[np.int64]
         dihedrals: NDArray[np.float64]
         size: float
@@ -220,6 +221,7 @@ class Transforms:
             "fold_angles": self.fold_angles,
             "families": {name: self.creases[rows] for name, rows in self.families.items()},
             "custom": self.custom,
+            "welds": self.welds,
         }
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
@@ -256,15 +258,17 @@ def _joined(
     angles: dict[tuple[int, int], float] = {}
     families: dict[str, list[tuple[int, int]]] = {}
     custom: dict[str, Any] = {}
+    welds: list[tuple[int, int]] = []
     starts = []
     for (sheet, _), numbers_ in zip(sheets, glued.numbers, strict=True):
         starts.append(len(faces))
         faces += [tuple(numbers_[list(face)].tolist()) for face in sheet.faces]
+        welds += numbers_[sheet.welds].tolist()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FoldynWarning)
         bare = first.changed(
             vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
-            families=None, custom=None,
+            families=None, custom=None, welds=welds,
         )  # fmt: skip
     flat = np.abs(bare.dihedrals - np.pi) < FLAT
     for k, pair in enumerate(bare.creases.tolist()):

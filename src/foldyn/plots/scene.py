@@ -77,12 +77,13 @@ class Sheet3D:
 
     @cached_property
     def edges(self) -> Indices:
-        """Nodes along each edge of the pattern, creases first, shape (ne, p).
+        """Nodes along each edge of the pattern but for welds, creases first, shape (ne, p).
 
         p is 2, or for a shell the number of nodes along an edge, which bends.
         """
+        count = len(self._creases) + len(self.pattern.boundary)
         if hasattr(self.structure, "edge_nodes"):
-            return np.asarray(self.structure.edge_nodes, dtype=np.int64)
+            return np.asarray(self.structure.edge_nodes, dtype=np.int64)[:count]
         both = [np.reshape(pairs, (-1, 2)) for pairs in (self._creases, self.pattern.boundary)]
         return np.concatenate(both).astype(np.int64)
 

@@ -320,6 +320,7 @@ def _case_variables(document: Document) -> dict[str, Any]:
         "face_offsets": ("face_bound",),
         "assignments": ("crease",),
         "fold_angles": ("crease",),
+        "welds": ("weld", "end"),
         "board_corners": ("face_corner", "axis"),
         "board_thickness": ("face",),
         "tables_crease_stiffness": ("crease",),

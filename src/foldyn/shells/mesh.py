@@ -58,10 +58,7 @@ def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
     polygons are first cut into triangles about the mean of their corners.
     """
     points = _Points(pattern.vertices)
-    edges = {
-        (low, high): points.line(low, high, divisions)
-        for low, high in np.concatenate([pattern.creases, pattern.boundary]).tolist()
-    }
+    edges = {(low, high): points.line(low, high, divisions) for low, high in pattern.lines.tolist()}
     triangles, panels = [], []
     for number, face in enumerate(pattern.faces):
         sides = [_side(edges, a, b) for a, b in around(face)]

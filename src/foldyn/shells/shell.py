@@ -31,7 +31,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
-from foldyn.structures.rigid_plates import Plate, checked_panels, rigid_plates
+from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
 
@@ -185,7 +185,7 @@ class Shell(Discretized):
     @cached_property
     def edge_nodes(self) -> NDArray:
         """See `Discretized`; p is divisions + 1."""
-        ends = np.concatenate([self.pattern.creases, self.pattern.boundary]).reshape(-1, 2)
+        ends = self.pattern.lines
         count = self.options.divisions - 1
         inner = len(self.pattern.vertices) + np.arange(len(ends) * count).reshape(len(ends), count)
         return read_only(np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1))
@@ -364,6 +364,7 @@ def shell(
     hinge_law(fold_law, "fold_law")
     edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
+    check_welds(plates, pattern)
     options = ShellOptions(divisions, mass, fold_law, crease_stiffness, crease_rest, edges, plates)
     nodes = sum(divisions**2 * (1 if len(face) == 4 else len(face) / 2) for face in pattern.faces)
     check_memory(

@@ -12,12 +12,13 @@ bending    kappa = sum_k (L_k / A) beta_k n_k n_k^T,  beta_k the rotation, about
 Numer. Methods Eng. 35, 1992). Plane stress with E, nu, t gives energies e K_m e / 2 and
 beta K_b beta / 2.
 
-On a side shared by two triangles of one panel the sheet is smooth: with d the change of the
-dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a rotation without mass. On a
-crease each side has a rotation of its own, and the crease turns by what is left of the dihedral,
-d - x - y. Free sides have no moment: their rotation is eliminated in the triangle. A clamped side
-keeps its rest tangent in space: its hinge has a wing that is no node and rides on the mean
-displacement of the side's ends. The sides of rigid panels, which stay flat, have no rotations.
+On a side shared by two triangles of one panel, and along a weld of two panels, the sheet is smooth:
+with d the change of the dihedral there, one side turns by d/2 + x and the other by d/2 - x, x a
+rotation without mass. On a crease each side has a rotation of its own, and the crease turns by what
+is left of the dihedral, d - x - y. Free sides have no moment: their rotation is eliminated in the
+triangle. A clamped side keeps its rest tangent in space: its hinge has a wing that is no node and
+rides on the mean displacement of the side's ends. The sides of rigid panels, which stay flat, have
+no rotations.
 """
 
 from __future__ import annotations
@@ -85,6 +86,8 @@ def sides(
     weight, sign = np.zeros((2, 3 * count))
     numbers = np.arange(len(one))
     folded = mesh.panel[one // 3] != mesh.panel[two // 3]
+    between = zip(low[one[folded]].tolist(), high[one[folded]].tolist(), strict=True)
+    folded[folded] = [pair in crease_of for pair in between]
     smooth = ~folded
     for side, turn in ((one, 1.0), (two, -1.0)):
         hinge[side[smooth]], weight[side[smooth]] = numbers[smooth], 0.5

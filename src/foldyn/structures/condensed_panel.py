@@ -3,9 +3,11 @@
 The angles of a panel of m corners are the turns of its m spokes (none in a triangle) and, of each
 edge that is a crease, the turn beta of the sheet there against the facet of the spokes at that
 edge, averaged along the edge. Their energy 1/2 phi^T K phi is the least that a plate can have which
-goes through the corners and the center, keeps its creased edges straight and has these mean turns;
-other edges are free. The plate is made of triangles of constant curvature (Morley; in
-`mechanics.triangle`), twice, and K extrapolated in their size.
+goes through the corners and the center, keeps its straight edges straight and has these mean turns;
+other edges are free. An edge along which the sheet runs on into the next panel also has a bow: the
+mean distance of the sheet from the line between its ends, over its length. The plate is made of
+triangles of constant curvature (Morley; in `mechanics.triangle`), twice, and K extrapolated in
+their size.
 """
 
 from __future__ import annotations
@@ -25,19 +27,20 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     """Stiffness (q, q) of a panel's angles over its bending stiffness E t^3/(12 (1 - nu^2)).
 
     The angles: turns of the spokes, in the order of the corners (none in a triangle), then of the
-    creased edges, in their order. A turn is the increase of a dihedral, seen from the front.
+    creased edges, then the bows, in their order. A turn is the increase of a dihedral, seen from
+    the front, and a bow positive towards it.
     """
     coarse, fine = (_condensed(panel, poissons_ratio, n) for n in (COARSE, FINE))
     ratio = (FINE / COARSE) ** 2
     stiffness = fine + (fine - coarse) / (ratio - 1.0)
     points, corners = _points(panel), len(panel.corners)
-    edges = np.flatnonzero(panel.creased)
     held = heights_and_slopes(panel)
     stiffness = held.T @ stiffness @ held
     spokes = _spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
-    turned = np.zeros((len(stiffness), len(spokes) + len(edges)))
+    others = len(stiffness) - len(points)
+    turned = np.zeros((len(stiffness), len(spokes) + others))
     turned[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
-    turned[len(points) :, len(spokes) :] = np.eye(len(edges))
+    turned[len(points) :, len(spokes) :] = np.eye(others)
     out = turned.T @ stiffness @ turned
     out = 0.5 * (out + out.T)
     out.setflags(write=False)
@@ -45,12 +48,15 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
 
 
 def heights_and_slopes(panel: Outline) -> NDArray:
-    """Heights of corners and center and outward slopes of creases, of heights and turns beta."""
+    """Heights of corners and center, outward slopes of creases, and bows: with turns for slopes.
+
+    A matrix, by which the turns beta take the place of the slopes.
+    """
     points, edges = _points(panel), np.flatnonzero(panel.creased)
-    count = len(points)
-    out = np.eye(count + len(edges))
-    out[count:, :count] = _facet_slopes(points, len(panel.corners))[edges]
-    out[count:, count:] = -np.eye(len(edges))
+    turning = slice(len(points), len(points) + len(edges))
+    out = np.eye(turning.stop + sum(panel.bowed))
+    out[turning, : len(points)] = _facet_slopes(points, len(panel.corners))[edges]
+    out[turning, turning] *= -1.0
     return out
 
 
@@ -88,9 +94,9 @@ def _spoke_turns(points: NDArray, corners: int) -> NDArray:
 
 
 def _condensed(panel: Outline, poissons_ratio: float, n: int) -> NDArray:
-    """Stiffness of the heights of corners and center and the mean outward slopes of creases."""
+    """Stiffness of the heights of corners and center, mean outward slopes of creases, and bows."""
     plate = PanelPlate(panel, poissons_ratio, n)
-    return plate.solved([*plate.heights, *plate.slopes])[1]
+    return plate.solved([*plate.heights, *plate.slopes, *plate.bows])[1]
 
 
 @lru_cache(maxsize=4096)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import FoldynWarning, InputError
 from foldyn.materials import BarLaw, HingeLaw
 from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
@@ -18,9 +19,9 @@ from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
-from foldyn.structures.plate import panel_plates
+from foldyn.structures.plate import panel_plates, weld_stiffness
 from foldyn.structures.presets import resolved
-from foldyn.structures.rigid_plates import checked_panels
+from foldyn.structures.rigid_plates import check_welds, checked_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import Structure
 from foldyn.values import vector
@@ -89,8 +90,9 @@ def discretize(
         bow between their ends.
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
-        but that of the scheme "n5b8e" where this is given, and "herkal", the paper's, where a
-        calibration other than "plate" is given, or `bend_law="superlinear"` and no calibration.
+        but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,
+        where a calibration other than "plate" is given, or `bend_law="superlinear"` and no
+        calibration.
 
     Returns
     -------
@@ -112,11 +114,20 @@ def discretize(
     check_kinds(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
-        preset, scheme=scheme, mass=mass, bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
+        preset, welds=len(pattern.welds) > 0, scheme=scheme, mass=mass,
+        bar_law=bar_law, fold_law=fold_law, bend_law=bend_law,
         calibration=calibration, crease_stiffness=crease_stiffness, crease_rest=crease_rest,
         clamped=edges, rigid=checked_panels(rigid, len(pattern.faces)),
         straight=boundary_edges(straight, pattern, "straight"),
     )  # fmt: skip
+    check_welds(options.rigid, pattern)
+    if len(pattern.welds) and options.scheme != "n5b8e":
+        warnings.warn(
+            f"pattern: its welds ({len(pattern.welds)}) become hinges, which bend as the sheet "
+            'does only roughly: take preset = "n5b8e", or a shell',
+            FoldynWarning,
+            stacklevel=2,
+        )
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     calibrate.check_sheet(sheet, pattern)
@@ -124,31 +135,32 @@ def discretize(
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
-    outer = np.concatenate([pattern.creases, pattern.boundary]).reshape(-1, 2)
-    area = np.concatenate([inner_area, [edge_area[a, b] for a, b in outer.tolist()]])
+    area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
-    bends, onset = calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), np.zeros(0)
+    welds, onset = weld_stiffness(pattern, sheet), np.zeros(0)
+    bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates = None
     if options.scheme == "n5b8e":
         every = range(len(pattern.faces))
         plates = edge_plates(
-            mesh.nodes, mesh.centers, mesh.folds, pattern, sheet, options.straight,
+            mesh, pattern, sheet, options.straight,
             every if isinstance(options.rigid, str) else options.rigid or (),
         )  # fmt: skip
-        bends = spoke_stiffness(plates, len(mesh.folds), len(mesh.bends))
+        bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
     elif options.calibration == "plate":
         plated = panel_plates(mesh, pattern, sheet, options.rigid)
-        folds, bends, large = plated.folds(folds), plated.bends, bends
+        folds, large = plated.folds(folds), bends
+        bends = np.concatenate([plated.bends, welds])
         onset = plate_onset(bends, large)
 
-    x = mesh.nodes
+    x, hinges = mesh.nodes, np.concatenate([mesh.bends, mesh.welds])
     clamps, clamped_triangle = clamp_rows(edges, mesh.triangles)
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     structure = Structure(
         nodes=x,
-        bars=np.concatenate([mesh.inner, outer]),
+        bars=np.concatenate([mesh.inner, pattern.lines]),
         bar_area=area,
         sheet=sheet,
         options=options,
@@ -156,9 +168,9 @@ def discretize(
         folds=mesh.folds,
         fold_stiffness=folds,
         fold_rest=fold_rest(options.crease_rest, mesh.folds, x, pattern),
-        bends=mesh.bends,
+        bends=hinges,
         bend_stiffness=bends,
-        bend_rest=hinge_angles(x, mesh.bends),
+        bend_rest=hinge_angles(x, hinges),
         bend_onset=onset,
         triangles=mesh.triangles,
         triangle_panel=mesh.triangle_panel,

@@ -151,10 +151,11 @@ class Discretized:
     def edge_nodes(self) -> NDArray:
         """Nodes along each edge of the pattern (ne, p), from its lower to its higher vertex.
 
-        The creases come first, in their order, then the boundary edges in that of
-        `pattern.boundary`; p is 2, or more for a structure that cuts edges into pieces.
+        The creases come first, in their order, then the boundary edges and the welds in those of
+        `pattern.boundary` and `pattern.welds`; p is 2, or more for a structure that cuts edges into
+        pieces.
         """
-        return read_only(np.concatenate([self.pattern.creases, self.pattern.boundary]))
+        return read_only(np.array(self.pattern.lines))
 
     @property
     def coarser(self) -> Discretized | None:
@@ -185,6 +186,7 @@ class Discretized:
         if self.sheet.density is None:
             raise InputError("sheet: density is missing: give it (kg/m3), the mass needs it")
         faces = self.pattern.faces if self.pattern is not None else ()
+        welds = self.pattern.welds.tolist() if self.pattern is not None else []
         count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
         area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         areal_density = self.sheet.values("areal_density", count)
@@ -199,6 +201,7 @@ class Discretized:
             triangle_panel=self.triangle_panel,
             triangle_area=area,
             areal_density=areal_density,
+            welds=tuple((low, high) for low, high in welds),
         )
 
     def _displacement(self, u: ArrayLike) -> NDArray:

@@ -7,6 +7,10 @@ with the stiffness of the crease alone.
 A crease between panels that are not in one plane stays straight, because bowing would stretch them:
 by w^2 for a bow w out of the plane of one is w sin(fold) in the plane of the other, against t^2.
 It counts as such above `STRAIGHT` t/L, t the thickness and L its length.
+
+Along a weld the sheet is smooth: with d the change of the dihedral of the facets there, one panel
+turns by d/2 + x and the other by d/2 - x, x a rotation that they share. Where it does not stay
+straight they share its bow as well.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from foldyn import mechanics
 from foldyn.materials import BarLaw, HingeLaw
@@ -23,7 +28,7 @@ from foldyn.mechanics.plates import BarsPlates
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, edge_of
 from foldyn.structures.condensed_panel import panel_stiffness
-from foldyn.structures.mesh import hinge_angles, lengths
+from foldyn.structures.mesh import Mesh, hinge_angles, lengths
 from foldyn.structures.panel_plate import Outline, outline
 from foldyn.structures.sheet import Sheet
 
@@ -33,6 +38,7 @@ STRAIGHT = 3.0
 class EdgePlates(NamedTuple):
     """Panels as plates: what `BarsPlates` has of them."""
 
+    rotation_hinge: NDArray
     fold_rotations: NDArray
     start: NDArray
     angle: NDArray
@@ -41,7 +47,7 @@ class EdgePlates(NamedTuple):
 
 
 def edge_plates(
-    nodes: NDArray, centers: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet,
+    mesh: Mesh, pattern: Pattern, sheet: Sheet,
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
 ) -> EdgePlates:  # fmt: skip
     """Panels of a mesh with center nodes as plates.
@@ -50,29 +56,57 @@ def edge_plates(
     rigid : numbers of rigid panels, which have no angles.
     """
     kinds, kind = sheet.kinds(len(pattern.faces))
-    crease = edge_lookup(pattern.creases)
-    panels = outlines(nodes, centers, folds, pattern, sheet, straight_edges, rigid)
-    spokes = [len(face) if centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
-    first = len(folds) + np.concatenate([[0], np.cumsum(spokes)])
-    rotations = np.full((len(folds), 2), -1)
+    folds, bends = len(mesh.folds), len(mesh.bends)
+    hinge = edge_lookup(pattern.creases)
+    hinge |= {edge: folds + bends + k for edge, k in edge_lookup(pattern.welds).items()}
+    hinges = np.concatenate([mesh.folds, mesh.welds])
+    panels = outlines(mesh.nodes, mesh.centers, hinges, pattern, sheet, straight_edges, rigid)
+    spokes = [len(face) if mesh.centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
+    first = folds + np.concatenate([[0], np.cumsum(spokes)])
+    rotations = np.full((folds, 2), -1)
+    beside: list[int] = []
+    shared: dict[tuple[int, str], int] = {}
+
+    def number(k: int, what: str) -> int:
+        """Of the rotation that both sides of a weld have."""
+        if (k, what) not in shared:
+            shared[k, what] = len(beside)
+            beside.append(k)
+        return shared[k, what]
+
     angles: list[list[int]] = []
     matrices: list[NDArray] = []
-    count = 0
     for p, face in enumerate(pattern.faces):
         panel = panels[p]
         if panel is None:
             angles.append([])
             continue
+        edges = [edge_of(a, b) for a, b in around(face)]
         turned = list(range(first[p], first[p + 1]))
-        for k in (crease[edge_of(a, b)] for a, b in around(face) if edge_of(a, b) in crease):
-            rotations[k, int(rotations[k, 0] >= 0)] = count
-            turned.append(-1 - count)
-            count += 1
+        parts = [np.eye(len(turned))]
+        for k in (hinge[edge] for edge in edges if edge in hinge):
+            if k < folds:
+                rotations[k, int(rotations[k, 0] >= 0)] = len(beside)
+                turned.append(-1 - len(beside))
+                parts.append(np.ones((1, 1)))
+                beside.append(k)
+            else:  # the dihedral there, and the rotation that both sides have
+                first_side = (k, "turn") not in shared
+                turned += [k, -1 - number(k, "turn")]
+                parts.append(np.array([[0.5, 1.0 if first_side else -1.0]]))
+        for edge in (edge for edge, bow in zip(edges, panel.bowed, strict=True) if bow):
+            turned.append(-1 - number(hinge[edge], "bow"))
+            parts.append(np.ones((1, 1)))
         own = kinds[kind[p]]
-        matrices.append(own.bending_modulus * panel_stiffness(panel, own.poissons_ratio))
+        matrix = own.bending_modulus * panel_stiffness(panel, own.poissons_ratio)
+        if any(k >= folds + bends for k in turned):
+            turns = block_diag(*parts)
+            matrix = turns.T @ matrix @ turns
+        matrices.append(matrix)
         angles.append(turned)
     sizes = [len(turned) for turned in angles]
     return EdgePlates(
+        rotation_hinge=np.array(beside, np.int64),
         fold_rotations=rotations,
         start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
         angle=np.array([k for turned in angles for k in turned], np.int64),
@@ -82,33 +116,42 @@ def edge_plates(
 
 
 def outlines(
-    nodes: NDArray, centers: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet,
+    nodes: NDArray, centers: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet,
     straight_edges: Collection[Edge] = (), rigid: Collection[int] = (),
 ) -> list[Outline | None]:  # fmt: skip
-    """Outline of each panel; None of a rigid one. Arguments as of `edge_plates`."""
-    crease = edge_lookup(pattern.creases)
-    straight = straight_creases(nodes, folds, pattern, sheet)
+    """Outline of each panel; None of a rigid one. Welds count as creases, which may bow.
+
+    Arguments as of `straight_creases` and `edge_plates`.
+    """
+    bent = np.concatenate([pattern.creases, pattern.welds])
+    straight = set(edge_lookup(bent[straight_creases(nodes, hinges, pattern, sheet)]))
+    straight |= set(straight_edges)
+    hinged, welds = edge_lookup(bent), edge_lookup(pattern.welds)
     found: list[Outline | None] = []
     for p, face in enumerate(pattern.faces):
         if p in rigid:
             found.append(None)
             continue
-        edges = [crease.get(edge_of(a, b), -1) for a, b in around(face)]
-        center = nodes[centers[p]] if centers[p] >= 0 else None
-        held = [
-            bool(straight[k]) if k >= 0 else edge_of(a, b) in straight_edges
-            for k, (a, b) in zip(edges, around(face), strict=True)
-        ]
-        x = pattern.vertices[list(face)]
-        found.append(outline(x, center, [k >= 0 for k in edges], held))
+        edges = [edge_of(a, b) for a, b in around(face)]
+        found.append(
+            outline(
+                pattern.vertices[list(face)],
+                nodes[centers[p]] if centers[p] >= 0 else None,
+                [edge in hinged for edge in edges],
+                [edge in straight for edge in edges],
+                [edge in welds and edge not in straight for edge in edges],
+            )
+        )
     return found
 
 
-def straight_creases(nodes: NDArray, folds: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
-    """Which creases (nf,) stay straight, for the hinges `folds` on them."""
-    thickness = sheet.values("thickness", len(pattern.faces))[pattern.crease_faces].max(axis=1)
-    slender = thickness / lengths(pattern.vertices, pattern.creases)
-    return np.abs(np.sin(hinge_angles(nodes, folds))) > STRAIGHT * slender
+def straight_creases(nodes: NDArray, hinges: NDArray, pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Which creases and welds (nf + nw,) stay straight, for the hinges on them in this order."""
+    edges = np.concatenate([pattern.creases, pattern.welds])
+    faces = np.concatenate([pattern.crease_faces, pattern.weld_faces])
+    thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1)
+    slender = thickness / lengths(pattern.vertices, edges)
+    return np.abs(np.sin(hinge_angles(nodes, hinges))) > STRAIGHT * slender
 
 
 def plates_model(
@@ -120,7 +163,7 @@ def plates_model(
     length = lengths(nodes, bars)
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
-        rotations=int((plates.fold_rotations >= 0).sum()),
+        rotations=len(plates.rotation_hinge),
         per_reach=1.0 / float(np.sqrt((length**2).mean())),
         hinges=np.concatenate([folds, bends]).astype(np.int64),
         fold_stiffness=np.array(fold_stiffness, float),
@@ -140,5 +183,5 @@ def spoke_stiffness(plates: EdgePlates, folds: int, bends: int) -> NDArray:
         count = plates.start[p + 1] - first
         own = plates.angle[first : first + count]
         diagonal = plates.stiffness[plates.entry[p] : plates.entry[p + 1]][:: count + 1]
-        out[own[own >= 0] - folds] = diagonal[own >= 0]
+        out[own[own >= 0] - folds] += diagonal[own >= 0]
     return out

@@ -33,6 +33,7 @@ class Surface(NamedTuple):
     triangle_panel: NDArray  # (nt,)
     triangle_area: NDArray  # (nt,) m2
     areal_density: NDArray  # (np,) kg/m2
+    welds: tuple[tuple[int, int], ...]  # edges (low, high) across which the sheet runs on
 
     @property
     def panel_mass(self) -> NDArray:
@@ -215,9 +216,9 @@ def condensed(surface: Surface) -> sparse.csr_array:
     """Mass of panels that follow their corners and center as thin plates do.
 
     Between these a panel takes the shape of a plate with no moments at its edges and straight
-    creases; see `foldyn.structures.condensed_panel`. Panels without a center node have the
-    consistent matrix of their triangles. The shape hardly depends on Poisson's ratio, for which 0.3
-    is taken.
+    creases, while welds bow; see `foldyn.structures.condensed_panel`. Panels without a center node
+    have the consistent matrix of their triangles. The shape hardly depends on Poisson's ratio, for
+    which 0.3 is taken.
     """
     plated = surface.centers >= 0
     rows, columns, values = [], [], []
@@ -238,7 +239,7 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
     Their nodes are the corners, then the center.
     """
     edges = [edge_of(a, b) for face in surface.faces for a, b in around(face)]
-    creases = {edge for edge, count in Counter(edges).items() if count == 2}
+    creases = {edge for edge, count in Counter(edges).items() if count == 2} - set(surface.welds)
     found, total = {}, surface.panel_mass
     for p in np.flatnonzero(surface.centers >= 0).tolist():
         face = surface.faces[p]

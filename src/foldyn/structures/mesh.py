@@ -33,8 +33,8 @@ class Mesh:
         Hinge on each inner bar: axis j, k, wings i, l.
     triangles, triangle_panel : (nt, 3), (nt,)
         Counter-clockwise from the front.
-    folds : (nc, 4)
-        Hinge on each crease, in the pattern's order.
+    folds, welds : (nc, 4), (nw, 4)
+        Hinge on each crease and on each weld, in the pattern's order.
     """
 
     nodes: NDArray
@@ -45,6 +45,7 @@ class Mesh:
     triangles: NDArray
     triangle_panel: NDArray
     folds: NDArray
+    welds: NDArray
 
 
 def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh:
@@ -120,12 +121,16 @@ def _mesh(
         (a, b, third[panel, a, b], third[panel, b, a])
         for panel, (a, b) in zip(inner_panel, inner, strict=True)
     ]
-    folds = [
-        (low, high, third[front, low, high], third[back, high, low])
-        for (low, high), (front, back) in zip(
-            pattern.creases.tolist(), pattern.crease_faces.tolist(), strict=True
+    folds, welds = (
+        [
+            (low, high, third[front, low, high], third[back, high, low])
+            for (low, high), (front, back) in zip(edges.tolist(), faces.tolist(), strict=True)
+        ]
+        for edges, faces in (
+            (pattern.creases, pattern.crease_faces),
+            (pattern.welds, pattern.weld_faces),
         )
-    ]
+    )
     mesh = Mesh(
         nodes=nodes,
         centers=centers,
@@ -135,6 +140,7 @@ def _mesh(
         triangles=_rows(triangles, 3),
         triangle_panel=np.array(triangle_panel, np.int64),
         folds=_rows(folds, 4),
+        welds=_rows(welds, 4),
     )
     check_triangles(nodes, mesh.triangles, mesh.triangle_panel, pattern, remedy)
     return mesh

@@ -30,12 +30,18 @@ class Outline(NamedTuple):
     center: tuple[float, float] | None  # m; None in a triangle
     creased: tuple[bool, ...]
     straight: tuple[bool, ...]
+    bowed: tuple[bool, ...]
 
 
 def outline(
-    x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool]
+    x: NDArray,
+    center: NDArray | None,
+    creased: list[bool],
+    straight: list[bool],
+    bowed: list[bool] | None = None,
 ) -> Outline:
     """Outline of a panel with corners x (m, 3), of size 1 with its first edge along an axis."""
+    bowed = [False] * len(x) if bowed is None else bowed
     middle = x.mean(axis=0)
     points = x if center is None else np.concatenate([x, center[None]])
     _, _, axes = np.linalg.svd(x - middle)
@@ -46,9 +52,8 @@ def outline(
     e = edge / np.linalg.norm(edge)
     flat = flat @ np.array([[e[0], -e[1]], [e[1], e[0]]]) / np.sqrt(np.linalg.norm(normal))
     rows = tuple((float(a), float(b)) for a, b in flat.round(DIGITS) + 0.0)
-    return Outline(
-        rows[: len(x)], None if center is None else rows[-1], tuple(creased), tuple(straight)
-    )
+    hub = None if center is None else rows[-1]
+    return Outline(rows[: len(x)], hub, tuple(creased), tuple(straight), tuple(bowed))
 
 
 def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
@@ -62,8 +67,8 @@ class PanelPlate:
     """A panel as a plate of small triangles; n pieces of each edge, G = 1.
 
     Its unknowns are heights of the points, then slopes across the sides. `heights` (of corners and
-    center), `slopes` (mean, outward, of creased edges) and `lines` (of points on straight edges off
-    the line between its ends) are linear functions of them: coefficients by number.
+    center), `slopes` (mean, outward, of creased edges), `bows` and `lines` (of points on straight
+    edges off the line between its ends) are linear functions of them: coefficients by number.
     """
 
     def __init__(self, panel: Outline, poissons_ratio: float, n: int) -> None:
@@ -73,7 +78,7 @@ class PanelPlate:
         self.stiffness = _plate(self.points, self.triangles, side, sign, poissons_ratio)
         number = {pair: len(self.points) + k for k, pair in enumerate(map(tuple, ends.tolist()))}
         self.heights = [{node: 1.0} for node in at.tolist()]
-        self.slopes, self.lines = [], []
+        self.slopes, self.bows, self.lines = [], [], []
         for k, nodes in enumerate(edge.tolist() for edge in edges):
             if panel.creased[k]:
                 mean = {
@@ -81,6 +86,11 @@ class PanelPlate:
                     for a, b in pairwise(nodes)
                 }
                 self.slopes.append(mean)
+            if panel.bowed[k]:
+                share = 1.0 / (n * float(np.linalg.norm(x[k] - x[(k + 1) % len(x)])))
+                ends = 0.5 * (1 - n) * share  # the line between them takes them off
+                inner = {node: share for node in nodes[1:-1]}
+                self.bows.append({nodes[0]: ends, nodes[-1]: ends, **inner})
             if panel.straight[k]:
                 for step in range(1, n):
                     part = step / n

@@ -10,9 +10,13 @@ spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the 
                             `POLYGON`, because a plate that only its corners bend is softer;
 its diagonals (N4B5)        2 (1 - nu) G A / D^2, A the area of the two triangles of each;
 fold of length Lf           1/kf' = 1/kf + sum over its two panels of c/G, but for panels that are
-                            rigid; c = `COMPLIANCE` or `TRIANGLE` times A/Lf^2 where not of a quad.
+                            rigid; c = `COMPLIANCE` or `TRIANGLE` times A/Lf^2 where not of a quad;
+weld of length Lf           1/k = sum over its two panels of c/G, a crease that does not turn; c as
+                            `WELD` says times A/Lf^2, 2/3 in triangles, which is a third of their
+                            height: the sheet between the middles of two panels.
 
-Creases between panels that are not in one plane stay straight in these plates, other edges may bow.
+Creases and welds between panels that are not in one plane stay straight in these plates, other
+edges may bow.
 Derivation and errors: docs/fidelity.md.
 """
 
@@ -34,6 +38,7 @@ from foldyn.structures.sheet import Sheet
 COMPLIANCE = 0.12  # c Lf^2/A of panels of more than four corners
 TRIANGLE = (0.22, 0.6)  # of triangles without a free edge, and with one or two
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
+WELD = {"triangle": 2.0 / 3.0, "alone": 0.19}  # c Lf^2/A at a weld; of quads with no other crease
 Panel = tuple[NDArray, NDArray]  # stiffness of its bends and compliance c of its edges, for G = 1
 
 
@@ -61,7 +66,7 @@ def panel_plates(
 ) -> Plates:
     """Panels of a mesh as plates; rigid ones do not give way to their creases."""
     count = len(pattern.faces)
-    number = edge_lookup(pattern.creases)
+    number = edge_lookup(np.concatenate([pattern.creases, pattern.welds]))
     edges = [[number.get(edge_of(a, b), -1) for a, b in around(face)] for face in pattern.faces]
     modulus, nu = (sheet.values(name, count) for name in ("bending_modulus", "poissons_ratio"))
     first = np.searchsorted(mesh.inner_panel, np.arange(count + 1))
@@ -75,18 +80,34 @@ def panel_plates(
         )
         bends[own] = modulus[p] * stiffness
         for k, c in zip(edges[p], compliance.tolist(), strict=True):
-            if k >= 0 and p not in stiff:
+            if 0 <= k < len(creases) and p not in stiff:
                 creases[k] += c / modulus[p]
     return Plates(bends, creases)
 
 
+def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
+    """Stiffness of whole welds (nw,), N m/rad: that of the panels on both sides in series."""
+    free = set(edge_lookup(pattern.boundary))
+    modulus = sheet.values("bending_modulus", len(pattern.faces))
+    compliance = np.zeros(len(pattern.welds))
+    for k, both in enumerate(pattern.weld_faces.tolist()):
+        for p in both:
+            edges = [edge_of(a, b) for a, b in around(pattern.faces[p])]
+            alone = len(edges) == 4 and len(free.intersection(edges)) == 3
+            kind = "triangle" if len(edges) == 3 else "alone" if alone else ""
+            c = WELD.get(kind, COMPLIANCE)
+            compliance[k] += c * pattern.face_areas[p] / modulus[p]
+    return lengths(pattern.vertices, pattern.welds) ** 2 / compliance
+
+
 def _quads(mesh: Mesh, pattern: Pattern, sheet: Sheet, edges: list[list[int]]) -> dict[int, Panel]:
-    """Panels of four corners by number; `edges` has the crease on each edge, -1 on free ones."""
+    """Panels of four corners by number; `edges` has the crease or weld on each edge, or -1."""
     faces = pattern.faces
     quads = np.array([p for p, face in enumerate(faces) if len(face) == 4], np.int64)
     corner = np.array([faces[p] for p in quads], np.int64).reshape(-1, 4)
     crease = np.array([edges[p] for p in quads], np.int64).reshape(-1, 4)
-    straight = np.append(straight_creases(mesh.nodes, mesh.folds, pattern, sheet), False)
+    hinges = np.concatenate([mesh.folds, mesh.welds])
+    straight = np.append(straight_creases(mesh.nodes, hinges, pattern, sheet), False)
     x, center = pattern.vertices[corner], mesh.centers[quads]
     points = np.where((center >= 0)[:, None], mesh.nodes[center], quad_centers(x))
     cut = mesh.inner[np.searchsorted(mesh.inner_panel, quads)]  # its first bar

@@ -231,12 +231,11 @@ class BarsPlatesBody(Body):
 
 
 def positions(model: BarsPlates) -> NDArray:
-    """Where the dofs are (3 rows, 3), m: rotations in the middle of their folds."""
+    """Where the dofs are (3 rows, 3), m: rotations in the middle of their edges."""
     points = np.zeros((3 * model.rows, 3))
     n = model.nodes
     points[: 3 * n] = np.repeat(model.bars.rest, 3, axis=0)
-    middle = model.bars.rest[model.hinges[: len(model.fold_rest), :2]].mean(axis=1)
-    for side in range(2):
-        has = model.fold_rotations[:, side] >= 0
-        points[3 * n + model.fold_rotations[has, side]] = middle[has]
+    points[3 * n : 3 * n + model.rotations] = model.bars.rest[
+        model.hinges[model.rotation_hinge, :2]
+    ].mean(axis=1)
     return points

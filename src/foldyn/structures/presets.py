@@ -2,7 +2,8 @@
 
 A preset gives what is left out. Without one it is "plate", unless an option is given that stands
 for another: the scheme n5b8e; or for the model of the paper, a calibration other than "plate" or
-superlinear bends without a calibration.
+superlinear bends without a calibration. A pattern with welds has "n5b8e" in the place of "plate",
+but with clamped edges: a hinge on a weld cannot bend as a plate does.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from foldyn.structures.structure import ModelOptions
 from foldyn.values import choice, show
 
 PLATE, N5B8E, HERKAL, MERLIN2 = "plate", "n5b8e", "herkal", "merlin2"
+AGAINST_PLATES = ("scheme", "calibration", "bend_law", "clamped")
+"""Options that say how a weld is to bend, or that panels as plates do not take."""
 
 PRESETS: Mapping[str, ModelOptions] = {
     PLATE: ModelOptions(),
@@ -40,13 +43,15 @@ PRESETS: Mapping[str, ModelOptions] = {
 """
 
 
-def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
+def resolved(preset: str | None = None, welds: bool = False, **given: Any) -> ModelOptions:
     """All options of a model.
 
     Parameters
     ----------
     preset : {"plate", "herkal", "merlin2"}, optional
         See the module for what its absence means.
+    welds : bool
+        Whether the pattern has some.
     **given
         Fields of `ModelOptions` that replace those of the preset, unless they are None.
 
@@ -56,7 +61,10 @@ def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
         An option is unknown, or two of them do not go together.
     """
     known = {name: value for name, value in given.items() if value is not None}
-    base = PRESETS[implied(known) if preset is None else choice("preset", preset, PRESETS)]
+    name = implied(known) if preset is None else choice("preset", preset, PRESETS)
+    if preset is None and welds and not any(known.get(key) for key in AGAINST_PLATES):
+        name = N5B8E
+    base = PRESETS[name]
     options = ModelOptions(**{**vars(base), **known})
     choice("mass", options.mass, MASS_RULES)
     bar_law(options.bar_law)

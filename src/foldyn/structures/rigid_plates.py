@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.patterns import Pattern
 from foldyn.values import indices, show
 
 OFF_PLANE = 1e-9  # of the size of three corners: how far a point may lie off their plane
@@ -67,6 +68,19 @@ def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[
                 field,
             )
     return chosen
+
+
+def check_welds(rigid: str | Sequence[int] | None, pattern: Pattern) -> None:
+    """Refuse rigid panels at a weld, across which a sheet bends."""
+    chosen = range(len(pattern.faces)) if isinstance(rigid, str) else rigid or ()
+    for edge, panels in zip(pattern.welds.tolist(), pattern.weld_faces.tolist(), strict=True):
+        for panel in panels:
+            if panel in chosen:
+                raise InputError(
+                    f": panel {panel} is welded to another at ({edge[0]}, {edge[1]}), where the "
+                    "sheet bends; leave it out, or make the weld a crease",
+                    "rigid",
+                )
 
 
 def rigid_plates(

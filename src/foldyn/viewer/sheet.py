@@ -43,9 +43,13 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
 
 
 def edge_pieces(structure: Discretized) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Pieces (k, 2) of the pattern's edges, the kind of each, its edge, and its ends along it."""
-    pattern, rows = structure.pattern, np.asarray(structure.edge_nodes)
+    """Pieces (k, 2) of the pattern's edges, the kind of each, its edge, and its ends along it.
+
+    Welds are left out.
+    """
+    pattern = structure.pattern
     letters = [*pattern.assignments, *"B" * len(pattern.boundary)]
+    rows = np.asarray(structure.edge_nodes)[: len(letters)]
     pairs = np.stack([rows[:, :-1], rows[:, 1:]], axis=2)
     length = np.linalg.norm(np.diff(structure.nodes[pairs], axis=2)[:, :, 0], axis=2)
     end = np.cumsum(length, axis=1)

@@ -66,7 +66,7 @@ class Evaluated(NamedTuple):
 
 
 class FoldEnergy:
-    """The energy of a pattern, of which flat creases that nothing drives are bends.
+    """The energy of a pattern, of which welds and flat creases that nothing drives are bends.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class FoldEnergy:
     stiff : (nc,)
         Whether a crease belongs to a panel.
     bends : int
-        How many hinges lie within panels; those of the creases follow.
+        How many hinges lie within panels or on welds; those of the creases follow.
     size : float
         Mean length of the bars, m.
     """
@@ -83,10 +83,10 @@ class FoldEnergy:
     def __init__(self, pattern: Pattern, stiff: NDArray) -> None:
         mesh = n4b5(pattern)
         bars = np.concatenate([mesh.inner, pattern.edges])
-        hinges = np.concatenate([mesh.bends, mesh.folds])
+        hinges = np.concatenate([mesh.bends, mesh.welds, mesh.folds])
         self.triangles, self.triangle_panel = mesh.triangles, mesh.triangle_panel
         self.diagonals, self.diagonal_panel = mesh.inner, mesh.inner_panel
-        self.bends, self.stiff = len(mesh.bends), stiff
+        self.bends, self.stiff = len(mesh.bends) + len(mesh.welds), stiff
         self.signs = np.where(stiff, 0.0, [SIGNS[letter] for letter in pattern.assignments])
         self.size = float(lengths(pattern.vertices, bars).mean())
         self.center = pattern.vertices.mean(axis=0)

@@ -70,7 +70,7 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
 
     Panels that would fall into slivers, as with three corners on a line, stay whole.
     """
-    bent = np.abs(shape.turns - energy.rest)[: energy.bends] > PLANE
+    bent = np.abs(shape.turns - energy.rest)[: len(energy.diagonals)] > PLANE
     cut = np.setdiff1d(energy.diagonal_panel[bent], _with_slivers(energy, x))
     faces = [face for number, face in enumerate(pattern.faces) if number not in set(cut.tolist())]
     pieces = energy.triangles[np.isin(energy.triangle_panel, cut)]
@@ -91,7 +91,7 @@ def folded_pattern(pattern: Pattern, energy: FoldEnergy, shape: Shape, x: NDArra
         try:
             return Pattern(
                 x, [*faces, *pieces.tolist()], letters, pattern.name, None, wanted, families,
-                pattern.custom,
+                pattern.custom, pattern.welds,
             )  # fmt: skip
         except InputError as error:
             raise ComputationError(

@@ -1,0 +1,159 @@
+"""Facets: lines that divide a panel in a drawing, but along which the sheet is not creased.
+
+Programs that fold patterns cut panels into triangles by such lines, assigned "F". `welded` takes
+them out: two panels become one polygon where this is convex, with every vertex at a corner of it,
+as Hertel and Mehlhorn (Proc. FCT 1983) merge the triangles of a polygon; other facets stay as
+welds, lines across which the sheet runs on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
+
+COPLANAR = 1e-3  # rad: panels that turn by less lie in one plane, as coordinates in a file do
+STRAIGHT = np.radians(15.0)  # corners that turn by less divide an edge
+
+
+def welded(
+    pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None, join: bool = True
+) -> Pattern:
+    """Pattern whose facets are no creases.
+
+    Panels in one plane (within 1e-3 rad) are joined across a facet where that makes a convex
+    polygon with a corner at each of their vertices, across the longest facets first. Other facets
+    become `welds`. Vertices keep their numbers; panels and creases are counted anew, in their
+    order, a joined panel as the first of its parts.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    facets : iterable of (vertex, vertex), optional
+        Creases that are facets; without it all that are assigned "F". Welds that are there already
+        are facets too.
+    join : bool
+        Whether to join panels; otherwise all facets become welds.
+
+    Returns
+    -------
+    Pattern
+
+    Raises
+    ------
+    InputError
+        A facet is no crease or is assigned "M" or "V"; panels of boards; panels that lie upon each
+        other.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> square = fd.Pattern([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
+    >>> fd.welded(square).faces
+    ((0, 1, 2, 3),)
+    """
+    if not isinstance(pattern, Pattern):
+        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    rows = _rows(pattern, facets)
+    edges = np.concatenate([pattern.creases[rows], pattern.welds])
+    if pattern.boards is not None and len(edges):
+        raise InputError(
+            ": thick panels are boards of their own; weld the thin pattern, then thicken it",
+            "facets",
+        )
+    beside = np.concatenate([pattern.crease_faces[rows], pattern.weld_faces])
+    turned = np.concatenate([pattern.dihedrals[rows], pattern.weld_dihedrals]) - np.pi
+    length = np.linalg.norm(np.diff(pattern.vertices[edges], axis=1)[:, 0], axis=1)
+    order = np.lexsort((edges[:, 1], edges[:, 0], -length.round(12)))
+    flat = order[np.abs(turned[order]) <= COPLANAR] if join else order[:0]
+    faces = _joined(pattern, edges[flat].tolist(), beside[flat].tolist())
+    sides = {frozenset(side) for face in faces for side in around(face)}
+    kept = np.setdiff1d(np.arange(len(pattern.creases)), rows)
+    creases = [_pair(pair) for pair in pattern.creases[kept].tolist()]
+    families = {
+        name: pattern.creases[np.intersect1d(members, kept)].tolist()
+        for name, members in pattern.families.items()
+    }
+    return pattern.changed(
+        faces=faces,
+        assignments=dict(zip(creases, np.array(pattern.assignments)[kept].tolist(), strict=True)),
+        fold_angles=dict(zip(creases, pattern.fold_angles[kept].tolist(), strict=True)),
+        families={name: members for name, members in families.items() if members},
+        welds=[pair for pair in edges.tolist() if frozenset(pair) in sides],
+    )
+
+
+def _pair(edge: Sequence[int] | NDArray) -> Edge:
+    return int(edge[0]), int(edge[1])
+
+
+def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
+    """Rows of the creases that are facets."""
+    letters = np.array(pattern.assignments, dtype="<U1")
+    if facets is None:
+        return np.flatnonzero(letters == "F")
+    row, rows = edge_lookup(pattern.creases), set()
+    for facet in facets:
+        pair = vertex_pair("facets", facet)
+        if pair not in row:
+            raise InputError(f": {pair} is not a crease; name its two vertices", "facets")
+        if letters[row[pair]] in ("M", "V"):
+            raise InputError(
+                f': crease {pair} is assigned "{letters[row[pair]]}", so that it folds; assign '
+                'it "F", or leave it out',
+                "facets",
+            )
+        rows.add(row[pair])
+    return np.array(sorted(rows), dtype=np.int64)
+
+
+def _joined(
+    pattern: Pattern, edges: Sequence[Sequence[int]], beside: Sequence[Sequence[int]]
+) -> list[tuple[int, ...]]:
+    """Faces, joined across edges in their order, given the two faces beside each.
+
+    A joined face has the place, the first corner and the plane of the first of its parts.
+    """
+    faces, part_of = list(pattern.faces), list(range(len(pattern.faces)))
+
+    def whole(face: int) -> int:
+        while part_of[face] != face:
+            face = part_of[face]
+        return face
+
+    for edge, both in zip(edges, beside, strict=True):
+        one, two = sorted(whole(face) for face in both)
+        if one == two:
+            continue
+        union = _union(faces[one], faces[two], _pair(edge))
+        if union is not None and _convex(pattern.vertices, union, pattern.face_normals[one]):
+            faces[one], faces[two], part_of[two] = union, (), one
+    return [face for face in faces if face]
+
+
+def _union(one: Sequence[int], two: Sequence[int], edge: Edge) -> tuple[int, ...] | None:
+    """Corners of two faces without the edge that they share; None if they share more."""
+    if len(set(one) & set(two)) > 2:
+        return None
+    a = edge[0] if edge in set(around(one)) else edge[1]  # from which `one` runs along it
+    at, back = one.index(a), two.index(a)
+    beyond = [*two[back:], *two[:back]][1:-1]  # between the two ends of the edge
+    return (*one[: at + 1], *beyond, *one[at + 1 :])
+
+
+def _convex(vertices: NDArray, face: Sequence[int], normal: NDArray) -> bool:
+    """Whether a face lies in the plane across `normal` and turns to the left at every corner."""
+    x = vertices[list(face)]
+    if np.abs((x - x[0]) @ normal).max() > COPLANAR * np.linalg.norm(x - x[0], axis=1).max():
+        return False
+    along = np.roll(x, -1, axis=0) - x
+    before = np.roll(along, 1, axis=0)
+    left = np.einsum("ij,j->i", np.cross(before, along), normal)
+    ahead = np.einsum("ij,ij->i", before, along)
+    return bool((np.arctan2(left, ahead) > STRAIGHT).all())

@@ -1,0 +1,139 @@
+"""Facets: panels joined across lines that are no creases, and welds where they cannot be."""
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+import foldyn as fd
+from foldyn.errors import InputError
+from sheets_with_facets import crossed_miura
+
+SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+@pytest.mark.parametrize("dihedral", [60, 120, 179])
+def test_diagonals_go_and_everything_else_stays(dihedral):
+    whole, cut = crossed_miura(dihedral)
+    made = fd.welded(cut)
+    assert made.faces == whole.faces
+    assert made.assignments == whole.assignments
+    np.testing.assert_array_equal(made.vertices, whole.vertices)
+    np.testing.assert_array_equal(made.creases, whole.creases)
+    assert made.fold_angles.tolist() == [0.5] * len(whole.creases)
+    rows = made.families["straight"]
+    assert [made.assignments[k] for k in rows] == ["M"] * len(rows)
+    assert len(rows) == whole.assignments.count("M")
+    assert (made.name, made.custom, len(made.welds)) == ("cut", {"a": 1}, 0)
+
+
+def test_only_some_facets():
+    square = fd.Pattern([*SQUARE, (2, 0), (2, 1)], [(0, 1, 2), (0, 2, 3), (1, 4, 5, 2)])
+    made = fd.welded(square, [(2, 0)])
+    assert made.faces == ((0, 1, 2, 3), (1, 4, 5, 2))
+    assert made.creases.tolist() == [[1, 2]]
+    kept = fd.welded(square, [(2, 0)], join=False)
+    assert kept.faces == square.faces
+    assert (kept.creases.tolist(), kept.welds.tolist()) == ([[1, 2]], [[0, 2]])
+    assert kept.weld_faces.tolist() == [[1, 0]]
+    assert kept.weld_dihedrals.tolist() == [pytest.approx(np.pi)]
+
+
+def test_what_is_not_convex_or_loses_a_vertex_keeps_its_lines():
+    dart = fd.Pattern([(0, 0), (2, -1), (0.5, 0), (2, 1)], [(0, 1, 2), (0, 2, 3)])
+    assert fd.welded(dart).welds.tolist() == [[0, 2]]  # a corner that points inwards
+    middle = fd.Pattern([*SQUARE, (0.5, 0.5)], [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+    assert fd.welded(middle).welds.tolist() == [[0, 4], [1, 4], [2, 4], [3, 4]]
+    halves = fd.Pattern(
+        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
+    )
+    assert fd.welded(halves).welds.tolist() == [[1, 4]]  # it ends between two corners
+    hexagon = np.column_stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3)])
+    fan = fd.Pattern(hexagon, [(0, k, k + 1) for k in range(1, 5)])
+    assert fd.welded(fan).faces == ((0, 1, 2, 3, 4, 5),)
+
+
+def test_panels_that_do_not_lie_in_one_plane_stay():
+    angle = np.radians(np.array([0, 10, 20]))
+    arc = np.column_stack([np.sin(angle), np.zeros(3), np.cos(angle)])
+    roof = fd.Pattern(
+        np.concatenate([arc, arc + np.array([0, 1, 0])]),
+        [(0, 1, 4, 3), (1, 2, 5, 4)],
+        {(1, 4): "F"},
+    )
+    made = fd.welded(roof)
+    assert (made.faces, made.welds.tolist()) == (roof.faces, [[1, 4]])
+    assert abs(np.degrees(made.weld_dihedrals[0]) - 180) == pytest.approx(10)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_triangles(seed):
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([SQUARE, rng.random((3 * seed, 2))])
+    cut = fd.Pattern(points, Delaunay(points).simplices)
+    made = fd.welded(cut)
+    assert not len(made.creases)
+    assert set(map(tuple, made.boundary.tolist())) == set(map(tuple, cut.boundary.tolist()))
+    assert made.face_areas.sum() == pytest.approx(1.0)
+    assert set(np.concatenate(made.faces)) == set(range(len(points)))
+    assert len(made.faces) <= len(cut.faces) - (seed == 0)
+    again = fd.welded(made)
+    assert again.faces == made.faces
+    assert again.welds.tolist() == made.welds.tolist()
+    assert fd.welded(fd.welded(cut, join=False)).faces == made.faces
+    for face in made.faces:  # convex: every corner to the left of every side
+        x = made.vertices[list(face)]
+        for a, b in zip(x, np.roll(x, -1, axis=0), strict=True):
+            assert (np.cross(b - a, x - a)[:, 2] >= -1e-12).all()
+
+
+def test_copies_keep_welds():
+    halves = fd.Pattern(
+        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
+    )
+    made = fd.welded(halves)
+    for copy in (made.scaled(2), made.moved((1, 2, 3)), made.mirrored(), made.rotated(30, "x")):
+        assert copy.welds.tolist() == [[1, 4]]
+        assert not len(copy.creases)
+    assert len(made.repeated((2, 2), [(2, 0, 0), (0, 1, 0)]).welds) == 4
+    assert len(made.joined(made.moved((0, 1, 0))).welds) == 2
+
+
+@pytest.mark.parametrize(
+    ("facets", "message"),
+    [
+        ([(0, 1)], r"facets: \(0, 1\) is not a crease"),
+        ([(1, 2)], r'facets: crease \(1, 2\) is assigned "M", so that it folds'),
+        (["ab"], "facets: key 'ab' is not a pair"),
+    ],
+)
+def test_wrong_facets(facets, message):
+    pattern = fd.Pattern(
+        [*SQUARE, (2, 0), (2, 1)], [(0, 1, 2), (0, 2, 3), (1, 4, 5, 2)], {(1, 2): "M"}
+    )
+    with pytest.raises(InputError, match=message):
+        fd.welded(pattern, facets)
+
+
+def test_wrong_welds():
+    def made(welds, letters=None):
+        return fd.Pattern(SQUARE, [(0, 1, 2), (0, 2, 3)], letters, welds=welds)
+
+    with pytest.raises(InputError, match=r"welds: \(0, 1\) is not an edge of two panels"):
+        made([(0, 1)])
+    with pytest.raises(InputError, match=r"edge \(0, 2\) is 'M' but welded"):
+        made([(0, 2)], {(0, 2): "M"})
+    assert made([(2, 0)], {(0, 2): "F"}).welds.tolist() == [[0, 2]]
+    with pytest.raises(InputError, match=r"welds: the panels at \(0, 2\) lie upon each other"):
+        fd.Pattern([(0, 0), (1, 0), (1, 1), (0.9, 0)], [(0, 1, 2), (0, 2, 3)], welds=[(0, 2)])
+    with pytest.raises(InputError, match="pattern: got list, give a Pattern"):
+        fd.welded([])
+
+
+def test_thick_panels_are_no_sheet():
+    halves = fd.Pattern(
+        [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)], [(0, 1, 4, 5), (1, 2, 3, 4)]
+    )
+    with pytest.raises(InputError, match="are welded to one sheet"):
+        fd.thicken(fd.welded(halves), 0.01)
+    with pytest.raises(InputError, match="facets: thick panels are boards"):
+        fd.welded(fd.thicken(halves, 0.01))

@@ -1,0 +1,198 @@
+"""Welds in bars and hinges: panels as plates that go on into each other, and hinges instead."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn import checks
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.mechanics.plates_condensed import condensed_force
+from sheets_with_facets import (
+    LENGTH,
+    STEEL,
+    crossed_miura,
+    cut_across,
+    elastic,
+    half_pipe,
+    triangulated,
+    with_lines,
+)
+
+SHELL = (130.1, 317.0, 360.5)  # Hz, of the uncut strip: tests/shells/test_shell_welds.py
+
+
+def plain(pattern, **options):
+    """Structure without what is said of welds."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FoldynWarning)
+        return fd.discretize(pattern, STEEL, **options)
+
+
+@pytest.mark.parametrize(
+    ("cut", "error"),
+    [
+        (cut_across([0.5]), 0.05),
+        (cut_across([0.07]), 0.05),
+        (cut_across([0.25, 0.5, 0.75]), 0.01),
+        (cut_across(np.linspace(0.1, 0.9, 9)), 0.005),
+        (with_lines([(0, 0.5), (1, 0.5)]), 0.01),
+        (with_lines([(0.35, 0), (0.55, 1)]), 0.06),
+        (triangulated(6, seed=1), 0.06),
+        (triangulated(20, seed=2), 0.03),
+    ],
+)
+def test_first_frequency_of_a_strip(cut, error):
+    """Errors of the uncut strip: +117 % as it is, +1.2 % with the scheme n5b8e."""
+    made = fd.discretize(fd.welded(cut), STEEL)
+    assert made.options.scheme == "n5b8e"
+    assert elastic(made)[0] == pytest.approx(SHELL[0], rel=error)
+
+
+def test_many_facets_have_the_modes_of_the_shell():
+    made = fd.discretize(fd.welded(cut_across(np.linspace(0.1, 0.9, 9))), STEEL)
+    np.testing.assert_allclose(elastic(made)[:3], SHELL, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"preset": "n5b8e"}, {"scheme": "n4b5"}, {"calibration": "standard"}],
+    ids=["plate", "n5b8e", "n4b5", "standard"],
+)
+def test_joined_panels_are_the_same_model(options):
+    whole, cut = crossed_miura()
+    one, other = (fd.discretize(p, STEEL, **options) for p in (whole, fd.welded(cut)))
+    for name in ("nodes", "bars", "bar_area", "folds", "fold_stiffness", "bends", "bend_stiffness"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    np.testing.assert_array_equal(one.mass.toarray(), other.mass.toarray())
+
+
+def test_lines_that_stay_hardly_change_a_folded_sheet():
+    whole, cut = crossed_miura()
+    found = [
+        fd.modes(fd.Case(made, [fd.Fix("xmin")]), count=3).frequency.values
+        for made in (
+            fd.discretize(whole, STEEL, preset="n5b8e"),
+            fd.discretize(fd.welded(cut, join=False), STEEL),
+            fd.discretize(cut, STEEL, preset="n5b8e"),
+        )
+    ]
+    np.testing.assert_allclose(found[1], found[0], rtol=0.03)
+    assert found[2][0] < 0.9 * found[0][0]  # as hinges
+
+
+def test_a_curved_sheet_of_facets():
+    shell = elastic(fd.shell(fd.welded(half_pipe(8)), STEEL, divisions=6, mass="consistent"))
+    made = elastic(fd.discretize(fd.welded(half_pipe(8)), STEEL))
+    np.testing.assert_allclose(made[:2], shell[:2], rtol=0.05)
+
+
+def test_strip_bends_far():
+    """A strip of ten panels, the first held at its corners, whose tip rises by a ninth of it."""
+    pattern = fd.welded(cut_across(np.linspace(0.1, 0.9, 9)))
+    n = len(pattern.vertices) // 2
+    tips = []
+    for made in (fd.discretize(pattern, STEEL), fd.shell(pattern, STEEL, divisions=4)):
+        held, force = fd.Fix([0, 1, n, n + 1]), fd.Force([n - 1, 2 * n - 1], (0, 0, 4.0))
+        moved = fd.trace(fd.Case(made, [held], [force])).displacement.values[-1]
+        tips.append(moved[n - 1])
+    assert tips[0][2] > LENGTH / 9
+    np.testing.assert_allclose(tips[0][[0, 2]], tips[1][[0, 2]], rtol=0.06)
+
+
+@pytest.mark.parametrize("pattern", [half_pipe(4), triangulated(5, seed=3)], ids=["pipe", "flat"])
+def test_energy_force_and_tangent(pattern):
+    body = fd.discretize(fd.welded(pattern), STEEL).body
+    q = 1e-3 * np.random.default_rng(2).standard_normal(body.size)
+    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, q) < 1e-6
+    assert checks.tangent_error(body.internal, body.tangent, q) < 1e-6
+    q[body.hidden] = 0.0
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    rest = body.model.bars.rest
+    q[: rest.size] = (rest @ turned.T - rest).ravel()
+    assert body.energies(q).sum() < 1e-12 * STEEL.bending_modulus
+
+
+def test_both_sides_of_a_weld_share_turn_and_bow():
+    made = fd.discretize(fd.welded(cut_across([0.5])), STEEL)
+    assert (len(made.folds), len(made.bends)) == (0, 9)
+    assert made.body.size == 3 * len(made.nodes) + 2
+    folded = fd.discretize(fd.welded(half_pipe(2)), STEEL)  # stays straight: no bow
+    assert folded.body.size == 3 * len(folded.nodes) + 1
+
+
+def test_motion_keeps_its_energy():
+    case = fd.Case(
+        fd.discretize(fd.welded(half_pipe(3)), STEEL),
+        [fd.Fix([0, 4])],
+        [fd.Force([3, 7], (0, 0, 1.0))],
+    )
+    for method in ("rk4", "generalized_alpha"):
+        result = fd.simulate(case, duration=5e-4, method=method)
+        parts = ("kinetic", "strain_bars", "strain_folds", "strain_bends")
+        total = sum(result[name] for name in parts) - result.work
+        assert np.abs(total).max() < 1e-4 * np.abs(result.work).max()
+
+
+def test_displacements_alone():
+    """Explicit methods have the rotations of welds in balance."""
+    made = fd.discretize(fd.welded(triangulated(5, seed=3)), STEEL)
+    body = made.condensed.body
+    q = 1e-4 * np.random.default_rng(2).standard_normal(body.size)
+    assert checks.gradient_error(lambda z: body.energies(z).sum(), body.internal, q) < 1e-6
+    assert checks.tangent_error(body.internal, body.tangent, q) < 1e-5
+    compiled, work = np.zeros((made.nodes.shape[0], 3)), body.workspaces(1)[0]
+    condensed_force(body.model, q.reshape(-1, 3), compiled, work)
+    np.testing.assert_allclose(compiled.ravel(), body.internal(q), rtol=1e-7, atol=1e-6)
+
+
+def test_results_keep_welds(tmp_path):
+    pattern = fd.welded(triangulated(5, seed=3))
+    case = fd.Case(fd.discretize(pattern, STEEL))
+    fd.save(fd.modes(case, count=8), tmp_path / "m.nc")
+    stored = fd.load(tmp_path / "m.nc")
+    assert stored.welds.dims == ("weld", "end")
+    again = fd.case_of(stored).structure
+    np.testing.assert_array_equal(again.pattern.welds, pattern.welds)
+    assert again.options == case.structure.options
+    np.testing.assert_array_equal(again.bend_stiffness, case.structure.bend_stiffness)
+
+
+def test_hinges_instead_are_told_of():
+    pattern = fd.welded(cut_across([0.5]))
+    for options in ({"preset": "plate"}, {"scheme": "n5b8"}, {"calibration": "standard"}):
+        with pytest.warns(FoldynWarning, match="its welds.* become hinges"):
+            made = fd.discretize(pattern, STEEL, **options)
+        assert made.options.scheme == "n5b8"
+    # a panel in the middle of which the sheet is bent gives way like a fold on a stiff crease
+    g, area, width = STEEL.bending_modulus, 0.1 * 0.05, 0.05
+    made = plain(pattern, scheme="n5b8")
+    assert made.bend_stiffness[-1] == pytest.approx(g * width**2 / (2 * 0.19 * area))
+    triangles = plain(fd.welded(with_lines([(0, 0), (1, 1)]), join=False), scheme="n5b8")
+    height = 0.2 * 0.05 / np.hypot(0.2, 0.05)
+    assert triangles.bend_stiffness[-1] == pytest.approx(g * np.hypot(0.2, 0.05) / (2 * height / 3))
+
+
+def test_clamped_edges_take_hinges():
+    pattern = fd.welded(cut_across([0.5]))
+    with pytest.warns(FoldynWarning, match="its welds"):
+        made = fd.discretize(pattern, STEEL, clamped=[(0, 3)])
+    assert made.options.scheme == "n5b8"
+
+
+def test_creases_know_nothing_of_welds():
+    whole, cut = crossed_miura()
+    lines = fd.welded(cut, join=False)
+    assert lines.assignments == whole.assignments
+    made = fd.discretize(lines, STEEL, crease_stiffness=list(range(1, len(lines.creases) + 1)))
+    length = np.linalg.norm(np.diff(lines.vertices[lines.creases], axis=1)[:, 0], axis=1)
+    np.testing.assert_allclose(made.fold_stiffness, np.arange(1, len(length) + 1) * length)
+    with pytest.raises(InputError, match="no crease assigned flat"):
+        fd.discretize(lines, STEEL, crease_stiffness={"flat": 1.0})
+
+
+def test_internal_amplitudes_are_refused():
+    case = fd.Case(fd.discretize(fd.welded(cut_across([0.5])), STEEL))
+    with pytest.raises(InputError, match=r"internal = 2: .* has welds \(1\); leave it out"):
+        fd.modes(case, count=8, internal=2)
