@@ -46,7 +46,7 @@ def bird_base() -> fd.Pattern:
 PATTERNS = {
     "Miura-ori": (P.miura((3, 3), dihedral=180), 0.75),
     "waterbomb": (P.waterbomb((4, 5), dihedral=180), 0.6),
-    "Resch": (P.resch((3, 3)), 0.95),
+    "Resch": (P.resch((3, 3), dihedral=180), 0.95),
     "square twist": (P.square_twist(dihedral=180), 0.7),
     BENDS: (
         P.square_twist(panel_angle=60, dihedral=180, symmetric=True),

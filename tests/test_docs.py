@@ -79,7 +79,7 @@ def test_the_gallery_of_patterns_shows_every_generator_by_calls_that_run():
 
 
 def test_the_patterns_page_shows_families_that_can_be_used():
-    (block,) = blocks("patterns.md", "python")
+    block, _ = blocks("patterns.md", "python")
     pattern = fd.patterns.miura((2, 2), dihedral=100)
     corners, panels = [(x, y) for y in (0, 1) for x in range(3)], [(0, 1, 4, 3), (1, 2, 5, 4)]
     strip = fd.Pattern(corners, panels, families={"straight": [(1, 4)]})

@@ -149,7 +149,7 @@ def test_families_of_a_pattern_in_a_case_file(tmp_path):
     for old, new, message in (
         ("[[1, 4]]", "[[0, 4]]", r"families\['spine'\]: \(0, 4\) is not a crease"),
         ("spine = [[", "valley = [[", "families: 'valley' is no name for a family"),
-        ("{ spine = [[1, 4]] }", "[1]", r"families = \[1\]: give a mapping"),
+        ("{ spine = [[1, 4]] }", "[1]", r"families = \[1\]: must be a table"),
     ):
         path.write_text(INLINE.replace(old, new))
         with pytest.raises(InputError, match=message):

@@ -31,7 +31,9 @@ def motion():
 
 @pytest.fixture(scope="module")
 def path():
-    structure = fd.discretize(fd.patterns.miura(), SHEET)
+    miura = fd.patterns.miura()
+    plain = fd.Pattern(miura.vertices, miura.faces, name="miura")
+    structure = fd.discretize(plain, SHEET)
     case = fd.Case(structure, [fd.Fix([0, 1, 2])], [fd.Force([7], (1e-4, 0, 0))])
     return fd.trace(case, load_factors=[0.5, 1.0])
 

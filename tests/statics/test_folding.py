@@ -115,7 +115,7 @@ STATES = {
     "square_twist": (fd.patterns.square_twist(dihedral=180), fd.patterns.square_twist()),
     "waterbomb": (fd.patterns.waterbomb((3, 2), dihedral=180), fd.patterns.waterbomb((3, 2))),
     "arc_miura": (fd.patterns.arc_miura(dihedral=180), fd.patterns.arc_miura()),
-    "resch": (fd.patterns.resch((2, 2)), fd.patterns.resch((2, 2), folded=True)),
+    "resch": (fd.patterns.resch((2, 2), dihedral=180), fd.patterns.resch((2, 2))),
 }
 
 

@@ -98,7 +98,7 @@ class Analysis(ABC):
     files: ClassVar[tuple[str, ...]]
     needs_density: ClassVar[str]
     takes: ClassVar[Sequence[str]]
-    moving: ClassVar[bool] = True
+    moving: ClassVar[bool] = False
     by_mass: ClassVar[bool] = True
 
     def __init__(self, arguments: dict[str, Any]) -> None:

@@ -72,7 +72,6 @@ class FidelityAnalysis(Analysis):
     needs_density = "a comparison with the shell needs"
     takes = arguments_of(fidelity)
     files = ("fidelity.png",)
-    moving = False
     by_mass = False
 
     masses: tuple[str, ...] = ()

@@ -188,6 +188,7 @@ class FrfAnalysis(Analysis):
     """The response to a drive of each frequency about a state."""
 
     kind = "frf"
+    moving = True
     schema = FrfSchema
     needs_density = "a frequency response needs"
     takes = (*arguments_of(frf), *OPTIONS)

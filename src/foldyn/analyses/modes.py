@@ -56,6 +56,7 @@ class ModesAnalysis(Analysis):
     """Natural frequencies and mode shapes about a state."""
 
     kind = "modes"
+    moving = True
     schema = ModesSchema
     needs_density = "modes need"
     takes = arguments_of(modes)

@@ -87,6 +87,7 @@ class MotionAnalysis(Analysis):
     """The motion from an initial state under loads and moving supports."""
 
     kind = "dynamics"
+    moving = True
     schema = MotionSchema
     needs_density = "a motion needs"
     takes = arguments_of(prepare)

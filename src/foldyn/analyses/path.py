@@ -146,6 +146,7 @@ class PathAnalysis(Analysis):
     """The path of equilibria under loads and moving supports that grow together."""
 
     kind = "statics"
+    moving = True
     schema = PathSchema
     files = (
         *(f"{name}.png" for name in ("reaction", "curve", "energies", "shapes")),
