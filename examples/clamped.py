@@ -31,10 +31,10 @@ def compute() -> tuple[dict, dict]:
 
 
 def check(found: dict) -> None:
-    """Both models agree to 9 %, and without the clamp the sheet swings more slowly."""
+    """Both models agree to 10 %, and without the clamp the sheet swings more slowly."""
     frequency = {name: modes.frequency.values for name, modes in found.items()}
     reduced, shell = frequency["bars and hinges"], frequency["shell"]
-    np.testing.assert_allclose(reduced[:2], shell[:2], rtol=0.09)
+    np.testing.assert_allclose(reduced[:2], shell[:2], rtol=0.1)
     for model, clamped in (("bars and hinges", reduced), ("shell", shell)):
         assert frequency[f"{model}, hinged"][0] < 0.96 * clamped[0]
 

@@ -82,7 +82,9 @@ def test_which_modes_are_shown(write):
 
 def test_a_film_of_a_large_sheet_shows_fewer_modes(write, monkeypatch):
     monkeypatch.setattr("foldyn.analyses.modes.MOST_TRIANGLES", 70)  # 32 in a mode
-    _, page = write('[analysis]\nkind = "modes"\ncount = 3\nsecant = 1\n')
+    _, page = write(
+        '[analysis]\nkind = "modes"\ncount = 3\nsecant = 1\n[output]\nanimation = "gif"\n'
+    )
     assert "The same modes (the first 2) in motion" in page
 
 

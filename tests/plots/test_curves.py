@@ -132,7 +132,7 @@ def test_equal_hinges_share_a_curve_and_many_are_counted(pattern):
             for i in range(3)
         ],
     )
-    equal = structures.discretize(flat, sheet)
+    equal = structures.discretize(flat, sheet, preset="herkal")
     fold = plot_laws(equal).axes[0]
     (text,) = fold.get_legend().get_texts()
     assert "and 6 more" in text.get_text()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples import case, page, results
+from page_samples import case, page, results
 
 playwright = pytest.importorskip("playwright.sync_api")
 BROWSER = next(

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from decode import changing, decoded
-from samples import page, results
+from page_samples import page, results
 
 import foldyn as fd
 from foldyn.errors import InputError

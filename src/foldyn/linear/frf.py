@@ -156,7 +156,7 @@ def frf(
     >>> case = fd.Case(s, supports, damping=fd.Rayleigh(alpha=0.5))
     >>> response = frf(case, fd.Force([0, 1], (1e-3, 0, 0)), [0.0, 1.0])
     >>> abs(response.receptance).sel(node=0, axis="x").values.round(1).tolist()
-    [17.8, 4.3]
+    [17.7, 4.3]
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")

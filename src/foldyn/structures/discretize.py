@@ -109,7 +109,7 @@ def discretize(
     >>> pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     >>> sheet = fd.Sheet(youngs_modulus=1e6, poissons_ratio=0.25, thickness=0.01)
     >>> fd.discretize(pattern, sheet).fold_stiffness.round(4).tolist()
-    [0.0502]
+    [0.0503]
     """
     check_kinds(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
