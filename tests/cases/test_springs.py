@@ -73,6 +73,7 @@ def test_energies_and_forces_are_those_of_the_formulas(model):
     assert inner[4:].any() == np.False_
 
 
+@pytest.mark.slow
 def test_compiled_loops_see_the_same_forces_as_statics(model):
     s = structure(model, FOLD)
     body, q = fd.Case(s, SOME).body, moved(s, 0.05)
