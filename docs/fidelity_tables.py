@@ -8,15 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from foldyn.studies.fidelity import motion_results as motions
-from foldyn.studies.fidelity.internal import first_table, read_first
+from foldyn.studies.fidelity.internal import first_table
 from foldyn.studies.fidelity.stored import RESULTS, read, table
 
 PAGE = Path(__file__).with_name("fidelity.md")
 TABLES = {
     "documented": lambda: table(read(RESULTS / "documented.csv")),
     "drawn": lambda: table(read(RESULTS / "drawn.csv")),
-    "documented internal": lambda: first_table(read_first(RESULTS / "documented_internal.csv")),
-    "drawn internal": lambda: first_table(read_first(RESULTS / "drawn_internal.csv")),
+    "documented internal": lambda: first_table(read(RESULTS / "documented_internal.csv")),
+    "drawn internal": lambda: first_table(read(RESULTS / "drawn_internal.csv")),
     "motions": lambda: motions.summaries(motions.read()),
     "motion cases": lambda: motions.by_case(motions.read()),
 }

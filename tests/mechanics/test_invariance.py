@@ -82,7 +82,7 @@ def test_a_turned_pattern_is_the_same_structure(name):
     assert relative(other.internal_force(u @ q.T), s.internal_force(u) @ q.T) < 1e-11
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-6, 0.15))
 def test_forces_and_moments_balance(name, seed, amplitude):
     """At any state the internal forces have no resultant and no moment."""
@@ -94,7 +94,7 @@ def test_forces_and_moments_balance(name, seed, amplitude):
     assert np.abs(np.cross(s.nodes + u, f).sum(axis=0)).max() < 1e-12 * size
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 10**6), amplitude=st.floats(1e-3, 0.15))
 def test_tangent_on_rigid_modes(name, seed, amplitude):
     """K times a translation is zero; K times a rotation is the rotated force, at any state."""

@@ -17,14 +17,13 @@ from foldyn.studies.fidelity import independent
 from foldyn.studies.fidelity.cases import FidelityCase, documented, polygons, supports
 from foldyn.studies.fidelity.compare import MODELS, compare, first_modes
 from foldyn.studies.fidelity.drawn import drawn
-from foldyn.studies.fidelity.internal import AMPLITUDES, read_first
+from foldyn.studies.fidelity.internal import AMPLITUDES
 from foldyn.studies.fidelity.large import twisted, under_loads
 from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.statics import study
 from foldyn.studies.fidelity.stored import (
     RESULTS,
     Modes,
-    computed,
     read,
     summary,
     summary_of,
@@ -61,7 +60,7 @@ def test_limits(name, model):
 @pytest.mark.parametrize(("name", "near"), [("documented", 0.95), ("drawn", 0.85)])
 def test_limits_of_internal_amplitudes(name, near):
     """Of the first five modes: 95 % within 5 %, of all random cases only below the plate's."""
-    results = read_first(RESULTS / f"{name}_internal.csv")
+    results = read(RESULTS / f"{name}_internal.csv")
     found, without = summary(results, "3"), summary(results, "none")
     assert found.median < 0.01
     assert found.near >= near
@@ -72,7 +71,7 @@ def test_limits_of_internal_amplitudes(name, near):
 
 def test_stored_first_modes_are_what_the_code_gives():
     case = documented()[0]
-    (stored,) = [m for m in read_first(RESULTS / "documented_internal.csv") if m.case == case.name]
+    (stored,) = [m for m in read(RESULTS / "documented_internal.csv") if m.case == case.name]
     true = reference(case)
     for name, count in AMPLITUDES.items():
         for row, kept in zip(first_modes(case, true, count), stored.rows[name], strict=True):
@@ -249,6 +248,5 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert told.index("small loads") < told.index("large loads")
     assert all(model in told for model in MODELS)
     (first,) = read(tmp_path / "documented.csv")
-    assert len(read_first(tmp_path / "documented_internal.csv")[0].rows["3"]) == 5
+    assert len(read(tmp_path / "documented_internal.csv")[0].rows["3"]) == 5
     assert first.case == documented()[0].name
-    assert [m.case for m in computed(documented()[:1])] == [first.case]

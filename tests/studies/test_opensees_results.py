@@ -254,7 +254,7 @@ def test_folds_that_the_model_does_not_know_are_refused(options, message):
 def test_a_missing_package_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "opensees", None)
     monkeypatch.setitem(sys.modules, "opensees.openseespy", None)
-    with pytest.raises(InputError, match="opensees is not installed"):
+    with pytest.raises(InputError, match="needs OpenSees, which is not installed"):
         model.PanelShells(case(), 2).frequencies()
 
 

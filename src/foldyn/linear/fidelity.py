@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.linear.compared import OWN, Fidelity
@@ -19,7 +20,6 @@ from foldyn.linear.matched import SPARE, matched
 from foldyn.linear.modes import modes
 from foldyn.linear.operating_point import BALANCED
 from foldyn.linear.reference import Reference, modes_at_rest, reference_modes
-from foldyn.linear.refinement import extrapolated
 from foldyn.linear.shell_of import check_reduced, meshes, shell_of, with_structure
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
 from foldyn.materials import Superlinear

@@ -23,9 +23,10 @@ from scipy.linalg import block_diag
 from foldyn.errors import InputError
 from foldyn.structures import Structure
 from foldyn.structures.edge_angles import outlines
-from foldyn.structures.mass import TRIANGLE, condensed_panels
+from foldyn.structures.mass import condensed_panels
 from foldyn.structures.panel_modes import panel_modes
-from foldyn.structures.panel_plate import Outline
+from foldyn.structures.panel_plate import TRIANGLE_MASS, Outline
+from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.values import show, whole
 
 MOST = 6  # the meshes of panels have further shapes, but less and less well
@@ -154,7 +155,7 @@ def amplitudes(structure: Any, displacement: NDArray, size: int, count: int) -> 
         turned = np.sqrt(length2) * per_hidden * np.eye(len(turns))
         by = block_diag(height, turned, np.eye(len(inner)))
         mass = total[p] * modes.mass
-        mass[: len(nodes), : len(nodes)] -= rule.get(p, total[p] * TRIANGLE)
+        mass[: len(nodes), : len(nodes)] -= rule.get(p, total[p] * TRIANGLE_MASS)
         dofs = np.concatenate([(3 * nodes[:, None] + np.arange(3)).ravel(), turns, inner])
         masses.append(_entries(dofs, dofs, by.T @ mass @ by))
         ends = _ends(nodes, len(corners))
@@ -186,10 +187,9 @@ def _outlines(structure: Structure) -> list[Outline | None]:
     """Outlines of its panels; None of rigid ones."""
     options, pattern = structure.options, structure.pattern
     assert pattern is not None
-    every = range(len(pattern.faces))
     return outlines(
         structure.nodes, structure.centers, structure.folds, pattern, structure.sheet,
-        options.straight, every if isinstance(options.rigid, str) else options.rigid or (),
+        options.straight, rigid_panels(options.rigid, len(pattern.faces)),
     )  # fmt: skip
 
 

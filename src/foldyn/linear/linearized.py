@@ -28,7 +28,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.special import gamma, hyp2f1
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
@@ -44,7 +43,8 @@ from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.values import brief, number
 
 POWER = 4.0 / 3.0
-AT_REST = float(2.0 / np.sqrt(np.pi) * gamma(0.5 * POWER + 1.0) / gamma(0.5 * POWER + 1.5))
+AT_REST = 0.9411457706782074
+"""2/sqrt(pi) Gamma(POWER/2 + 1)/Gamma(POWER/2 + 3/2)."""
 
 
 @brief
@@ -299,6 +299,8 @@ def equivalent_slope(offset: ArrayLike, amplitude: float) -> NDArray:
     ndarray
         k_eq / k, of the shape of `offset`.
     """
+    from scipy.special import hyp2f1
+
     ratio = np.abs(np.asarray(offset, float)) / amplitude
     inside = np.minimum(ratio, 1.0)
     outside = np.maximum(ratio, 1.0)

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.optimize import linear_sum_assignment
 
 from foldyn.errors import InputError
 
@@ -80,6 +79,8 @@ def pair_modes(values: ArrayLike, least: float = 0.0) -> Pairs:
     Pairs
         Numbers of the modes in the first set, of their partners in the second, and their MAC.
     """
+    from scipy.optimize import linear_sum_assignment
+
     matrix = np.asarray(values, float)
     if matrix.ndim != 2 or not matrix.size:
         raise InputError(f"values: shape {matrix.shape}: give the matrix of mac(a, b)")

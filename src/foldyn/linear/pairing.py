@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from foldyn.linear.mac import mac
 
@@ -59,6 +58,8 @@ def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> li
     mass : (n,)
         Weights of the nodes.
     """
+    from scipy.optimize import linear_sum_assignment
+
     alike = likeness(fa, a, fb, b, mass)
     cost = 1.0 - alike + FREQUENCY_WEIGHT * np.abs(np.log(fb[None, :] / fa[:, None]))
     first, second = linear_sum_assignment(cost)

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
-from foldyn.linear.refinement import extrapolated
 from foldyn.values import brief
 
 DIVISIONS = (6, 12)  # of every edge in the two meshes
@@ -52,6 +51,8 @@ class Reference:
 
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
         """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        from scipy.spatial import cKDTree
+
         structure = self.case.structure
         apart, place = cKDTree(structure.nodes).query(nodes)
         seen = np.flatnonzero(apart < SAME_PLACE * structure.pattern.size)

@@ -1,8 +1,4 @@
-"""How far a mesh is from what finer ones tend to, from it and a coarser one.
-
-An error of the order h^2, h the size of the pieces, is told by two meshes: with N and M < N pieces
-of every edge, f_N + (f_N - f_M) / ((N/M)^2 - 1) is the limit (Richardson's extrapolation).
-"""
+"""How far a mesh is from what finer ones tend to, from it and a coarser one."""
 
 from __future__ import annotations
 
@@ -13,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.modes import modes
@@ -72,11 +69,6 @@ def refinement(case: Case, count: int = MODES) -> Refinement | None:
         return None
     ratio = structure.options.divisions / coarser.options.divisions
     return Refinement(structure.options.divisions, fine, extrapolated(coarse, fine, ratio))
-
-
-def extrapolated(coarse: Any, fine: Any, ratio: float) -> Any:
-    """What values tend to that two meshes have, the fine one with `ratio` times the divisions."""
-    return fine + (fine - coarse) / (ratio**2 - 1.0)
 
 
 def _frequencies(case: Case, structure: Any, count: int) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.panel_plate import Outline, PanelPlate, facets_of, mass_of
 
 COARSE, FINE = 8, 16  # pieces of each edge in the two meshes
@@ -31,8 +32,7 @@ def panel_stiffness(panel: Outline, poissons_ratio: float) -> NDArray:
     the front, and a bow positive towards it.
     """
     coarse, fine = (_condensed(panel, poissons_ratio, n) for n in (COARSE, FINE))
-    ratio = (FINE / COARSE) ** 2
-    stiffness = fine + (fine - coarse) / (ratio - 1.0)
+    stiffness = extrapolated(coarse, fine, FINE / COARSE)
     points, corners = _points(panel), len(panel.corners)
     held = heights_and_slopes(panel)
     stiffness = held.T @ stiffness @ held
@@ -110,7 +110,7 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
         mass_of(plate.points, plate.triangles, plate.solved(plate.heights)[0])
         for plate in (coarse, fine)
     )
-    out = more + (more - less) / ((FINE / COARSE) ** 2 - 1.0)
+    out = extrapolated(less, more, FINE / COARSE)
     # what is linear over the panel to the last digit, as its facets have it
     x = _points(panel)
     linear = np.column_stack([np.ones(len(x)), x])

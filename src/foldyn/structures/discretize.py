@@ -21,7 +21,7 @@ from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
 from foldyn.structures.presets import resolved
-from foldyn.structures.rigid_plates import check_welds, checked_panels
+from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import Structure
 from foldyn.values import vector
@@ -142,11 +142,8 @@ def discretize(
     bends = np.concatenate([calibrate.bend_stiffness(mesh, pattern, sheet, merlin2), welds])
     plates = None
     if options.scheme == "n5b8e":
-        every = range(len(pattern.faces))
-        plates = edge_plates(
-            mesh, pattern, sheet, options.straight,
-            every if isinstance(options.rigid, str) else options.rigid or (),
-        )  # fmt: skip
+        stiff = rigid_panels(options.rigid, len(pattern.faces))
+        plates = edge_plates(mesh, pattern, sheet, options.straight, stiff)
         bends = spoke_stiffness(plates, len(mesh.folds), len(bends))
     elif options.calibration == "plate":
         plated = panel_plates(mesh, pattern, sheet, options.rigid)

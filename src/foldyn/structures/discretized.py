@@ -15,6 +15,7 @@ from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
 from foldyn.materials import HingeLaw, PlateSuperlinear, hinge_law
 from foldyn.mechanics.body import Body
+from foldyn.patterns.picture import picture
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import Plate
@@ -40,6 +41,13 @@ class HingeKind(NamedTuple):
         if self.onset is None:
             return self.law
         return PlateSuperlinear(float(np.degrees(self.onset[row])))
+
+    def energy(self, theta: NDArray, rest: NDArray) -> NDArray:
+        """Energies / k (rad^2) of the hinges at dihedrals and rest angles (..., k), rad."""
+        if self.onset is None:
+            return self.law.energy(theta, rest)
+        unit = PlateSuperlinear(float(np.degrees(1.0)))
+        return self.onset**2 * unit.energy((theta - rest) / self.onset, 0.0)
 
 
 def read_only(array: NDArray) -> NDArray:
@@ -127,6 +135,10 @@ class Discretized:
     def total_mass(self) -> float:
         """Mass (kg)."""
         return float(self.mass.sum())
+
+    def _repr_html_(self) -> str | None:
+        """A picture for notebooks."""
+        return None if self.pattern is None else picture(self.pattern, repr(self))
 
     @cached_property
     def nodal_mass(self) -> NDArray:

@@ -17,9 +17,8 @@ from scipy import sparse
 from foldyn.errors import InputError
 from foldyn.patterns.topology import around, edge_of
 from foldyn.structures.condensed_panel import panel_mass
-from foldyn.structures.panel_plate import outline
+from foldyn.structures.panel_plate import TRIANGLE_MASS, outline
 
-TRIANGLE = (np.ones((3, 3)) + np.eye(3)) / 12.0  # of mass 1, linear between its corners
 LEAST = 0.25  # of the centroid rule's share; a parallelogram's corners need one half
 
 
@@ -162,7 +161,7 @@ def consistent(surface: Surface) -> sparse.csr_array:
 
     Its rotational inertia is exact about every axis in the plane of a panel.
     """
-    return _assembled(surface.triangles, surface.triangle_mass, TRIANGLE, surface)
+    return _assembled(surface.triangles, surface.triangle_mass, TRIANGLE_MASS, surface)
 
 
 def _assembled(

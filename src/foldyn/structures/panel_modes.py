@@ -19,10 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial import cKDTree
 
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.structures.condensed_panel import COARSE, FINE, heights_and_slopes
 from foldyn.structures.panel_plate import Outline, PanelPlate
 
@@ -57,11 +56,13 @@ def panel_modes(panel: Outline, poissons_ratio: float, count: int) -> PanelModes
     they are of real shapes and positive definite. Modes of one frequency are taken together: of a
     panel with symmetries there may be more than `count`.
     """
+    from scipy.spatial import cKDTree
+
     coarse, fine = (PanelPlate(panel, poissons_ratio, n) for n in (COARSE, FINE))
     (low, before), (high, shapes) = (_held_modes(plate, count + SPARE) for plate in (coarse, fine))
     _, same = cKDTree(fine.points).query(coarse.points)
     partner = _partners(before[: len(same)], shapes[same])
-    value = high + (high - low[partner]) / ((FINE / COARSE) ** 2 - 1.0)
+    value = extrapolated(low[partner], high, FINE / COARSE)
     kept = np.argsort(value, kind="stable")
     value, shapes = value[kept], shapes[:, kept]
     if value[count] < (1.0 + EQUAL) * value[count - 1]:
@@ -85,6 +86,8 @@ def middles(panel: Outline) -> NDArray:
 
 def _partners(coarse: NDArray, fine: NDArray) -> NDArray:
     """Which of the coarse shapes (n, k) each fine one (n, k) is like; their order may differ."""
+    from scipy.optimize import linear_sum_assignment
+
     size = np.linalg.norm(fine, axis=0)[:, None] * np.linalg.norm(coarse, axis=0)
     return linear_sum_assignment((fine.T @ coarse / size) ** 2, maximize=True)[1]
 

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 from foldyn.mechanics.triangle import triangle_stiffness
 
 DIGITS = 9  # to which panels have the same shape
+TRIANGLE_MASS = (np.ones((3, 3)) + np.eye(3)) / 12.0  # of 1 in all, linear between corners
 Rows = tuple[tuple[float, float], ...]
 
 
@@ -125,10 +126,7 @@ class PanelPlate:
     @property
     def mass(self) -> sparse.csr_array:
         """Mass matrix of the unknowns, of a panel of mass 1; slopes have none."""
-        corners = self.points[self.triangles]
-        area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-        element = (np.ones((3, 3)) + np.eye(3)) / 12.0
-        block = (area / area.sum())[:, None, None] * element
+        block = _parts(self.points, self.triangles)[:, None, None] * TRIANGLE_MASS
         rows, columns = np.repeat(self.triangles, 3, axis=1), np.tile(self.triangles, (1, 3))
         entries = (block.ravel(), (rows.ravel(), columns.ravel()))
         return sparse.csr_array(sparse.coo_array(entries, shape=self.stiffness.shape))
@@ -144,10 +142,15 @@ def _rows(functions: list[dict[int, float]], size: int) -> sparse.csr_array:
 
 def mass_of(points: NDArray, triangles: NDArray, heights: NDArray) -> NDArray:
     """Mass matrix (k, k) of shapes with heights (points or more, k) that triangles join."""
-    shape, corners = heights[triangles], points[triangles]
+    shape, part = heights[triangles], _parts(points, triangles)
+    return np.einsum("tak,ab,tbl,t->kl", shape, TRIANGLE_MASS, shape, part)
+
+
+def _parts(points: NDArray, triangles: NDArray) -> NDArray:
+    """Parts (nt,) of the area of all triangles."""
+    corners = points[triangles]
     area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    element = (np.ones((3, 3)) + np.eye(3)) / 12.0
-    return np.einsum("tak,ab,tbl,t->kl", shape, element, shape, area / area.sum())
+    return area / area.sum()
 
 
 def _meshed(

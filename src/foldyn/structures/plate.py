@@ -11,9 +11,10 @@ spoke of a larger polygon   4 (1 - nu) G A p / sum (h1^2 + h2^2), h1 and h2 the 
 its diagonals (N4B5)        2 (1 - nu) G A / D^2, A the area of the two triangles of each;
 fold of length Lf           1/kf' = 1/kf + sum over its two panels of c/G, but for panels that are
                             rigid; c = `COMPLIANCE` or `TRIANGLE` times A/Lf^2 where not of a quad;
-weld of length Lf           1/k = sum over its two panels of c/G, a crease that does not turn; c as
-                            `WELD` says times A/Lf^2, 2/3 in triangles, which is a third of their
-                            height: the sheet between the middles of two panels.
+weld of length Lf           1/k = sum over its two panels of c/G, a crease that does not turn; c is
+                            `COMPLIANCE`, in quads with no other crease `WELDED_ALONE`, in
+                            triangles 2/3 times A/Lf^2, there a third of the height over the length:
+                            the sheet between the middles of two panels.
 
 Creases and welds between panels that are not in one plane stay straight in these plates, other
 edges may bow.
@@ -33,12 +34,13 @@ from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.structures.edge_angles import straight_creases
 from foldyn.structures.mesh import Mesh, double_areas, lengths, quad_centers
 from foldyn.structures.quad_bends import quad_bends
+from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
 
-COMPLIANCE = 0.12  # c Lf^2/A of panels of more than four corners
+COMPLIANCE = 0.12  # c Lf^2/A of panels of more than four corners, and at most welds
 TRIANGLE = (0.22, 0.6)  # of triangles without a free edge, and with one or two
 POLYGON = (0.77, 0.87, 0.91, 0.93)  # p of regular polygons of 5, 6, 7 and more corners (the shell)
-WELD = {"triangle": 2.0 / 3.0, "alone": 0.19}  # c Lf^2/A at a weld; of quads with no other crease
+WELDED_TRIANGLE, WELDED_ALONE = 2.0 / 3.0, 0.19  # of triangles and of quads with no other crease
 Panel = tuple[NDArray, NDArray]  # stiffness of its bends and compliance c of its edges, for G = 1
 
 
@@ -70,7 +72,7 @@ def panel_plates(
     edges = [[number.get(edge_of(a, b), -1) for a, b in around(face)] for face in pattern.faces]
     modulus, nu = (sheet.values(name, count) for name in ("bending_modulus", "poissons_ratio"))
     first = np.searchsorted(mesh.inner_panel, np.arange(count + 1))
-    stiff = set(range(count) if isinstance(rigid, str) else rigid or ())
+    stiff = set(rigid_panels(rigid, count))
     quads = _quads(mesh, pattern, sheet, edges)
     bends, creases = np.empty(len(mesh.inner)), np.zeros(len(pattern.creases))
     for p in range(count):
@@ -94,8 +96,7 @@ def weld_stiffness(pattern: Pattern, sheet: Sheet) -> NDArray:
         for p in both:
             edges = [edge_of(a, b) for a, b in around(pattern.faces[p])]
             alone = len(edges) == 4 and len(free.intersection(edges)) == 3
-            kind = "triangle" if len(edges) == 3 else "alone" if alone else ""
-            c = WELD.get(kind, COMPLIANCE)
+            c = WELDED_TRIANGLE if len(edges) == 3 else WELDED_ALONE if alone else COMPLIANCE
             compliance[k] += c * pattern.face_areas[p] / modulus[p]
     return lengths(pattern.vertices, pattern.welds) ** 2 / compliance
 

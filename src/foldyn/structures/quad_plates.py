@@ -16,6 +16,8 @@ degree + 1 for low ones; corners of free edges are about as bad as those of the 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -109,12 +111,19 @@ def _edge_and_degree() -> tuple[NDArray, NDArray]:
 
 def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
     """Two linear functions (n, 2) of coordinates t, and those that vanish at the ends (n, d)."""
+    linear, bows = (
+        np.stack([legendre.legval(t, c) for c in group], axis=-1)
+        for group in _polynomials(derivative)
+    )
+    return linear, bows
+
+
+@cache
+def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
+    """Their Legendre coefficients."""
     ends = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
     inner = [legendre.legint(np.eye(j + 1)[j], lbnd=-1.0) for j in range(1, DEGREES[1])]
-    linear, bows = (
-        np.stack([legendre.legval(t, legendre.legder(c, derivative)) for c in group], axis=-1)
-        for group in (ends, inner)
-    )
+    linear, bows = ([legendre.legder(c, derivative) for c in group] for group in (ends, inner))
     return linear, bows
 
 

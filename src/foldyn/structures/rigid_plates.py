@@ -70,9 +70,14 @@ def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[
     return chosen
 
 
+def rigid_panels(rigid: str | Sequence[int] | None, count: int) -> Sequence[int]:
+    """Numbers of the rigid panels among `count`; `rigid` as `checked_panels` returns it."""
+    return range(count) if isinstance(rigid, str) else rigid or ()
+
+
 def check_welds(rigid: str | Sequence[int] | None, pattern: Pattern) -> None:
     """Refuse rigid panels at a weld, across which a sheet bends."""
-    chosen = range(len(pattern.faces)) if isinstance(rigid, str) else rigid or ()
+    chosen = rigid_panels(rigid, len(pattern.faces))
     for edge, panels in zip(pattern.welds.tolist(), pattern.weld_faces.tolist(), strict=True):
         for panel in panels:
             if panel in chosen:
@@ -103,11 +108,8 @@ def rigid_plates(
     InputError
         A panel is not flat.
     """
-    if rigid is None:
-        return ()
-    chosen = range(len(faces)) if isinstance(rigid, str) else rigid
     plates = []
-    for number in chosen:
+    for number in rigid_panels(rigid, len(faces)):
         corners = _widest(nodes, faces[number])
         riders = np.setdiff1d(triangles[panel == number], corners)
         weights, off = on_plate(nodes[riders], nodes[corners])

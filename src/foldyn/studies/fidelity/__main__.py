@@ -14,10 +14,11 @@ from pathlib import Path
 
 from foldyn.studies.fidelity.cases import documented
 from foldyn.studies.fidelity.drawn import COUNT, SEED, drawn
-from foldyn.studies.fidelity.internal import computed_first, first_table, write_first
+from foldyn.studies.fidelity.internal import first_table, modes_first
 from foldyn.studies.fidelity.large import large_table
+from foldyn.studies.fidelity.reference import reference
 from foldyn.studies.fidelity.statics import statics_table
-from foldyn.studies.fidelity.stored import RESULTS, Modes, computed, table, write
+from foldyn.studies.fidelity.stored import RESULTS, modes_below, table, write
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -30,19 +31,19 @@ def main(arguments: list[str] | None = None) -> int:
     chosen.out.mkdir(parents=True, exist_ok=True)
     sets = {"documented": documented(), "drawn": drawn(chosen.count, chosen.seed)}
     for name, cases in sets.items():
-        found = computed(cases, _tell)
-        write(chosen.out / f"{name}.csv", found)
-        print(f"\n{name}: {len(cases)} cases\n\n{table(found)}\n")
-        first = computed_first(cases, _tell)
-        write_first(chosen.out / f"{name}_internal.csv", first)
+        below, first = [], []
+        for case in cases:
+            true = reference(case)
+            below.append(modes_below(case, true))
+            first.append(modes_first(case, true))
+            count = len(next(iter(below[-1].rows.values())))
+            print(f"{case.name}: {count} modes", file=sys.stderr, flush=True)
+        write(chosen.out / f"{name}.csv", below)
+        write(chosen.out / f"{name}_internal.csv", first)
+        print(f"\n{name}: {len(cases)} cases\n\n{table(below)}\n")
         print(f"{name}, internal amplitudes\n\n{first_table(first)}\n")
     print(statics_table(), large_table(), sep="\n\n")
     return 0
-
-
-def _tell(modes: Modes) -> None:
-    count = len(next(iter(modes.rows.values())))
-    print(f"{modes.case}: {count} modes", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.linear.refinement import extrapolated
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.materials import EnhancedLinear
 from foldyn.structures import discretize
 from foldyn.studies.fidelity.cases import FidelityCase, documented

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from math import inf
-from pathlib import Path
 
+from foldyn.linear.reference import Reference
 from foldyn.structures.plate_frequency import BELOW
 from foldyn.studies.fidelity.cases import FidelityCase
 from foldyn.studies.fidelity.compare import first_modes
-from foldyn.studies.fidelity.reference import reference
-from foldyn.studies.fidelity.stored import Modes, read, summary_of, write
+from foldyn.studies.fidelity.stored import Modes, columns, summary_of
 
 AMPLITUDES = {"none": 0, "1": 1, "3": 3}
 """Internal amplitudes of a panel, by their name in the table."""
@@ -19,27 +17,10 @@ RANGES = {"below 0.6": (0.0, BELOW), "0.6 to 1": (BELOW, 1.0), "above 1": (1.0, 
 """Of frequencies over that of the plate."""
 
 
-def computed_first(
-    cases: Iterable[FidelityCase], tell: Callable[[Modes], None] = lambda modes: None
-) -> list[Modes]:
-    """The first five modes of cases by the shell and by n5b8e with internal amplitudes."""
-    found = []
-    for case in cases:
-        true = reference(case)
-        rows = {name: first_modes(case, true, count) for name, count in AMPLITUDES.items()}
-        tell(Modes(case.name, rows))
-        found.append(Modes(case.name, rows))
-    return found
-
-
-def write_first(path: Path, results: Iterable[Modes]) -> None:
-    """Write them as `stored.write` does."""
-    write(path, results, AMPLITUDES)
-
-
-def read_first(path: Path) -> list[Modes]:
-    """What `write_first` wrote."""
-    return read(path, AMPLITUDES)
+def modes_first(case: FidelityCase, true: Reference) -> Modes:
+    """The first five modes of a case by n5b8e with internal amplitudes, beside the shell's."""
+    rows = {name: first_modes(case, true, count) for name, count in AMPLITUDES.items()}
+    return Modes(case.name, rows)
 
 
 def first_table(results: list[Modes]) -> str:
@@ -53,11 +34,5 @@ def first_table(results: list[Modes]) -> str:
         for name in AMPLITUDES:
             rows = [row for modes in results for row in modes.rows[name]]
             s = summary_of([row for row in rows if low <= row.over_plate < high])
-            errors = " | ".join(_percent(value) for value in (s.median, s.ninetieth))
-            shares = f"{100 * s.near:.0f} % | {100 * s.alike:.0f} %"
-            lines.append(f"| {title} | {s.modes} | {name} | {errors} | {shares} | {s.lost} |")
+            lines.append(f"| {title} | {s.modes} | {name} | {columns(s)} |")
     return "\n".join(lines)
-
-
-def _percent(error: float) -> str:
-    return "lost" if error == inf else f"{100 * error:.1f} %"

@@ -9,10 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foldyn.studies.fidelity.cases import documented
 from foldyn.studies.fidelity.stored import ALIKE, NEAR, RESULTS
 
 STORED = RESULTS / "motions.csv"
 SHELL = "shell"
+PLATE, FINER = "plate, linear", "n5b8e, linear"
+RECOMMENDED = "n5b8e, linear; of triangles plate, linear"  # n5b8e has no inner node there
 PULSE = "pulse"
 SHARE = 0.5  # of the shell's variance that is its fundamental's, at least, for a period to be told
 SCATTER = 0.1  # standard deviation of the shell's periods over their mean, at most
@@ -130,14 +133,23 @@ def beside(true: Run, own: Run) -> Beside:
 
 
 def compared(found: Iterable[Run]) -> dict[str, list[Beside]]:
-    """All models beside the shell, where it has a period."""
+    """All models beside the shell, where it has a period, and `RECOMMENDED`."""
     models: dict[str, list[Beside]] = {}
-    for every in grouped(found).values():
+    triangles = _of_triangles()
+    for (case, _), every in grouped(found).items():
         if told(every[SHELL]):
-            for model, own in every.items():
-                if model != SHELL:
-                    models.setdefault(model, []).append(beside(every[SHELL], own))
+            rows = {m: beside(every[SHELL], own) for m, own in every.items() if m != SHELL}
+            if {FINER, PLATE} <= rows.keys():
+                rows[RECOMMENDED] = rows[PLATE if case in triangles else FINER]
+            for model, row in rows.items():
+                models.setdefault(model, []).append(row)
     return models
+
+
+def _of_triangles() -> set[str]:
+    """Names of documented cases whose panels are triangles."""
+    faces = {case.name: case.pattern().faces for case in documented()}
+    return {name for name, panels in faces.items() if all(len(panel) == 3 for panel in panels)}
 
 
 def untold(found: Iterable[Run]) -> list[Run]:

@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
 from foldyn.cases import Case, State
 from foldyn.dynamics import simulate
 from foldyn.errors import ComputationError, FoldynWarning, InstabilityError, PenetrationError
 from foldyn.linear import mac, modes
 from foldyn.linear.reference import DIVISIONS, elastic, modes_at_rest
-from foldyn.linear.refinement import extrapolated
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge
 from foldyn.shells import Shell, shell

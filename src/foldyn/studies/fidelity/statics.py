@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.algebra.extrapolation import extrapolated
 from foldyn.analyses import read_case
 from foldyn.cases import Case, Fix, Force
 from foldyn.linear import modes
 from foldyn.linear.fidelity import MODELS
-from foldyn.linear.refinement import extrapolated
 from foldyn.linear.small_loads import small_loads
 from foldyn.patterns import miura
 from foldyn.shells import shell

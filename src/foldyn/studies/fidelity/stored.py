@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from foldyn.linear.reference import Reference
 from foldyn.studies.fidelity.cases import FidelityCase
 from foldyn.studies.fidelity.compare import MODELS, Row, compare
-from foldyn.studies.fidelity.reference import reference
 
 RESULTS = Path(__file__).parent / "results"
 NEAR, ALIKE = 0.05, 0.95  # error and MAC of a good mode
@@ -35,22 +35,14 @@ class Summary(NamedTuple):
     lost: int  # modes without a partner
 
 
-def computed(
-    cases: Iterable[FidelityCase], tell: Callable[[Modes], None] = lambda modes: None
-) -> list[Modes]:
-    """Modes of cases by the shell and by every model."""
-    found = []
-    for case in cases:
-        true = reference(case)
-        modes = Modes(case.name, {model: compare(case, true, model) for model in MODELS})
-        tell(modes)
-        found.append(modes)
-    return found
+def modes_below(case: FidelityCase, true: Reference) -> Modes:
+    """Modes of a case below the limit by every model, beside those of the shell."""
+    return Modes(case.name, {model: compare(case, true, model) for model in MODELS})
 
 
-def write(path: Path, results: Iterable[Modes], models: Iterable[str] = tuple(MODELS)) -> None:
+def write(path: Path, results: Sequence[Modes]) -> None:
     """Write a table: case, mode, frequency (Hz), the same over the plate's, errors and MAC."""
-    heads = [f"{what}: {model}" for model in models for what in ("error", "mac")]
+    heads = [f"{what}: {model}" for model in results[0].rows for what in ("error", "mac")]
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["case", "mode", "shell [Hz]", "over plate", *heads])
@@ -62,11 +54,14 @@ def write(path: Path, results: Iterable[Modes], models: Iterable[str] = tuple(MO
                 out.writerow([modes.case, first.mode, *frequency, *own])
 
 
-def read(path: Path, models: Iterable[str] = tuple(MODELS)) -> list[Modes]:
-    """A table that `write` wrote; cases without modes below the limit are not in it."""
+def read(path: Path) -> list[Modes]:
+    """A table that `write` wrote; cases without any mode in it are left out."""
     found: dict[str, Modes] = {}
     with path.open(encoding="utf-8", newline="") as file:
-        for line in csv.DictReader(file):
+        lines = csv.DictReader(file)
+        heads = [head.partition(": ") for head in lines.fieldnames or ()]
+        models = [model for what, _, model in heads if what == "error"]
+        for line in lines:
             modes = found.setdefault(line["case"], Modes(line["case"], {m: [] for m in models}))
             for model in models:
                 error, mac = float(line[f"error: {model}"]), float(line[f"mac: {model}"])
@@ -98,8 +93,15 @@ def table(results: list[Modes]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for model in MODELS:
-        s = summary(results, model)
-        errors = f"{100 * s.median:.1f} % | {100 * s.ninetieth:.1f} %"
-        shares = f"{100 * s.near:.0f} % | {100 * s.alike:.0f} %"
-        lines.append(f"| {model} | {errors} | {shares} | {s.lost} |")
+        lines.append(f"| {model} | {columns(summary(results, model))} |")
     return "\n".join(lines)
+
+
+def columns(s: Summary) -> str:
+    """Median, 90th percentile, shares and lost modes in a line of a table."""
+    errors = [_percent(s.median), _percent(s.ninetieth)]
+    return " | ".join([*errors, f"{100 * s.near:.0f} %", f"{100 * s.alike:.0f} %", str(s.lost)])
+
+
+def _percent(error: float) -> str:
+    return "lost" if np.isinf(error) else f"{100 * error:.1f} %"

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn import plots
+from foldyn.analyses.provenance import Call
 from foldyn.cases import Force
 from foldyn.plots import style
 from foldyn.report import Heading, Section, Table, Text, write_report
@@ -23,33 +24,47 @@ from foldyn.studies.herkal import sensitivity_page, stiffnesses_page, variations
 from foldyn.studies.herkal.claims import claims, paper_table, table1, tolerance
 from foldyn.studies.herkal.metric import FAR, LEAST_MAC, best
 from foldyn.studies.herkal.runs import SECANT, reported
-from foldyn.studies.herkal.sheet_models import REFERENCE, case_study, label, model_of, paper_rules
+from foldyn.studies.herkal.sheet_models import (
+    REFERENCE,
+    case_study,
+    label,
+    model_of,
+    paper_rules,
+)
 from foldyn.studies.herkal.specimen import page as specimen_page
 from foldyn.studies.herkal.specimen.page import NO_BREAK
+from foldyn.studies.herkal.stages import inputs_of, stage_of
 from foldyn.studies.herkal.study import FULL, RESULTS, Study, mean_ranks, second_table
 from foldyn.studies.herkal.variations import Variations, likeness, rank_correlation
 from foldyn.studies.targets import Verdict
+from foldyn.viewer import Stage
 
 TITLE = "Dynamic behavior of origami structures: the case studies of Herkal et al."
 CHOSEN_BY = "case1_"  # rows of the targets by which assumptions were chosen
 SENSITIVITY = "sensitivity"  # folder of its tables in that of the study
 
 
-def write(study: Study) -> Path:
-    """Draw the figures of a study into its folder and write report.html; returns its path."""
+def write(study: Study, call: Call | None = None) -> Path:
+    """Draw the figures of a study into its folder and write report.html; returns its path.
+
+    call : how it was asked for, for the page.
+    """
     album = Album(study.folder)
+    stages = {case: shown for case in study.plan.cases if (shown := stage_of(study, case))}
+    first = next(iter(stages), "")
     varied = variations.read(study.folder / SENSITIVITY) or variations.read(variations.STORED)
-    sections: list[Section] = [Text(_opening(study)), Heading("What reproduces")]
+    sections: list[Section | Stage] = [stages.pop(first)] if first else []
+    sections += [Text(_opening(study)), Heading("What reproduces")]
     sections += [Text(verdict(study, varied)), _table_1(study), rank_table(study), _claims(study)]
     sections += [Heading("Why numbers differ"), Text(_differences()), *_second(study)]
     sections += stiffnesses_page.sections(study)
     if varied is not None:
         sections += sensitivity_page.sections(varied, album, tolerance())
     for case in study.plan.cases:
-        sections += _case(study, case, album)
+        sections += _case(study, case, album, stages.get(case))
     if study.data is not None:
         sections += specimen_page.sections(study.folder / RESULTS, study.parts[1], album)
-    sections += [Heading("How it was computed"), Text(_how(study))]
+    sections += [Heading("How it was computed"), Text(_how(study)), *inputs_of(study, call)]
     return write_report(study.folder / "report.html", TITLE, sections)
 
 
@@ -252,12 +267,13 @@ def _computed(verdict: Verdict) -> str:
     return found.replace(" ", NO_BREAK)
 
 
-def _case(study: Study, case: str, album: Album) -> list[Section]:
+def _case(study: Study, case: str, album: Album, shown: Stage | None) -> list[Section | Stage]:
     """Geometry, statics, motion and modes of one case."""
     case_file, (nodes, axis, up_to) = case_study(case), reported(case)
-    sections: list[Section] = [
-        Heading(case_file.title or case),
-        album.figure(
+    sections: list[Section | Stage] = [
+        Heading(case_file.heading),
+        *([shown] if shown else []),
+        *album.figure(
             f"{case}-structure",
             "The pattern with its vertices, supports and loads.",
             lambda: plots.draw_structure(case_file.case()),
@@ -268,7 +284,7 @@ def _case(study: Study, case: str, album: Album) -> list[Section]:
         forces = [load for load in case_file.case().loads if isinstance(load, Force)]
         force = float(np.linalg.norm(forces[0].vector))
         sections += [
-            album.figure(
+            *album.figure(
                 f"{case}-statics",
                 f"The load applied slowly: force over the {axis} displacement of the reported "
                 "nodes.",
@@ -281,19 +297,17 @@ def _case(study: Study, case: str, album: Album) -> list[Section]:
         ("motion", True, "the paper's distributions"),
         ("motion-beyond", False, "the models beyond the paper"),
     ):
-        shown = {
+        moved = {
             label(m): motion
             for m, motion in motions.items()
             if motion is not None and (m == REFERENCE or model_of(m).paper == paper)
         }
-        if len(shown) > 1:
-            sections.append(
-                album.figure(
-                    f"{case}-{name}",
-                    f"Displacement of the reported nodes along {axis} (left) and its frequency "
-                    f"content (right): shell and {what}.",
-                    lambda shown=shown: plots.plot_history(shown, nodes, axis, up_to),
-                )
+        if len(moved) > 1:
+            sections += album.figure(
+                f"{case}-{name}",
+                f"Displacement of the reported nodes along {axis} (left) and its frequency "
+                f"content (right): shell and {what}.",
+                lambda moved=moved: plots.plot_history(moved, nodes, axis, up_to),
             )
     return [*sections, _errors(study, case, nodes), _modes(study, case)]
 

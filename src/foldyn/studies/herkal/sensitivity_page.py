@@ -56,7 +56,7 @@ def sections(found: Variations, album: Album, tolerance: float) -> list[Section]
             f"{opinion(found)}\n\nComputed with: {found.about}. What a coarser shell than that of "
             "the study changes by itself is in the first row of the first table."
         ),
-        album.figure(
+        *album.figure(
             "sensitivity",
             "Errors of the distributions under every combination, a dot each: above each line with "
             "superlinear bends, below it with linear ones. Rings: the case files as they are. "

@@ -1,8 +1,9 @@
 """A pattern in OpenSees: corotational shells of three nodes, joined by springs along creases.
 
 Each panel has nodes of its own. Two nodes at one place of a crease are tied by stiff springs, and
-turn against each other about the crease with their share of its stiffness. Nothing of Foldyn's
-mechanics is used: geometry, supports, loads and damping come from the case, all else is here.
+turn against each other about the crease with their share of its stiffness; `exports.opensees` gives
+the commands. Nothing of Foldyn's mechanics is used: geometry, supports, loads and damping come from
+the case, mesh and stiffness are made here.
 """
 
 from __future__ import annotations
@@ -12,22 +13,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Fix, Force, Rayleigh
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, optional
+from foldyn.exports import opensees
+from foldyn.exports.creased_shell import CreasedShell, Joint, shares
+from foldyn.exports.opensees import TIE, TOLERANCE
 from foldyn.patterns import Pattern
 
 ALIKE = 1e-9  # relative difference below which diagonals are equal
-TIE = 100.0  # stiffness of the springs that tie nodes, in membrane stiffnesses E t (N/m)
-TOLERANCE = 1e-7  # m and rad: norm of the last correction of a step
-ITERATIONS = 60
-SECTION, TIE_MATERIAL = 1, 1  # their numbers
-MOVES, TURN = (1, 2, 3), 4  # directions of a spring: along its three axes, about the first
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +37,7 @@ class Crease:
     axis, length
         Unit vector from the lower to the higher vertex, and the distance between them (m).
     nodes : (n + 1, 2)
-        Pairs of nodes at one place: of the panel that runs along the axis when it is gone around
-        counter-clockwise from the front, and of the other. The dihedral grows with the turn of
-        the second against the first about the axis.
+        Pairs of nodes at one place, as those of a `Joint`.
     """
 
     axis: NDArray
@@ -218,12 +214,38 @@ class PanelShells:
                 return found
         raise InputError(f"fold_law = {law}: this model takes folds that are linear at rest")
 
+    @cached_property
+    def shell(self) -> CreasedShell:
+        """What OpenSees gets."""
+        mesh, sheet, count = self.mesh, self.case.structure.sheet, len(self.mesh.points)
+        held = np.zeros((count, 3), bool)
+        forces = [np.zeros((count, 3)) for _ in self.case.load_terms]
+        for vertex, nodes in enumerate(map(list, mesh.corners)):
+            held[nodes] = self.case.fixed[vertex]
+            for spread, (force, _) in zip(forces, self.case.load_terms, strict=True):
+                spread[nodes] = force[vertex] / len(nodes)
+        joints = tuple(
+            Joint(one.axis, one.nodes, crease_stiffness(one.length, sheet) * shares(len(one.nodes)))
+            for one in mesh.creases
+        )
+        return CreasedShell(
+            nodes=mesh.points,
+            triangles=mesh.triangles,
+            kind=np.zeros(len(mesh.triangles), np.int64),
+            sheets=(sheet,),
+            joints=joints,
+            places=mesh.corners,
+            held=held,
+            clamped=np.zeros(count, bool),
+            forces=tuple(forces),
+            masses=np.zeros(count),
+        )
+
     def path(self, steps: int = 10) -> Answer:
         """Equilibria under load factors 0, 1/steps, ..., 1."""
         domain = self._domain()
-        for number, (force, _) in enumerate(self.case.load_terms, 1):
-            domain.timeSeries("Linear", number)
-            self._load(domain, number, force)
+        for number, force in enumerate(self.shell.forces, 1):
+            opensees.run(domain, opensees.load(number, force, "Linear"))
         self._prepare(domain, "Newton")
         domain.integrator("LoadControl", 1.0 / steps)
         domain.analysis("Static")
@@ -233,7 +255,7 @@ class PanelShells:
         """Lowest natural frequencies (Hz) at rest."""
         domain = self._domain()
         self._prepare(domain, "Newton")
-        return np.sqrt(np.array(domain.eigen("-genBandArpack", count))) / (2.0 * np.pi)
+        return np.sqrt(np.array(domain.eigen(opensees.EIGEN, count))) / (2.0 * np.pi)
 
     def motion(self, duration: float, dt: float, every: int = 1) -> Answer:
         """Motion from rest with Newmark's average acceleration, sampled at each `every`-th step.
@@ -242,10 +264,11 @@ class PanelShells:
         """
         domain, steps = self._domain(), round(duration / dt)
         times = dt * np.arange(steps + 1)
-        for number, (force, history) in enumerate(self.case.load_terms, 1):
+        pairs = zip(self.shell.forces, self.case.load_terms, strict=True)
+        for number, (force, (_, history)) in enumerate(pairs, 1):
             factors = [float(history(t)) for t in (*times, times[-1] + dt)]
-            domain.timeSeries("Path", number, "-dt", dt, "-values", *factors)
-            self._load(domain, number, force)
+            series = ("Path", "-dt", dt, "-values", *factors)
+            opensees.run(domain, opensees.load(number, force, *series))
         self._prepare(
             domain, "ModifiedNewton"
         )  # a tangent a step: the same result in half the time
@@ -256,59 +279,12 @@ class PanelShells:
 
     def _domain(self) -> Any:
         """Nodes, elements and supports; node k of the mesh has number k + 1."""
-        mesh, sheet = self.mesh, self.case.structure.sheet
         domain = _opensees()(ndm=3, ndf=6)
-        for number, point in enumerate(mesh.points.tolist(), 1):
-            domain.node(number, *point)
-        domain.section(
-            "ElasticMembranePlateSection", SECTION, sheet.youngs_modulus, sheet.poissons_ratio,
-            sheet.thickness, sheet.density or 0.0,
-        )  # fmt: skip
-        for number, nodes in enumerate((mesh.triangles + 1).tolist(), 1):
-            domain.element("ASDShellT3", number, *nodes, SECTION, "-corotational")
-        tie = self.tie * sheet.youngs_modulus * sheet.thickness
-        domain.uniaxialMaterial("Elastic", TIE_MATERIAL, tie)
-        for number, crease in enumerate(mesh.creases):
-            self._join(domain, number, crease)
-        for nodes, held in zip(mesh.corners, self.case.fixed.astype(int).tolist(), strict=False):
-            if any(held):
-                for node in nodes:
-                    domain.fix(node + 1, *held, 0, 0, 0)
+        opensees.run(domain, opensees.model(self.shell, self.tie))
         return domain
 
-    def _join(self, domain: Any, number: int, crease: Crease) -> None:
-        """Springs along a crease, with the share of its stiffness that belongs to each place."""
-        pieces = len(crease.nodes) - 1
-        stiffness = crease_stiffness(crease.length, self.case.structure.sheet) / pieces
-        whole, half = 2 * number + 2, 2 * number + 3
-        domain.uniaxialMaterial("Elastic", whole, stiffness)
-        domain.uniaxialMaterial("Elastic", half, 0.5 * stiffness)
-        across = np.cross(np.eye(3)[np.abs(crease.axis).argmin()], crease.axis)
-        for place, nodes in enumerate((crease.nodes + 1).tolist()):
-            domain.element(
-                "zeroLength", self._spring(number, place), *nodes,
-                "-mat", half if place in (0, pieces) else whole, *[TIE_MATERIAL] * len(MOVES),
-                "-dir", TURN, *MOVES, "-orient", *crease.axis.tolist(), *across.tolist(),
-            )  # fmt: skip
-
-    def _spring(self, crease: int, place: int) -> int:
-        return len(self.mesh.triangles) + crease * (self.divisions + 1) + place + 1
-
-    def _load(self, domain: Any, number: int, force: NDArray) -> None:
-        """Forces on vertices, shared evenly by the nodes there."""
-        domain.pattern("Plain", number, number)
-        for nodes, vector in zip(self.mesh.corners, force, strict=False):
-            if vector.any():
-                for node in nodes:
-                    domain.load(node + 1, *(vector / len(nodes)).tolist(), 0.0, 0.0, 0.0)
-
     def _prepare(self, domain: Any, algorithm: str) -> None:
-        """Constraints that are plain, and an unsymmetric solver: the tangent is not symmetric."""
-        domain.constraints("Plain")
-        domain.numberer("RCM")
-        domain.system("UmfPack")
-        domain.test("NormDispIncr", self.tolerance, ITERATIONS, 0)
-        domain.algorithm(algorithm)
+        opensees.run(domain, opensees.solver(algorithm, self.tolerance))
 
     def _run(self, domain: Any, at: NDArray, every: int, step: tuple[float, ...]) -> Answer:
         moved, iterations, start = [self._moved(domain)], 0, time.process_time()
@@ -333,9 +309,10 @@ class PanelShells:
 
     def _check_folds(self, domain: Any, at: float) -> None:
         """Refuse a state in which a fold has left the range of its linear law."""
+        first = opensees.first_springs(self.shell)
         for number, (low, high) in enumerate(self.linear_range):
             for place in range(self.divisions + 1):
-                turn = domain.eleResponse(self._spring(number, place), "deformation")[0]
+                turn = domain.eleResponse(first[number] + place, "deformation")[0]
                 if not low <= turn <= high:
                     raise ComputationError(
                         f"crease {number} turned by {np.degrees(turn):.1f} degrees at {at:g}: "
@@ -359,9 +336,4 @@ def _opensees() -> Callable[..., Any]:
     """The class of models of OpenSees."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    try:
-        return import_module("opensees.openseespy").Model
-    except ImportError:
-        raise InputError(
-            "opensees is not installed: install the extra with pip install foldyn[opensees]"
-        ) from None
+    return optional("opensees.openseespy", "the check needs OpenSees", "foldyn[opensees]").Model

@@ -173,20 +173,20 @@ def _release(folder: Path, found: dict[str, Any], fit: Part, album: Album) -> li
         ),
         _estimates(found["damping"], DAMPING, data),
         *_doubt(found["damping"][FILM_SUPPORT], f"node {WATCHED}"),
-        album.figure(
+        *album.figure(
             "specimen-supports",
             f"Node {WATCHED}: the film, and the model on three supports (left), and their spectra "
             "(right). The model by the glue alone has the damping of the first.",
             lambda: figures.plot_supports(front, label, note),
         ),
         *_vibrations(front, data),
-        album.figure(
+        *album.figure(
             "specimen-front",
             f"All front nodes that were tracked, the model on the {SUPPORT_NAMES[FILM_SUPPORT]}. "
             f"Only node {WATCHED} was fitted.",
             lambda: figures.plot_front(front, FILM_SUPPORT, label, note),
         ),
-        album.figure(
+        *album.figure(
             "specimen-front-frequency",
             "Their amplitude spectra. Nodes that were lost for long have none.",
             lambda: figures.plot_front_content(front, FILM_SUPPORT, label, note),
@@ -287,7 +287,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
     shown = [k + 1 for k in range(min(6, modes.sizes["mode"]))]
     return [
         Heading("Frequency response and modes", 3),
-        album.figure(
+        *album.figure(
             "specimen-response",
             "Response of a corner of the top to a sine of 1 mN on each of its nodes.",
             lambda: figures.plot_responses(
@@ -295,7 +295,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
             ),
         ),
         _response_table(responses, paper),
-        album.figure(
+        *album.figure(
             "specimen-modes",
             "Modes of the model with the fitted folds. "
             + "; ".join(f"{k}: {named['name'].values[k - 1]}" for k in shown)

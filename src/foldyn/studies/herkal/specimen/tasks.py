@@ -236,7 +236,7 @@ def _weights(static: list[Measurement]) -> dict[str, list[float]]:
 
 def _write(one: Fit, folder: Path, note: str) -> None:
     folder.mkdir(exist_ok=True)
-    write_fit(one, folder, f"Paper specimen: {folder.name}", note)
+    write_fit(one, folder, f"Paper specimen: {folder.name}", note, figures="png")
     one.save(folder / "fit.json")
 
 
