@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,3 +102,16 @@ def test_one_way_formats(tmp_path, monkeypatch):
         read_pattern(tmp_path / "x.one")
     with pytest.raises(InputError, match="One files can be read but not written"):
         write_pattern(tmp_path / "x.one", simple_fold())
+
+
+def test_libraries_of_drawings_are_loaded_where_they_are_needed(tmp_path):
+    """Meshes are read without them, and nothing of them is loaded at the start of the command."""
+    simple = tmp_path / "x.fold"
+    write_pattern(simple, simple_fold())
+    code = (
+        f"import sys, foldyn as fd, foldyn.cli.main; fd.read_pattern({str(simple)!r})\n"
+        "drawings = {'shapely', 'svgelements', 'defusedxml', 'ezdxf'}\n"
+        "assert not drawings & set(sys.modules), drawings & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

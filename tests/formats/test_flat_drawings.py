@@ -81,7 +81,7 @@ def test_lines_through_one_point(count):
     assert (len(p.faces), len(p.vertices)) == (2 * count, 2 * count + 1)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.randoms(use_true_random=False), st.integers(2, 9))
 def test_the_order_of_lines_does_not_matter(random, count):
     lines = [*square(*scattered(count, 5)).letters]

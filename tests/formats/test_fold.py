@@ -34,7 +34,7 @@ def test_round_trip_of_every_generator(kind, extension, tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == [path.name]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     vertices=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=3),
     name=st.text(max_size=20),
@@ -332,3 +332,40 @@ def test_a_letter_against_the_dihedral_turns_the_faces_aloud(file):
     with pytest.warns(FoldynWarning, match="turned all panels over"):
         p = read_pattern(file(vertices_coords=LIFTED))
     assert p.dihedrals[0] == pytest.approx(np.pi / 2)
+
+
+def test_small_letters_and_nulls_are_taken_for_what_they_mean(tmp_path):
+    text = {**GOOD, "edges_assignment": ["v", "b", None]}
+    del text["faces_vertices"]
+    text["edges_vertices"] = [[1, 4], *([k, k + 1] for k in (0, 1, 3, 4)), [0, 3], [2, 5]]
+    text["edges_assignment"] = ["v", "b", "B", "B", "B", "B", "B"]
+    (tmp_path / "x.fold").write_text(json.dumps(text))
+    found = diagnose(tmp_path / "x.fold")
+    assert found.pattern.assignments == ("V",)
+    assert "edges_assignment: 2 small letters taken as large" in found.diagnosis.repairs
+    text["edges_assignment"][0] = None
+    (tmp_path / "x.fold").write_text(json.dumps(text))
+    found = diagnose(tmp_path / "x.fold")
+    assert found.pattern.assignments == ("U",)
+    assert "edges_assignment: 1 null taken as U, unassigned" in found.diagnosis.repairs
+
+
+@pytest.mark.parametrize(("angle", "doubted"), [(3.14159265, 1), (180, 0), (3.0, 0)])
+def test_angles_that_look_like_radians_are_doubted(angle, doubted, tmp_path):
+    text = {**GOOD, "edges_foldAngle": [angle, 0, 0]}
+    (tmp_path / "x.fold").write_text(json.dumps(text))
+    found = diagnose(tmp_path / "x.fold")
+    assert np.degrees(found.pattern.fold_angles) == pytest.approx([angle])
+    assert sum("as if they were radians" in text for text in found.diagnosis.doubts) == doubted
+
+
+@pytest.mark.parametrize(("order", "plane"), [((0, 2, 1), "x and z"), ((2, 0, 1), "y and z")])
+def test_lines_in_another_coordinate_plane_are_turned(order, plane, tmp_path):
+    text = {key: value for key, value in GOOD.items() if key != "faces_vertices"}
+    text["edges_vertices"] = [[1, 4], *([k, k + 1] for k in (0, 1, 3, 4)), [0, 3], [2, 5]]
+    text["edges_assignment"] = list("VBBBBBB")
+    text["vertices_coords"] = [[(x, y, 0.5)[k] for k in order] for x, y in GOOD["vertices_coords"]]
+    (tmp_path / "x.fold").write_text(json.dumps(text))
+    found = diagnose(tmp_path / "x.fold")
+    assert len(found.pattern.faces) == 2 and not found.pattern.vertices[:, 2].any()
+    assert any(f"in the plane of {plane}, into" in told for told in found.diagnosis.repairs)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fold_texts import LIFTED
 
+import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.formats import Frame, read_pattern, write_pattern
 from foldyn.patterns import miura, simple_fold
@@ -94,3 +95,37 @@ def test_other_formats_have_no_frames(tmp_path):
     write_pattern(tmp_path / "x.obj", p)
     with pytest.raises(InputError, match=r"x\.obj: frame: OBJ files have no frames"):
         read_pattern(tmp_path / "x.obj", frame=1)
+
+
+def test_the_order_of_layers_is_kept(tmp_path) -> None:
+    strip = fd.Pattern(
+        [(x, y) for x in range(4) for y in (0, 1)],
+        [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(3)],
+        ["V", "M"],
+    )
+    folding = fd.fold(strip, fraction=1.0, steps=2)
+    path = tmp_path / "strip.fold"
+    fd.write_pattern(path, folding.pattern)
+    assert json.loads(path.read_text())["faceOrders"] == folding.layers.tolist()
+    back = fd.read_pattern(path)
+    assert back.custom["faceOrders"] == folding.layers.tolist()
+    # it is kept in cases, and in copies whose panels are the same
+    assert back.moved((1, 0, 0)).custom == back.custom
+    assert "faceOrders" not in back.repeated((2, 1)).custom
+
+
+def test_the_order_of_layers_is_said_of_fronts(tmp_path) -> None:
+    text = {
+        "vertices_coords": [[0, 0], [1, 0], [1, 1], [0, 1]],
+        "faces_vertices": [[0, 1, 2], [0, 3, 2]],  # the second listed the other way around
+        "edges_vertices": [[0, 2]],
+        "edges_assignment": ["V"],
+        "faceOrders": [[0, 1, -1], [1, 0, 1]],
+    }
+    path = tmp_path / "flap.fold"
+    path.write_text(json.dumps(text))
+    assert fd.read_pattern(path, unit="m").custom["faceOrders"] == [[0, 1, 1], [1, 0, 1]]
+    for wrong in ([0, 1], [0, 2, 1], [0, 1, 2], [0, True, 1]):
+        path.write_text(json.dumps(text | {"faceOrders": [wrong]}))
+        with pytest.raises(InputError, match=r"faceOrders\[0\] = .*two face numbers from 0 to 1"):
+            fd.read_pattern(path)

@@ -45,7 +45,7 @@ def written(document) -> str:
 
 
 @pytest.mark.parametrize("ending", [".cp", ".svg", ".dxf"])
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     cells=st.tuples(st.integers(1, 3), st.integers(1, 3)),
     panel_angle=st.floats(35, 85),

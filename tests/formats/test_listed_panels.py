@@ -167,3 +167,97 @@ def test_the_text_of_a_diagnosis():
     assert "doubts: none" in text
     assert "vertices inside: 3; Maekawa holds at 0, Kawasaki at 3, developable 3" in text
     assert "       4     4     0     0     0.000     0.000  Maekawa" in text
+
+
+BRICK = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0], [2, 2, 0], [0, 2, 0]]
+WALL = [[0, 1, 2, 3], [3, 4, 5, 7], [4, 2, 6, 5]]
+"""Two panels on one whose upper edge is whole."""
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("turn", [0.0, 60.0])
+def test_a_vertex_inside_an_edge_divides_it(apart, turn):
+    """Flat and folded along the edge, with common vertices and without."""
+    vertices = np.array(BRICK, dtype=float)
+    up = vertices[:, 1] > 1.0
+    way = np.radians(turn)
+    vertices[up] = np.column_stack(
+        [vertices[up, 0], 1 + np.cos(way) * np.ones(up.sum()), np.sin(way) * np.ones(up.sum())]
+    )
+    faces = WALL
+    if apart:
+        vertices, faces = vertices[np.concatenate(WALL)], np.arange(12).reshape(3, 4).tolist()
+    found = built(listed(vertices, faces))
+    p = found.pattern
+    assert (len(p.vertices), len(p.creases)) == (8, 3)
+    assert sorted(len(face) for face in p.faces) == [4, 4, 5]
+    assert sorted(np.degrees(p.dihedrals)) == pytest.approx(sorted([180.0, *[180.0 - turn] * 2]))
+    told = "divided edges of panels at 1 vertex of others that lie in them"
+    assert told in found.diagnosis.repairs
+
+
+def test_pieces_of_a_divided_edge_have_its_letter_or_their_own():
+    found = built(listed(BRICK, WALL, [(2, 3), (2, 4), (4, 5)], "MVU", [-90, 45, np.nan]))
+    p = found.pattern
+    told = dict(zip(map(tuple, p.creases.tolist()), p.assignments, strict=True))
+    assert told == {(2, 4): "V", (3, 4): "M", (4, 5): "U"}
+    angles = dict(zip(told, np.degrees(p.fold_angles), strict=True))
+    assert angles[2, 4] == pytest.approx(45) and angles[3, 4] == pytest.approx(-90)
+    assert not any("bound no panel" in text for text in found.diagnosis.repairs)
+
+
+@pytest.mark.parametrize("letter", "BC")
+def test_an_edge_that_the_file_calls_boundary_or_cut_stays_whole(letter):
+    found = built(listed(BRICK, WALL, [(2, 3)], letter))
+    assert len(found.pattern.creases) == 1  # between the two upper panels
+    assert found.diagnosis.repairs == ()
+
+
+def test_bricks_that_overlap_by_half_are_divided_on_both_sides():
+    vertices = [[x, y, 0] for y in (0, 1) for x in (0, 2, 4)] + [[x, y, 0] for y in (1, 2)
+                for x in (-1, 1, 3)]  # fmt: skip
+    faces = [[0, 1, 4, 3], [1, 2, 5, 4], [6, 7, 10, 9], [7, 8, 11, 10]]
+    found = built(listed(vertices, faces))
+    assert len(found.pattern.creases) == 5
+    assert found.diagnosis.repairs[0].startswith("divided edges of panels at 4 vertices")
+
+
+@pytest.mark.parametrize("off", [0.0, 2e-6])
+def test_a_vertex_on_an_edge_of_another_layer_does_not_divide_it(off):
+    """A small flap folded back upon a large panel, its free edge along that of the panel."""
+    vertices = [[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0], [1, off, off], [2, 0, 0], [2, 1, 0],
+                [1, 1, off]]  # fmt: skip
+    found = built(listed(vertices, [[0, 1, 2, 3], [4, 5, 6, 7]]))
+    assert [len(face) for face in found.pattern.faces] == [4, 4]
+    assert found.diagnosis.repairs == ()
+
+
+def test_an_edge_that_three_panels_would_meet_at_stays_whole():
+    vertices = [[0, 0, 0], [2, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]]
+    faces = [[0, 2, 3], [0, 2, 4], [0, 1, 5]]
+    found = built(listed(vertices, faces))
+    assert sorted(len(face) for face in found.pattern.faces) == [3, 3, 3]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_patterns_with_edges_made_whole_are_found_again(seed):
+    """A folded sheet, of which some panels have lost corners in the middle of their edges."""
+    random = np.random.default_rng(seed)
+    p = miura(cells=(2, 2))
+    middles, faces = [], []
+    chosen = {tuple(edge) for edge in p.creases[random.permutation(len(p.creases))[:5]].tolist()}
+    number = {edge: len(p.vertices) + k for k, edge in enumerate(sorted(chosen))}
+    middles = [p.vertices[list(edge)].mean(axis=0) for edge in sorted(chosen)]
+    given = set()
+    for face in p.faces:
+        corners = []
+        for a, b in zip(face, (*face[1:], face[0]), strict=True):
+            edge = (min(a, b), max(a, b))
+            corners.append(a)
+            if edge in chosen and edge not in given:  # the second panel keeps the edge whole
+                corners.append(number[edge])
+                given.add(edge)
+        faces.append(corners)
+    found = built(listed([*p.vertices, *middles], faces))
+    assert len(found.pattern.creases) == len(p.creases) + 5
+    assert len(found.pattern.boundary) == len(p.boundary)

@@ -96,7 +96,7 @@ def test_flat_patterns_of_every_generator(kind, extension, tmp_path):
 
 
 @pytest.mark.parametrize("extension", BOTH)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_random_flat_patterns(extension, seed, tmp_path_factory):
     p = planar(seed, LETTERS.get(extension, "MVFU"), extension in ANGLED)
@@ -106,7 +106,7 @@ def test_random_flat_patterns(extension, seed, tmp_path_factory):
 
 
 @pytest.mark.parametrize("extension", FOLDED)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_random_folded_patterns(extension, seed, tmp_path_factory):
     """Heights make every crease a mountain or a valley; numbers stay to the last digit."""

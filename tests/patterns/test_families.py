@@ -156,6 +156,50 @@ def test_families_of_a_pattern_in_a_case_file(tmp_path):
             fd.read_case(path).case()
 
 
+def test_letters_and_angles_of_a_pattern_by_family():
+    """Pairs refine families; a size folds each crease its own way."""
+    flat = fd.patterns.miura((2, 2), dihedral=180)
+    a, b = flat.creases[flat.families["zigzag"][0]].tolist()
+    named = flat.changed(assignments={"straight": "V", "zigzag": "M", (b, a): "V"})
+    letters = np.array(named.assignments)
+    assert set(letters[STRAIGHT]) == {"V"} and set(letters[ZIGZAG[1:]]) == {"M"}
+    assert letters[ZIGZAG[0]] == "V"
+    told = named.changed(fold_angles={"zigzag": 1.0, (a, b): 0.25, "straight": 0.5}).fold_angles
+    assert set(told[ZIGZAG[1:]]) == {-1.0} and told[ZIGZAG[0]] == 0.25
+    assert set(told[STRAIGHT]) == {0.5}
+    only = named.changed(fold_angles={"mountain": 1.0}).fold_angles
+    np.testing.assert_array_equal(np.isnan(only), letters != "M")
+
+
+def test_facets_by_family():
+    flat = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]
+    strip = Pattern(flat, [(0, 1, 4, 3), (1, 2, 5, 4)], families={"middle": [(1, 4)]})
+    assert fd.welded(strip, "middle", join=False).welds.tolist() == [[1, 4]]
+    with pytest.raises(InputError, match=r'facets = "midle": did you mean'):
+        fd.welded(strip, "midle")
+
+
+def test_letters_and_angles_by_family_in_a_case_file(tmp_path):
+    path = tmp_path / "case.toml"
+    text = INLINE.replace('["V"]', '{ spine = "M" }\nfold_angles = { spine = 90 }')
+    path.write_text(text)
+    pattern = fd.read_case(path).pattern
+    assert pattern.assignments == ("M",) and np.degrees(pattern.fold_angles) == pytest.approx(-90)
+    for old, new, message in (
+        ('{ spine = "M" }', "{ spine = 1 }", "assignments = .*or a table by family"),
+        ("{ spine = 90 }", '{ spine = "90" }', "fold_angles = .*or a table of sizes by family"),
+        (
+            '{ spine = "M" }',
+            '{ spin = "M" }',
+            "is no family; did you mean 'spine'",
+        ),
+        ("{ spine = 90 }", "{ spine = -90 }", r"fold_angles.spine = -1.57.*: is a size"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=message):
+            fd.read_case(path)
+
+
 def test_words_of_a_pattern():
     assert crease_rows("creases", "all", MIURA).tolist() == list(range(len(LETTERS)))
     np.testing.assert_array_equal(crease_rows("c", "valley", MIURA), np.flatnonzero(LETTERS == "V"))
@@ -185,6 +229,25 @@ def test_words_of_a_pattern():
         (lambda: bars(crease_rest={3: 90}), "crease_rest: 3 is no assignment or family"),
         (lambda: fd.thicken(MIURA, 1e-4, {"rim": 0.0}), "offsets.rim: this pattern knows"),
         (lambda: fd.Actuate(" ", 90), 'creases = " ": give crease numbers'),
+        (
+            lambda: MIURA.changed(assignments={"rim": "V"}),
+            r'assignments.rim: is no family; this pattern has "zigzag", "straight"; give a family',
+        ),
+        (
+            lambda: MIURA.changed(assignments={"valley": "V"}),
+            "assignments.valley: is no family; this pattern has",
+        ),
+        (
+            lambda: MIURA.changed(
+                families={"a": MIURA.creases[:2], "b": MIURA.creases[1:3]},
+                assignments={"a": "V", "b": "M"},
+            ),
+            r'assignments.b = "M": crease \(\d+, \d+\) has a letter by another family already',
+        ),
+        (
+            lambda: MIURA.changed(assignments={"zigzag": "U"}, fold_angles={"zigzag": 1.0}),
+            "fold_angles.zigzag = 1: some of them are neither mountain nor valley",
+        ),
         (
             lambda: crease_rows("creases", "flat", MIURA),
             'creases = "flat": this pattern has no crease assigned flat',

@@ -179,7 +179,7 @@ def test_eggbox_against_its_formulas(dihedral):
             np.testing.assert_allclose(p.vertices[i * 7 + j], expected, atol=1e-13)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     kind=st.sampled_from(["miura", "eggbox"]),
     a=st.floats(1e-3, 1e3),

@@ -174,7 +174,7 @@ def test_what_cannot_be_thick(make, message):
         make()
 
 
-def test_a_fold_file_of_thick_panels_warns():
+def test_a_fold_file_of_thick_panels_warns(tmp_path):
     with pytest.warns(fd.errors.FoldynWarning, match="no place for the thickness"):
-        text = fd.formats.fold.write(fd.thicken(strip(2, fold_angle=30), T))
-    assert '"edges_foldAngle"' in text
+        fd.write_pattern(tmp_path / "thick.fold", fd.thicken(strip(2, fold_angle=30), T))
+    assert '"edges_foldAngle"' in (tmp_path / "thick.fold").read_text()

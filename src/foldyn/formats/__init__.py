@@ -2,20 +2,6 @@
 
 from __future__ import annotations
 
-from foldyn.formats.building import Built
-from foldyn.formats.diagnosis import Diagnosis
-from foldyn.formats.drawing import Drawing
-from foldyn.formats.files import FORMATS, Format, diagnose, read_pattern, write_pattern
-from foldyn.formats.frames import Frame
+from foldyn.facade import lazy
 
-__all__ = [
-    "FORMATS",
-    "Built",
-    "Diagnosis",
-    "Drawing",
-    "Format",
-    "Frame",
-    "diagnose",
-    "read_pattern",
-    "write_pattern",
-]
+__getattr__, __dir__, __all__ = lazy(__name__, __file__)

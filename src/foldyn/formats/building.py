@@ -12,14 +12,14 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.formats.cuts import opened
 from foldyn.formats.diagnosis import Diagnosis
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.flat_drawings import flat_panels
+from foldyn.formats.lines import MOST_LINES, Lines, too_many
 from foldyn.formats.listed_panels import listed_panels
 from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels
-from foldyn.formats.planar import MOST_LINES, Lines, too_many
 from foldyn.patterns import Pattern
 from foldyn.patterns.flat_foldability import flat_foldability
 from foldyn.patterns.topology import Edge, Faces, edge_lookup
+from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import LONGEST, SHORTEST, number
 
 _FARTHEST = 1e8  # from the origin, over the size: coordinates keep eight digits within the drawing
@@ -74,6 +74,8 @@ def built(drawing: Drawing, *, meters: float | None = None, scale: float = 1.0) 
     notes = Notes(drawing, unit)
     lines = _lines(drawing, unit, notes)
     if drawing.faces is None:
+        from foldyn.formats.flat_drawings import flat_panels
+
         panels = flat_panels(lines, notes)
     else:
         panels = listed_panels(lines, drawing.faces, notes)
@@ -179,7 +181,7 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
             panels.points, faces, letters, drawing.name, fold_angles=angles, custom=drawing.custom
         )
     notes.doubts += [str(doubt.message) for doubt in doubts]
-    return pattern
+    return _with_fronts(pattern, panels.faces, drawing, notes)
 
 
 def _turned(bare: Pattern, letters: NDArray[np.str_], notes: Notes) -> Faces:
@@ -192,3 +194,20 @@ def _turned(bare: Pattern, letters: NDArray[np.str_], notes: Notes) -> Faces:
         return bare.faces
     notes.repairs.append("turned all panels over: seen from their front, every letter was wrong")
     return tuple((face[0], *face[:0:-1]) for face in bare.faces)
+
+
+def _with_fronts(pattern: Pattern, faces: Faces, drawing: Drawing, notes: Notes) -> Pattern:
+    """The pattern with the order of its layers, if its panels, from `faces`, are those of the file.
+
+    It is said of fronts, which are the other sides of panels that were turned over.
+    """
+    given = pattern.custom.get(FACE_ORDERS)
+    if given is None:
+        return pattern
+    custom = {key: value for key, value in pattern.custom.items() if key != FACE_ORDERS}
+    if len(faces) == len(drawing.faces or ()):
+        turned = [now[1] != before[1] for now, before in zip(pattern.faces, faces, strict=True)]
+        custom[FACE_ORDERS] = [[f, g, -s if turned[g] else s] for f, g, s in given]
+    else:
+        notes.repairs.append(f"{FACE_ORDERS} left out: the panels are not those of the file")
+    return pattern.changed(custom=custom)

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
 from foldyn.values import show
@@ -61,11 +59,4 @@ def read(text: str) -> Drawing:
         places.append(place)
     if not letters:
         raise InputError(": there are none; give a file with a crease pattern", "lines")
-    return Drawing(
-        np.array(points),
-        np.arange(2 * len(letters)).reshape(-1, 2),
-        tuple(letters),
-        np.full(len(letters), np.nan),
-        assumed=1e-3,
-        places=tuple(places),
-    )
+    return Drawing.of_lines(points, letters, assumed=1e-3, places=tuple(places))

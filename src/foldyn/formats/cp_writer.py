@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.formats.writers import flat_points, letters, warn_of_angles, warn_of_boards
+from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.patterns import Pattern
 
 KINDS = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 4, "U": 4}
@@ -29,7 +29,6 @@ def write(pattern: Pattern) -> str:
     InputError
         The pattern is folded.
     """
-    warn_of_boards(pattern)
     warn_of_angles(pattern, "CP")
     points = (PER_METER * flat_points(pattern, "CP") * np.array([1.0, -1.0])).tolist()
     lines = [

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,3 +64,24 @@ class Drawing:
     families: Mapping[str, Sequence[tuple[int, int]]] = field(default_factory=dict)
     welds: Sequence[tuple[int, int]] | None = None
     custom: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_lines(
+        cls, points: ArrayLike, letters: Sequence[str], fold_angles: ArrayLike = np.nan, **more: Any
+    ) -> Self:
+        """Drawing of lines with ends of their own.
+
+        Parameters
+        ----------
+        points : array_like, shape (2m, d)
+            Both ends of each line in turn.
+        letters : sequence of str, length m
+        fold_angles : array_like, shape (m,), optional
+            Degrees; without it none is given.
+        **more
+            Further fields.
+        """
+        count = len(letters)
+        angles = np.array(np.broadcast_to(fold_angles, count), dtype=np.float64)
+        ends = np.arange(2 * count).reshape(-1, 2)
+        return cls(np.array(points), ends, tuple(letters), angles, **more)

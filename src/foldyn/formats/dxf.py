@@ -24,8 +24,8 @@ from foldyn.formats.curves import CHORD
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.dxf_writer import ezdxf
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.notes import count
-from foldyn.formats.planar import MOST_LINES, too_many
 from foldyn.formats.units import METERS
 from foldyn.input_files import DEEPEST
 from foldyn.values import LONGEST, shortened
@@ -100,11 +100,9 @@ def read(text: str) -> Drawing:
     if not total:
         raise InputError(": all are points; give a file with a crease pattern", "lines")
     repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
-    return Drawing(
+    return Drawing.of_lines(
         np.concatenate(points),
-        np.arange(2 * total).reshape(-1, 2),
-        tuple(letters),
-        np.full(total, np.nan),
+        letters,
         meters=_meters(document),
         assumed=1e-3,
         places=tuple(places),

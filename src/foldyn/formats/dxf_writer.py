@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 from typing import Any
 
-from foldyn.errors import InputError
+from foldyn.errors import optional
 from foldyn.formats.svg_writer import NAMES, PER_METER
-from foldyn.formats.writers import flat_points, letters, warn_of_angles, warn_of_boards
+from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.patterns import Pattern
 
 COLORS = {"B": 7, "M": 1, "V": 5, "F": 2, "U": 6, "C": 3}
 """Color index of AutoCAD of each layer: black or white, red, blue, yellow, magenta, green."""
+
+MILLIMETERS = 4
+"""Number of the unit in $INSUNITS."""
 
 
 def write(pattern: Pattern) -> str:
@@ -31,11 +34,10 @@ def write(pattern: Pattern) -> str:
     InputError
         The pattern is folded, or ezdxf is not installed.
     """
-    warn_of_boards(pattern)
     warn_of_angles(pattern, "DXF")
     points = (PER_METER * flat_points(pattern, "DXF")).tolist()
     library = ezdxf()
-    document = library.new("R2010", units=library.units.MM)
+    document = library.new("R2010", units=MILLIMETERS)
     space = document.modelspace()
     edges = letters(pattern)
     for letter in COLORS:
@@ -56,11 +58,4 @@ def ezdxf() -> Any:
     InputError
         It is not installed.
     """
-    try:
-        import ezdxf
-        import ezdxf.units
-    except ImportError:
-        raise InputError(
-            "DXF files need ezdxf, which is not installed: pip install ezdxf (or foldyn[dxf])"
-        ) from None
-    return ezdxf
+    return optional("ezdxf", "DXF files need ezdxf", "ezdxf (or foldyn[dxf])")

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from foldyn.errors import within
-from foldyn.formats.building import Built
-from foldyn.formats.drawing import Drawing
 from foldyn.formats.notes import count
 from foldyn.patterns import Pattern, welded
-from foldyn.patterns.facets import COPLANAR
+from foldyn.patterns.facets import COPLANAR, FACETS, HINGE, WELD
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import choice
 
-WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
-"""What facets become: nothing, where panels can be joined, or welds; welds; creases."""
+if TYPE_CHECKING:
+    from foldyn.formats.building import Built
+    from foldyn.formats.drawing import Drawing
 
 
 def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:

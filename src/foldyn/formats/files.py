@@ -10,15 +10,28 @@ from pathlib import Path
 from typing import Any, Literal
 
 from foldyn.errors import FoldynWarning, InputError, within
-from foldyn.formats import cp, cp_writer, dxf, dxf_writer, fold, obj, opx, stl, svg, svg_writer
+from foldyn.formats import (
+    cp,
+    cp_writer,
+    dxf,
+    dxf_writer,
+    fold,
+    fold_writer,
+    obj,
+    opx,
+    stl,
+    svg,
+    svg_writer,
+)
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.facets import with_facets
-from foldyn.formats.frames import Frame
 from foldyn.formats.kept import with_families, without_repetition
 from foldyn.formats.units import METERS
+from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
+from foldyn.patterns.frames import Frame
 from foldyn.values import choice, number
 from foldyn.writing import write_bytes
 
@@ -55,9 +68,14 @@ class Format:
     write: Callable[..., str] | None = None
     frames: bool = False
 
+    @property
+    def named(self) -> str:
+        """A file of this format, with its article: "an SVG file", as it is spelled out."""
+        return f"{'an' if self.name[0] in 'OS' else 'a'} {self.name} file"
+
 
 _FORMATS = (
-    Format("FOLD", (".fold",), read=fold.read, write=fold.write, frames=True),
+    Format("FOLD", (".fold",), read=fold.read, write=fold_writer.write, frames=True),
     Format("OBJ", (".obj",), read=obj.read, write=obj.write),
     Format("SVG", (".svg",), read=svg.read, write=svg_writer.write),
     Format("CP", (".cp",), read=cp.read, write=cp_writer.write),
@@ -151,7 +169,7 @@ def diagnose(
         raise InputError(f"{file}: {fmt.name} files can be written but not read.")
     if frame is not None and not fmt.frames:
         raise InputError(f": {fmt.name} files have no frames; leave it out", "frame", file)
-    text = read_text(file, f"a {fmt.name} file", MOST, "leave out all but the pattern")
+    text = read_text(file, fmt.named, MOST, "leave out all but the pattern")
     with within("", file):
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
         made = built(drawing, meters=meters, scale=factor)
@@ -190,6 +208,7 @@ def write_pattern(
     if frames and not fmt.frames:
         able = ", ".join(end for end, each in FORMATS.items() if each.frames)
         raise InputError(f": {fmt.name} files hold one state; write {able}", "frames", file)
+    warn_of_boards(pattern)
     with within("", file):
         content = fmt.write(pattern, *((frames,) if fmt.frames else ())).encode()
     try:

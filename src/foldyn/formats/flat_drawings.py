@@ -7,18 +7,11 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.formats import gaps
+from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
-from foldyn.formats.panels import Panels, compact, enclosed, sheet, with_inner_borders
-from foldyn.formats.planar import (
-    Lines,
-    check_crowding,
-    joined,
-    on_lines,
-    single,
-    split,
-    tolerance_of,
-    without_points,
-)
+from foldyn.formats.panels import Panels, compact, with_inner_borders
+from foldyn.formats.planar import check_crowding, joined, on_lines, split, tolerance_of
+from foldyn.formats.regions import enclosed, sheet
 
 _SAME = 1e-9  # of the size: ends that are farther apart are told of
 _PLANE = 1e-9  # of the size
@@ -30,7 +23,7 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     Parameters
     ----------
     lines : Lines
-        As drawn (m), with two coordinates, or three of which the last is the same everywhere.
+        As drawn (m), with two coordinates, or three of which one is the same everywhere.
     notes : Notes
         Gets what is repaired and doubted.
 
@@ -39,7 +32,7 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     InputError
         The lines are not in the plane, enclose nothing, or are too many.
     """
-    lines = _in_plane(lines)
+    lines = _in_plane(lines, notes)
     tolerance = tolerance_of(lines)
     whole = _joined(lines, tolerance, notes)
     whole, contradictions = single(whole)
@@ -86,15 +79,24 @@ def flat_panels(lines: Lines, notes: Notes) -> Panels:
     return compact(panels)
 
 
-def _in_plane(lines: Lines) -> Lines:
+def _in_plane(lines: Lines, notes: Notes) -> Lines:
+    """Lines in the plane of x and y, of a coordinate plane as seen from its positive side."""
     points = lines.points
     if not len(lines.ends):
         raise InputError(": there are none; give a file with a crease pattern", "lines")
     if points.shape[1] == 3:
-        used = points[np.unique(lines.ends)]
-        if np.ptp(used[:, 2]) > _PLANE * np.linalg.norm(np.ptp(used, axis=0)):
+        extent = np.ptp(points[np.unique(lines.ends)], axis=0)
+        x, y, z = points.T
+        even = extent <= _PLANE * np.linalg.norm(extent)
+        if not even.any():
             raise InputError(
                 ": panels cannot be found from lines in space; give a file with faces", "lines"
+            )
+        if not even[2]:
+            points = np.stack([x, -z] if even[1] else [y, z], axis=1)
+            notes.repairs.append(
+                f"turned the drawing, which is in the plane of {'x' if even[1] else 'y'} and z, "
+                "into that of x and y"
             )
     return Lines(points[:, :2], lines.ends, lines.letters, lines.angles, lines.source)
 

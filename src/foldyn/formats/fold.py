@@ -7,7 +7,6 @@ what other programs have put in (keys with a colon).
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -17,12 +16,10 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.frames import Frame, fold_angles
+from foldyn.formats.notes import count
 from foldyn.formats.units import METERS
-from foldyn.formats.writers import is_plane, letters, warn_of_boards
 from foldyn.input_files import from_json
-from foldyn.patterns import Pattern
-from foldyn.patterns.topology import edge_lookup
+from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.values import choice, show
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
@@ -65,6 +62,7 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
             raise InputError(f"{field} is missing: {_with_field(document, field, what)}.")
     vertices = _vertices(_list(fields, "vertices_coords"))
     faces = _faces(fields, len(vertices))
+    repairs += _mend_letters(fields)
     edges, assignments, angles = _edges(fields, len(vertices), faces is not None)
     custom, dropped = _custom(fields)
     if dropped:
@@ -77,7 +75,7 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
     places = tuple(f"edges_vertices[{e}]" for e in range(len(assignments)))
     return Drawing(
         vertices, edges, assignments, angles, faces, METERS.get(unit), name=str(title),
-        places=places, repairs=tuple(repairs),
+        places=places, repairs=tuple(repairs), doubts=_angle_doubts(angles),
         families=_families(fields.get(FAMILIES, {}), len(vertices)),
         welds=_welds(fields, len(vertices)), custom=custom,
     )  # fmt: skip
@@ -90,12 +88,12 @@ def _document(text: str) -> tuple[dict[str, Any], list[str]]:
         document = from_json(text)
     except InputError as error:
         mended = _COMMA.sub(lambda found: found[1] or "", text)
-        count = len(text) - len(mended)
+        commas = len(text) - len(mended)
         try:
-            document = from_json(mended if count else text)
+            document = from_json(mended if commas else text)
         except InputError:
             raise InputError(f"{error}, as a FOLD file must be.") from None
-        repairs.append(f"{count} comma{'s' if count > 1 else ''} before a closing bracket removed")
+        repairs.append(f"{count(commas, 'comma')} before a closing bracket removed")
     if not isinstance(document, dict):
         raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
     return document, repairs
@@ -210,6 +208,37 @@ def _faces(fields: dict[str, Any], count: int) -> tuple[tuple[int, ...], ...] | 
     return tuple(faces) or None  # some programs write an empty list
 
 
+def _mend_letters(fields: dict[str, Any]) -> list[str]:
+    """Write small letters large and "U" for null; returns what was done."""
+    given = fields.get("edges_assignment")
+    if not isinstance(given, list):
+        return []
+    letters = ["U" if each is None else each for each in given]
+    letters = [each.upper() if isinstance(each, str) else each for each in letters]
+    fields["edges_assignment"] = letters
+    missing = sum(each is None for each in given)
+    small = sum(one != other for one, other in zip(given, letters, strict=True)) - missing
+    return [
+        f"edges_assignment: {count(number, what, plural)} taken as {as_what}"
+        for number, what, plural, as_what in (
+            (missing, "null", "nulls", "U, unassigned"),
+            (small, "small letter", "", "large"),
+        )
+        if number
+    ]
+
+
+def _angle_doubts(angles: NDArray[np.float64]) -> tuple[str, ...]:
+    """What to say of fold angles that look like radians."""
+    largest = float(np.abs(np.nan_to_num(angles)).max(initial=0.0))
+    if abs(largest - np.pi) > 1e-3:
+        return ()
+    return (
+        f"edges_foldAngle: the largest is {largest:.5g}, as if they were radians; FOLD has "
+        "degrees, as which they are read",
+    )
+
+
 def _edges(
     fields: dict[str, Any], count: int, with_faces: bool
 ) -> tuple[NDArray[np.int64], tuple[str, ...], NDArray[np.float64]]:
@@ -274,7 +303,23 @@ def _custom(fields: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Data of other programs, and the keys of those that would not fit a repaired pattern."""
     keys = [key for key in fields if ":" in key and key not in (FAMILIES, WELDS)]
     dropped = [key for key in keys if _OF_ELEMENTS.match(key)]
-    return {key: fields[key] for key in keys if key not in dropped}, dropped
+    custom = {key: fields[key] for key in keys if key not in dropped}
+    if FACE_ORDERS in fields:
+        custom[FACE_ORDERS] = _face_orders(fields)
+    return custom, dropped
+
+
+def _face_orders(fields: dict[str, Any]) -> list[list[int]]:
+    """Order of the layers: rows (f, g, s), panel f above (1) or below (-1) g, 0 if unknown."""
+    count, rows = len(fields.get("faces_vertices", ())), _list(fields, FACE_ORDERS)
+    for k, row in enumerate(rows):
+        known = isinstance(row, list) and len(row) == 3 and all(type(n) is int for n in row)
+        if not known or not all(0 <= f < count for f in row[:2]) or row[2] not in (-1, 0, 1):
+            raise InputError(
+                f"{FACE_ORDERS}[{k}] = {show(row)}: give two face numbers from 0 to {count - 1}, "
+                "and 1, -1 or 0."
+            )
+    return rows
 
 
 def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
@@ -292,83 +337,3 @@ def _welds(fields: dict[str, Any], count: int) -> list[tuple[int, int]] | None:
     if WELDS not in fields:
         return None
     return [_pair(f"{WELDS}[{k}]", pair, count) for k, pair in enumerate(_list(fields, WELDS))]
-
-
-def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
-    """Text of a FOLD file (1.2); reading it gives the same pattern to the last digit.
-
-    Parameters
-    ----------
-    pattern : Pattern
-        What to write: the key frame. Its fold angles are those to fold to, where they are given,
-        or else those at which a folded pattern is; a flat one without angles has none.
-    frames : sequence of Frame, optional
-        Further states, which inherit all but coordinates and fold angles from the key frame.
-
-    Returns
-    -------
-    str
-        JSON with vertices (two coordinates when all z are 0), faces, edges, their assignment
-        and fold angle (degrees, valleys positive; 0 on the boundary), in meters.
-    """
-    warn_of_boards(pattern)
-    flat = is_plane(pattern)
-    folded = not flat or bool(np.any(np.abs(pattern.flat_dihedrals - pattern.dihedrals) > 1e-6))
-    row = edge_lookup(pattern.creases)
-    edges = letters(pattern)
-    rows = [row.get(edge) for edge, *_ in edges]
-    wanted = pattern.fold_angles
-    angles = fold_angles(pattern) if np.isnan(wanted).all() and folded else wanted
-    fields: dict[str, Any] = {
-        "file_spec": 1.2,
-        "file_creator": "Foldyn",
-        "file_classes": ["animation" if frames else "singleModel"],
-        **({"frame_title": pattern.name} if pattern.name else {}),
-        "frame_classes": ["foldedForm" if folded else "creasePattern"],
-        "frame_attributes": ["2D" if flat else "3D"],
-        "frame_unit": "m",
-        "vertices_coords": pattern.vertices[:, : 2 if flat else 3].tolist(),
-        "faces_vertices": [list(face) for face in pattern.faces],
-        "edges_vertices": pattern.edges.tolist(),
-        "edges_assignment": [letter for _, letter, _ in edges],
-        **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
-        **({FAMILIES: _named(pattern)} if pattern.families else {}),
-        **({WELDS: pattern.welds.tolist()} if any(letter == "F" for _, letter, _ in edges) else {}),
-        **pattern.custom,
-    }
-    lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in fields.items()]
-    if frames:
-        inside = ",\n".join(f"    {json.dumps(_state(pattern, f, rows))}" for f in frames)
-        lines.append(f'  "file_frames": [\n{inside}\n  ]')
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _state(pattern: Pattern, frame: Frame, rows: Sequence[int | None]) -> dict[str, Any]:
-    """Fields of a frame that inherits the rest from the key frame."""
-    return {
-        "frame_title": frame.title,
-        "frame_classes": ["foldedForm"],
-        "frame_attributes": ["3D"],
-        "frame_parent": 0,
-        "frame_inherit": True,
-        "vertices_coords": frame.vertices.tolist(),
-        "edges_foldAngle": _degrees(fold_angles(pattern, frame.vertices), rows),
-    }
-
-
-def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
-    """Angles of all edges, given those of the creases; 0 on the boundary, None where unknown."""
-    found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
-    return [None if np.isnan(angle) else angle for angle in found]
-
-
-def _named(pattern: Pattern) -> dict[str, list[list[int]]]:
-    """Vertex pairs of the creases of each family."""
-    return {name: pattern.creases[rows].tolist() for name, rows in pattern.families.items()}
-
-
-def _json(value: Any) -> str:
-    """JSON with one line for each row of a table."""
-    if isinstance(value, list) and value and isinstance(value[0], list):
-        return "[\n" + ",\n".join(f"    {json.dumps(row)}" for row in value) + "\n  ]"
-    return json.dumps(value)

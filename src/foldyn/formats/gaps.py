@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely import STRtree
 
-from foldyn.formats.planar import Lines, joined, renumbered, segments, single, split, without_points
+from foldyn.formats.lines import Lines, single, without_points
+from foldyn.formats.planar import joined, renumbered, segments, split
 
 GAP = 5e-3
 """Distance that an open end may miss its target by, over the drawing's size."""

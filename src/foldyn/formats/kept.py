@@ -8,7 +8,7 @@ import numpy as np
 
 from foldyn.formats.building import Built
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.frames import fold_angles
+from foldyn.patterns.frames import fold_angles
 
 SAME = 1e-4  # rad: digits of a file
 

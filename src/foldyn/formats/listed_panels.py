@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.formats.lines import Lines, single, without_points
 from foldyn.formats.notes import Notes, count
 from foldyn.formats.panels import Panels, compact, with_inner_borders
-from foldyn.formats.planar import Lines, single, without_points
+from foldyn.formats.t_junctions import with_corners_on_edges
 from foldyn.patterns.geometry import face_geometry, seams
 from foldyn.patterns.topology import Edge, Faces, around, build_topology, checked_faces, edge_of
 from foldyn.values import show
 
-_ROUNDS = 4
+_ROUNDS = 8
 
 
 def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
@@ -50,13 +53,23 @@ def listed_panels(lines: Lines, faces: Faces, notes: Notes) -> Panels:
         notes.repairs.append(
             f"left out {count(twice, 'panel')} listed twice or of fewer than 3 corners"
         )
-    merged = 0
+    merged = divided = 0
     for _ in range(_ROUNDS):  # joined panels may close further seams
-        into = _seam_points(panels)
-        if into is None:
+        into, wound, points, normals = _seam_points(panels)
+        if into is not None:
+            merged += int(np.count_nonzero(into != np.arange(len(into))))
+            panels = _renumbered(panels, into)
+            continue
+        whole = replace(panels, faces=wound)
+        parted, more = with_corners_on_edges(whole, points, normals)
+        if not more:
             break
-        merged += int(np.count_nonzero(into != np.arange(len(into))))
-        panels = _renumbered(panels, into)
+        panels, divided = parted, divided + more
+    if divided:
+        notes.repairs.append(
+            f"divided edges of panels at {count(divided, 'vertex', 'vertices')} of others that lie "
+            "in them"
+        )
     if merged:
         notes.repairs.append(f"merged {count(merged, 'vertex', 'vertices')} where panels meet")
         panels = compact(panels)
@@ -101,8 +114,13 @@ def _once(panels: Panels) -> tuple[Panels, int]:
     return Panels(panels.points, tuple(faces.values()), panels.letters, panels.angles), left
 
 
-def _seam_points(panels: Panels) -> NDArray[np.int64] | None:
-    """Number of the point that each is merged into, or None where panels meet as they should."""
+def _seam_points(
+    panels: Panels,
+) -> tuple[NDArray[np.int64] | None, Faces, NDArray[np.float64], NDArray[np.float64]]:
+    """Number of the point that each is merged into, or None where panels meet as they should.
+
+    With it the panels, wound alike, their points in space, and their normals.
+    """
     points = np.zeros((len(panels.points), 3))
     points[:, : panels.points.shape[1]] = panels.points
     topology = build_topology(checked_faces(panels.faces, len(points)), len(points))
@@ -119,8 +137,9 @@ def _seam_points(panels: Panels) -> NDArray[np.int64] | None:
             low, high = sorted((_root(into, a), _root(into, b)))
             into[high] = low
     if np.array_equal(into, np.arange(len(points))):
-        return None
-    return np.array([_root(into, k) for k in range(len(points))])
+        return None, topology.faces, points, normals
+    into = np.array([_root(into, k) for k in range(len(points))])
+    return into, topology.faces, points, normals
 
 
 def _root(into: NDArray[np.int64], point: int) -> int:

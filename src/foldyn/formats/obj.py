@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.units import METERS
-from foldyn.formats.writers import letters, warn_of_boards
+from foldyn.formats.writers import letters
 from foldyn.patterns import Pattern
 from foldyn.values import show
 
@@ -98,7 +98,7 @@ def read(text: str) -> Drawing:
         points[:, 1] *= -1.0
         faces = [face if _area(points[list(face)]) > 0.0 else face[::-1] for face in faces]
     return Drawing(
-        points if faces else _in_plane(points),
+        points,
         np.array([each.edge for each in every], dtype=np.int64).reshape(-1, 2),
         tuple(each.letter for each in every),
         _angles(every),
@@ -155,7 +155,8 @@ def _vertex(word: str, known: tuple[int, int], place: str) -> int:
 def _area(corners: NDArray) -> float:
     """Signed area of a polygon (k, 3) in the plane z = 0."""
     x, y = corners[:, 0], corners[:, 1]
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are refused later
+        return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _crease(
@@ -202,17 +203,6 @@ def _meters(comment: str) -> float | None:
     return METERS.get(_NAMES.get(word, word))
 
 
-def _in_plane(points: NDArray) -> NDArray[np.float64]:
-    """Points of a drawing in a coordinate plane, seen from its positive side, with z = 0."""
-    flat = np.ptp(points, axis=0) == 0.0
-    x, y, z = points.T
-    if not flat[2] and flat[1]:
-        points = np.stack([x, -z, 0.0 * y], axis=1)
-    elif not flat[2] and flat[0]:
-        points = np.stack([y, z, 0.0 * x], axis=1)
-    return points
-
-
 def write(pattern: Pattern) -> str:
     """Text of an OBJ file, in meters: vertices, faces, and all edges as lines #e.
 
@@ -226,7 +216,6 @@ def write(pattern: Pattern) -> str:
     -------
     str
     """
-    warn_of_boards(pattern)
     lines = ["# Foldyn", "# unit: m", "# edges: #e vertex vertex kind angle; kinds: "
              "0 boundary, 1 flat, 2 valley, 3 mountain, 4 unassigned, 5 cut"]  # fmt: skip
     if pattern.name:

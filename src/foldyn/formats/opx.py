@@ -8,15 +8,16 @@ Source of the format: fold's src/oripa.coffee (https://github.com/edemaine/fold)
 from __future__ import annotations
 
 import math
-from xml.etree.ElementTree import Element
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
 from foldyn.formats.cp import LETTERS
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.xml_text import from_xml, local
 from foldyn.values import show
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 _COORDINATES = ("x0", "y0", "x1", "y1")
 
@@ -63,14 +64,7 @@ def read(text: str) -> Drawing:
             _coordinate(values.get(name, "0"), f"lines[{number}].{name}") for name in _COORDINATES
         )
         points += [(x0, -y0), (x1, -y1)]
-    return Drawing(
-        np.array(points),
-        np.arange(2 * len(letters)).reshape(-1, 2),
-        tuple(letters),
-        np.full(len(letters), np.nan),
-        assumed=1e-3,
-        name=_title(root),
-    )
+    return Drawing.of_lines(points, letters, assumed=1e-3, name=_title(root))
 
 
 def _properties(element: Element) -> dict[str, str]:

@@ -7,10 +7,8 @@ more corners are cut into triangles between their corners; what they are creased
 from __future__ import annotations
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from foldyn.formats.writers import warn_of_boards
 from foldyn.patterns import Pattern
 
 PER_METER = 1e3
@@ -28,7 +26,6 @@ def write(pattern: Pattern) -> str:
     -------
     str
     """
-    warn_of_boards(pattern)
     name = " ".join(pattern.name.split()) or "foldyn"
     corners = PER_METER * pattern.vertices[triangles(pattern)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -52,6 +49,8 @@ def triangles(pattern: Pattern) -> NDArray[np.int64]:
 
 def _cut(face: tuple[int, ...], corners: NDArray, normal: NDArray) -> list[tuple[int, ...]]:
     """Triangles of a polygon, cut in its mean plane."""
+    import shapely
+
     first = corners[1] - corners[0]
     first = first - (first @ normal) * normal
     axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)

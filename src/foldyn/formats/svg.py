@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import Element
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ from foldyn.errors import InputError
 from foldyn.formats.curves import CHORD
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.notes import count
-from foldyn.formats.planar import MOST_LINES, too_many
 from foldyn.formats.svg_shapes import (
     PIXEL,
     SHAPES,
@@ -35,6 +35,9 @@ from foldyn.formats.svg_shapes import (
 from foldyn.formats.svg_styles import Rules, Style, rules_of, styled
 from foldyn.formats.xml_text import DEEPEST, from_xml, local
 from foldyn.values import LONGEST
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
@@ -215,10 +218,9 @@ def _drawing(
     angles, said = _fold_angles(np.array(letters), np.array(opacities))
     curved = sum(not curve.straight for curve, *_ in lines.curves)
     repairs = [f"{count(curved, 'curve')} drawn as chords, within {tolerance:.3g} units"]
-    return Drawing(
+    return Drawing.of_lines(
         np.concatenate(points),
-        np.arange(2 * total).reshape(-1, 2),
-        tuple(letters),
+        letters,
         angles,
         meters=frame.pixels * PIXEL if frame.physical else None,
         assumed=frame.pixels * PIXEL,

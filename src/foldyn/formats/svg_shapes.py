@@ -6,17 +6,18 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
-from xml.etree.ElementTree import Element
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from svgelements import Arc, Close, CubicBezier, Matrix, Move, Path, QuadraticBezier
 
 from foldyn.errors import InputError
 from foldyn.formats.curves import arc_chords, bezier
 from foldyn.formats.xml_text import local
 from foldyn.values import show
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 PIXEL = 0.0254 / 96
 """Length of a CSS pixel (m)."""
@@ -69,6 +70,8 @@ def numbers(text: str) -> list[float]:
 
 def placing(text: str | None, place: str) -> Placing:
     """Affine map of a `transform`."""
+    from svgelements import Matrix
+
     text = (text or "").strip()
     if not text or text == "none":
         return np.eye(3)[:2]
@@ -167,6 +170,8 @@ def _ellipse(
 
 
 def _path(text: str, place: str) -> Iterator[Curve]:
+    from svgelements import Arc, Close, CubicBezier, Move, Path, QuadraticBezier
+
     if text.strip() in ("", "none"):
         return
     try:

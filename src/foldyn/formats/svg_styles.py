@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from xml.etree.ElementTree import Element
-
-from svgelements import Color
+from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
 from foldyn.formats.line_colors import RGB
 from foldyn.formats.xml_text import local
 from foldyn.values import show
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 PROPERTIES = ("stroke", "stroke-opacity", "opacity", "display", "visibility", "color")
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
@@ -146,6 +147,8 @@ def _given(element: Element, rules: Rules) -> Mapping[str, str]:
 
 def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
     """Color and opacity of a paint; the first color of a gradient is not known: black."""
+    from svgelements import Color
+
     word = value.lower()
     if word in ("none", "transparent", ""):
         return None, 1.0

@@ -8,12 +8,12 @@ nor readers of crease patterns take for lines.
 
 from __future__ import annotations
 
-from xml.sax.saxutils import escape
+from html import escape
 
 import numpy as np
 
 from foldyn.formats.line_colors import COLORS
-from foldyn.formats.writers import flat_points, letters, warn_of_boards
+from foldyn.formats.writers import flat_points, letters
 from foldyn.patterns import Pattern
 
 PER_METER = 1e3  # mm
@@ -48,7 +48,6 @@ def write(pattern: Pattern) -> str:
     InputError
         The pattern is folded.
     """
-    warn_of_boards(pattern)
     points = PER_METER * flat_points(pattern, "SVG")
     points = np.stack([points[:, 0], 0.0 - points[:, 1]], axis=1)
     left, top = points.min(axis=0).tolist()
@@ -67,7 +66,7 @@ def write(pattern: Pattern) -> str:
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{page!r}mm" height="{total!r}mm" '
         f'viewBox="{left - margin!r} {top - margin!r} {page!r} {total!r}">',
-        *([f"<title>{escape(pattern.name)}</title>"] if pattern.name else []),
+        *([f"<title>{escape(pattern.name, quote=False)}</title>"] if pattern.name else []),
         f'<g id="creases" fill="none" stroke-width="{pen:.4g}" stroke-linecap="round">',
     ]
     for (a, b), letter, angle in edges:

@@ -1,4 +1,4 @@
-"""What writers of all formats need: letters of all edges, whether a pattern is flat, boards."""
+"""What writers of several formats need: letters of all edges, and whether a pattern is flat."""
 
 from __future__ import annotations
 
@@ -63,17 +63,6 @@ def letters(pattern: Pattern) -> list[tuple[Edge, str, float]]:
     return told
 
 
-def warn_of_boards(pattern: Pattern) -> None:
-    """Say that a file has no place for boards."""
-    if pattern.boards is not None:
-        warnings.warn(
-            "pattern: the file has no place for the thickness of its panels and holds the planes "
-            "through their hinge lines; write the thin pattern, and thicken what is read",
-            FoldynWarning,
-            stacklevel=5,
-        )
-
-
 def warn_of_angles(pattern: Pattern, kind: str) -> None:
     """Say that a file has no place for the angles to fold to."""
     if not np.isnan(pattern.fold_angles).all():
@@ -81,5 +70,16 @@ def warn_of_angles(pattern: Pattern, kind: str) -> None:
             f"pattern: {kind} files have no place for fold angles, which are left out; write .fold "
             "to keep them",
             FoldynWarning,
-            stacklevel=5,
+            stacklevel=4,
+        )
+
+
+def warn_of_boards(pattern: Pattern) -> None:
+    """Say that a file cannot hold the thickness of a pattern's panels; `write_pattern` calls it."""
+    if pattern.boards is not None:
+        warnings.warn(
+            "pattern: the file has no place for the thickness of its panels and holds the planes "
+            "through their hinge lines; write the thin pattern, and thicken what is read",
+            FoldynWarning,
+            stacklevel=3,
         )

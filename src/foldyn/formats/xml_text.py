@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from xml.etree.ElementTree import Element, ParseError
-
-from defusedxml import DefusedXmlException, ElementTree
+from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
 from foldyn.values import shortened
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 DEEPEST = 100
 """Levels of nested elements."""
@@ -34,6 +35,10 @@ def from_xml(text: str, what: str) -> Element:
     InputError
         No XML, with entities or parts in other files, or nested too deep.
     """
+    from xml.etree.ElementTree import ParseError
+
+    from defusedxml import DefusedXmlException, ElementTree
+
     try:
         root = ElementTree.fromstring(_without_abbreviations(text), forbid_dtd=False)
     except DefusedXmlException:

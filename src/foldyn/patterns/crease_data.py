@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,51 @@ ASSIGNED: Mapping[str, str] = {
 """Words that stand for creases of every pattern, and the letters that each means."""
 
 
-def fold_angles(given: Any, creases: NDArray[np.int64]) -> NDArray[np.float64]:
+class Named(NamedTuple):
+    """Letters and families of creases, by which words choose some of them."""
+
+    assignments: Sequence[str]
+    families: Mapping[str, NDArray[np.int64]]
+
+
+def letters_by_pair(given: Any, named: Mapping[str, Any], creases: NDArray[np.int64]) -> Any:
+    """Letters by pairs of vertices, those of families in a mapping put before their pairs."""
+    words = [key for key in given if isinstance(key, str)] if isinstance(given, Mapping) else []
+    if not words:
+        return given
+    own = {key: letter for key, letter in given.items() if not isinstance(key, str)}
+    alone = {vertex_pair("assignments", key) for key in own}
+    letters: dict[Any, Any] = {}
+    for word in words:
+        if word not in named:
+            known = f"has {', '.join(map(show, named))}" if named else "has none"
+            raise InputError(
+                f": is no family; {suggest(word, named)}this pattern {known}; give a family, or "
+                "pairs of vertices, as (0, 1)",
+                f"assignments.{word}",
+            )
+        for pair in map(tuple, creases[named[word]].tolist()):
+            if letters.setdefault(pair, given[word]) != given[word]:
+                raise InputError(
+                    f" = {show(given[word])}: crease {pair} has a letter by another family already",
+                    f"assignments.{word}",
+                )
+    return {pair: letter for pair, letter in letters.items() if pair not in alone} | own
+
+
+def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray[np.float64]:
     """Angles (nc,), rad, valleys positive, NaN where none is given; `given` as `Pattern` takes."""
     angles = np.full(len(creases), np.nan)
     if given is None:
         return angles
     if isinstance(given, Mapping):
         row = edge_lookup(creases)
+        for word in (key for key in given if isinstance(key, str)):
+            rows = crease_rows(f"fold_angles.{word}", word, named, is_key=True)
+            angles[rows] = _own_way(word, _angle(given[word]), np.array(named.assignments)[rows])
         for key, angle in given.items():
+            if isinstance(key, str):
+                continue  # pairs after words, which they refine
             pair = vertex_pair("fold_angles", key)
             if pair not in row:
                 raise InputError(f": {pair} is not a crease; name its two vertices", "fold_angles")
@@ -47,6 +84,17 @@ def fold_angles(given: Any, creases: NDArray[np.int64]) -> NDArray[np.float64]:
         )
     angles[:] = [_angle(angle) for angle in entries]
     return angles
+
+
+def _own_way(word: str, size: float, letters: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Angles (rad) of creases that a word chooses, each its own way, from a size."""
+    signs = np.select([letters == "V", letters == "M"], [1.0, -1.0], 0.0)
+    if size < 0.0 or (size > 0.0 and not signs.all()):
+        why = "is a size, as each crease folds its own way; give at least 0"
+        if size > 0.0:
+            why = "some of them are neither mountain nor valley; give angles by vertex pairs"
+        raise InputError(f" = {size:g}: {why}", f"fold_angles.{word}")
+    return signs * size
 
 
 def _angle(value: Any) -> float:

@@ -15,15 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
 
+WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
+"""What facets become: nothing, where panels can be joined, or welds; welds; creases."""
 COPLANAR = 1e-3  # rad: panels that turn by less lie in one plane, as coordinates in a file do
 STRAIGHT = np.radians(15.0)  # corners that turn by less divide an edge
 
 
 def welded(
-    pattern: Pattern, facets: Iterable[tuple[int, int]] | None = None, join: bool = True
+    pattern: Pattern, facets: Iterable[tuple[int, int]] | str | None = None, join: bool = True
 ) -> Pattern:
     """Pattern whose facets are no creases.
 
@@ -35,9 +38,9 @@ def welded(
     Parameters
     ----------
     pattern : Pattern
-    facets : iterable of (vertex, vertex), optional
-        Creases that are facets; without it all that are assigned "F". Welds that are there already
-        are facets too.
+    facets : iterable of (vertex, vertex) or str, optional
+        Creases that are facets, or the name of their family; without it all that are assigned "F".
+        Welds that are there already are facets too.
     join : bool
         Whether to join panels; otherwise all facets become welds.
 
@@ -98,6 +101,8 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     letters = np.array(pattern.assignments, dtype="<U1")
     if facets is None:
         return np.flatnonzero(letters == "F")
+    if isinstance(facets, str):
+        facets = pattern.creases[crease_rows("facets", facets, pattern)]
     row, rows = edge_lookup(pattern.creases), set()
     for facet in facets:
         pair = vertex_pair("facets", facet)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Edge, Faces, around, edge_lookup, edge_of
@@ -200,6 +199,8 @@ def seams(
 
 def _places(vertices: NDArray, boundary: NDArray) -> NDArray:
     """Number of the place of each vertex (n,), the same for those of the boundary that coincide."""
+    from scipy.spatial import cKDTree
+
     rim = np.unique(boundary)
     points, where = np.unique(vertices[rim], axis=0, return_inverse=True)
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))

@@ -14,6 +14,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns import crease_data
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry, seams
+from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import (
     Edge,
     Topology,
@@ -44,9 +45,9 @@ class Pattern(Transforms):
         connected part the lowest-numbered face decides where the front is.
     assignments : mapping, sequence or None
         "M" (mountain), "V" (valley), "F" (flat) or "U" (unassigned), either for each crease in
-        the order of `creases` or as a mapping from vertex pairs, {(a, b): "M"}. A mapping may
-        also hold "B" for boundary edges; creases that it leaves out, and all of them for None,
-        get the letter of their dihedral.
+        the order of `creases` or as a mapping from vertex pairs and families, {(a, b): "M",
+        "zigzag": "V"}, pairs before families. A mapping may also hold "B" for boundary edges;
+        creases that it leaves out, and all of them for None, get the letter of their dihedral.
     name : str
         What to call the pattern.
     boards : Boards, optional
@@ -54,7 +55,8 @@ class Pattern(Transforms):
     fold_angles : mapping, sequence or None
         The state to fold to: an angle (rad) from -pi to pi for each crease in the order of
         `creases`, positive on valleys, 0 where flat, NaN or None where none is wanted, or a
-        mapping from vertex pairs.
+        mapping from vertex pairs, and from "mountain", "valley", "all" and families, of which the
+        angle is a size, as each crease folds its own way; pairs refine these.
     families : mapping, optional
         Names for groups of creases, each with vertex pairs: {"zigzag": [(0, 1), (1, 2)]}.
     custom : mapping, optional
@@ -140,10 +142,20 @@ class Pattern(Transforms):
         self,
         vertices: ArrayLike,
         faces: Sequence[Sequence[int]] | NDArray[np.integer],
-        assignments: Mapping[tuple[int, int], str] | Sequence[str] | None = None,
+        assignments: (
+            Mapping[tuple[int, int], str]
+            | Mapping[tuple[int, int] | str, str]
+            | Sequence[str]
+            | None
+        ) = None,
         name: str = "",
         boards: Boards | None = None,
-        fold_angles: Mapping[tuple[int, int], float] | ArrayLike | None = None,
+        fold_angles: (
+            Mapping[tuple[int, int], float]
+            | Mapping[tuple[int, int] | str, float]
+            | ArrayLike
+            | None
+        ) = None,
         families: Mapping[str, Sequence[tuple[int, int]]] | None = None,
         custom: Mapping[str, Any] | None = None,
         welds: Sequence[tuple[int, int]] | NDArray[np.integer] = (),
@@ -156,7 +168,9 @@ class Pattern(Transforms):
         normals = geometry.face_normals
         graph = topology.creases, topology.crease_faces
         dihedrals, closed = crease_dihedrals(points, normals, *graph)
-        given, open_edges = _given_letters(assignments, topology)
+        named = crease_data.families(families, topology.creases)
+        by_pair = crease_data.letters_by_pair(assignments, named, topology.creases)
+        given, open_edges = _given_letters(by_pair, topology)
         dihedrals[closed & (given == "M")] = 2 * np.pi
         bent, shut = crease_dihedrals(points, normals, topology.welds, topology.weld_faces)
         if shut.any():
@@ -173,15 +187,17 @@ class Pattern(Transforms):
             flat = np.pi + dihedrals - apart
         _warn_of_contradictions(given, topology.creases, apart)
         _warn_of_seams(seams(points, topology.faces, normals, topology.boundary), open_edges)
+        letters = tuple(np.where(given == "", _letters(apart), given).tolist())
+        words = crease_data.Named(letters, named)
         values: dict[str, Any] = {
             **topology._asdict(),
             **geometry._asdict(),
             "vertices": points,
-            "assignments": tuple(np.where(given == "", _letters(apart), given).tolist()),
+            "assignments": letters,
             "name": name,
             "boards": boards,
-            "fold_angles": crease_data.fold_angles(fold_angles, topology.creases),
-            "families": crease_data.families(families, topology.creases),
+            "fold_angles": crease_data.fold_angles(fold_angles, topology.creases, words),
+            "families": named,
             "custom": dict(custom or {}),
             "dihedrals": dihedrals,
             "weld_dihedrals": bent,
@@ -206,6 +222,10 @@ class Pattern(Transforms):
             f"<Pattern {label}{len(self.vertices)} vertices, {len(self.faces)} faces, "
             f"{len(self.creases)} creases{welds}>"
         )
+
+    def _repr_html_(self) -> str | None:
+        """A picture for notebooks."""
+        return picture(self, repr(self))
 
 
 def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import Faces, around, edge_lookup, edge_of
@@ -64,6 +63,8 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     Glued
         With the vertices of the first sheet first, each where the first sheet has it.
     """
+    from scipy.spatial import cKDTree
+
     starts = np.cumsum([0, *(len(each) for each in vertices)])
     points = np.concatenate(list(vertices))
     rim = np.concatenate([part + start for part, start in zip(edges, starts, strict=False)])
@@ -149,6 +150,8 @@ def _translations(
     vertices: NDArray, edges: NDArray, tolerance: float
 ) -> list[tuple[NDArray, NDArray]]:
     """Translations that bring boundary edges together, with the edges that they do so with."""
+    from scipy.spatial import cKDTree
+
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
     way = b - a
     near = cKDTree(way).query_ball_tree(cKDTree(-way), 2.0 * tolerance)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -147,8 +148,9 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
     """
     sizes = np.array([len(face) for face in faces])
     owner = np.repeat(np.arange(len(faces)), sizes)
-    start = np.concatenate([np.asarray(face, dtype=np.int64) for face in faces])
-    end = np.concatenate([np.roll(np.asarray(face, dtype=np.int64), -1) for face in faces])
+    start = np.fromiter(chain.from_iterable(faces), np.int64, int(sizes.sum()))
+    end, last = np.roll(start, -1), np.cumsum(sizes) - 1
+    end[last] = start[last - sizes + 1]
     low, high = np.minimum(start, end), np.maximum(start, end)
     # Sorted by edge, equal edges side by side and the lower face first.
     order = np.argsort(low * n_vertices + high, kind="stable")

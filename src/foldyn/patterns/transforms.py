@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.memory import check_memory
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.values import number, numbers, show, vector, whole
 
-PER_VERTEX = 2200.0
-"""Bytes a vertex of a pattern as it is made."""
 FLAT = 1e-6  # rad from pi: a crease between copies that is given no letter by its dihedral
 TURNED = {"M": "V", "V": "M"}
+FACE_ORDERS = "faceOrders"
+"""Key of a pattern's custom data that holds the order of its layers, as FOLD has it."""
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -141,10 +141,7 @@ class Transforms:
         """
         first, second = _counts(counts)
         _thin(self)
-        check_memory(
-            "counts", f"a pattern of {first * second * len(self.vertices):.3g} vertices",
-            PER_VERTEX * first * second * len(self.vertices), "take fewer",
-        )  # fmt: skip
+        check_size("counts", first * second * len(self.vertices))
         near = number("tolerance", tolerance, above=0.0) * self.size
         rim = half_edges(self.faces, self.boundary)
         steps = periods_of(self.vertices, rim, near) if periods is None else _given(periods)
@@ -205,7 +202,8 @@ class Transforms:
     def changed(self, **values: Any) -> Self:
         """Return the pattern with other arguments; see `Pattern`.
 
-        Warnings that it has given when it was first made are not given again.
+        Warnings that it has given when it was first made are not given again. Other faces have no
+        order of layers until one is given.
 
         Parameters
         ----------
@@ -223,6 +221,8 @@ class Transforms:
             "custom": self.custom,
             "welds": self.welds,
         }
+        if "faces" in values:
+            own["custom"] = {k: v for k, v in self.custom.items() if k != FACE_ORDERS}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FoldynWarning)
             return type(self)(**{**own, **values})
@@ -243,7 +243,9 @@ class Transforms:
             boards = Boards(
                 boards.offsets, place(np.concatenate(corners)), factor * boards.thickness
             )
-        return self.changed(vertices=place(self.vertices), faces=faces, boards=boards)
+        return self.changed(
+            vertices=place(self.vertices), faces=faces, boards=boards, custom=self.custom
+        )
 
 
 def _joined(
@@ -264,12 +266,10 @@ def _joined(
         starts.append(len(faces))
         faces += [tuple(numbers_[list(face)].tolist()) for face in sheet.faces]
         welds += numbers_[sheet.welds].tolist()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FoldynWarning)
-        bare = first.changed(
-            vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
-            families=None, custom=None, welds=welds,
-        )  # fmt: skip
+    bare = first.changed(
+        vertices=glued.vertices, faces=faces, assignments=None, fold_angles=None,
+        families=None, custom=None, welds=welds,
+    )  # fmt: skip
     flat = np.abs(bare.dihedrals - np.pi) < FLAT
     for k, pair in enumerate(bare.creases.tolist()):
         letters[pair[0], pair[1]] = "U" if flat[k] else bare.assignments[k]
@@ -283,6 +283,7 @@ def _joined(
             angles[pair] = -angle if turned[k] else angle
         for name, rows in sheet.families.items():
             families.setdefault(name, []).extend(pairs[k] for k in rows.tolist())
+    custom.pop(FACE_ORDERS, None)
     known = edge_lookup(bare.creases)
     return (
         bare.changed(

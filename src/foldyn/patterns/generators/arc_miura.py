@@ -90,7 +90,7 @@ def arc_miura(
         s = b * math.sin(g1) / math.hypot(1.0, math.cos(g1) * slope)
         k = s * math.cos(g1) * slope
         turns = [2.0 * math.atan2(k, each) for each in along]
-        check_turn("cells[1]", ny, math.degrees(turns[0] - turns[1]), ny, "cells")
+        check_turn("cells[1]", ny, math.degrees(turns[0] - turns[1]), "cells")
     j = np.arange(2 * ny + 1)
     odd = j % 2
     turn = np.where(odd, -turns[1], turns[0])

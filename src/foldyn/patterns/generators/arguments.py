@@ -87,7 +87,7 @@ def sizes(a: Any, b: Any) -> tuple[float, float]:
     return length("a", a), length("b", b)
 
 
-def check_turn(name: str, value: Any, turn: float, count: int, what: str) -> None:
+def check_turn(name: str, count: int, turn: float, what: str) -> None:
     """Refuse a sheet that rolls up by more than a full turn.
 
     turn : degrees by which each of `count` rows, or whatever `what` says, turns against the last.
@@ -95,7 +95,7 @@ def check_turn(name: str, value: Any, turn: float, count: int, what: str) -> Non
     if abs(turn) * count > ROUND:
         most = math.floor(ROUND / abs(turn))
         raise InputError(
-            f" = {value}: each of the {count} {what} turns by {abs(turn):.4g} degrees against the "
+            f" = {count}: each of the {count} {what} turns by {abs(turn):.4g} degrees against the "
             f"last, so that the sheet rolls up by more than a full turn and passes through itself; "
             f"take at most {most} {what}, or another dihedral",
             name,

@@ -25,6 +25,8 @@ def assembled(
 ) -> Pattern:
     """Pattern of which each family may name edges of one panel too, which are left out.
 
+    An edge may be named twice.
+
     Parameters
     ----------
     name : str

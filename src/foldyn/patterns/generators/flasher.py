@@ -97,7 +97,6 @@ def flasher(sides: int = 6, a: float = 1.0, rings: int = 3, folded: bool = False
                 families[name or "outer_bend"].append((low[1], high[1]))
                 families["ridge"].append((high[0], high[1]))
                 families["hub" if begin == 0 else "ray"].append((low[0], low[1]))
-    families = {name: list(dict.fromkeys(pairs)) for name, pairs in families.items()}
     angles = {
         "hub": math.pi / 2, "ray": math.pi, "ridge": -math.pi,
         "inner_bend": 2.0 * half, "outer_bend": -2.0 * half,

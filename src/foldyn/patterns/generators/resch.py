@@ -9,7 +9,6 @@ from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import cell_counts, check_turn, fold_dihedral
@@ -73,7 +72,7 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, dihedral: float = 120.0
         counts, a = cell_counts(cells, 7), length("a", a)
         closed = isinstance(dihedral, Real) and dihedral == 0
         star = Star.closed() if closed else Star.at(math.radians(fold_dihedral(dihedral)))
-        check_turn("cells[0]", counts[0], math.degrees(star.turn), counts[0], "columns of stars")
+        check_turn("cells[0]", counts[0], math.degrees(star.turn), "columns of stars")
     found: dict[tuple[int, int, int], int] = {}
     vertices: list[tuple[float, ...]] = []
 
@@ -101,7 +100,6 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, dihedral: float = 120.0
             faces += [(tips[1], left, middle[2]), (middle[2], right, tips[2])]
             families["tile"] += [(left, middle[2]), (tips[1], left)]
             families["tile"] += [(right, middle[2]), (tips[2], right)]
-    families = {name: list(dict.fromkeys(pairs)) for name, pairs in families.items()}
     angles = CLOSED if dihedral == 180 else None
     return assembled("resch", vertices, faces, families, LETTERS, angles)
 
@@ -147,6 +145,8 @@ class Star:
     @classmethod
     def at(cls, dihedral: float) -> Star:
         """Star whose tuck along y has a dihedral (rad)."""
+        from scipy.optimize import root
+
         if dihedral == math.pi:
             return cls.of(dihedral, 0.0, 1.5, 0.0)
         solution = np.array([math.pi / 6, math.sqrt(3.0) / 2, 0.0])

@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
-from scipy.optimize import brentq
-
 from foldyn.errors import within
 from foldyn.patterns.generators.arguments import cell_counts, check_turn, fold_dihedral, sizes
 from foldyn.patterns.generators.assembly import assembled
@@ -76,7 +74,7 @@ def waterbomb(
         dihedral = fold_dihedral(dihedral, least=closed)
         height = a / 2 if dihedral == 180.0 else _height(math.radians(dihedral), a / 2, b / 2)
         bent, radius, depth = _rolled(height, a / 2, b / 2)
-        check_turn("cells[0]", nx, 2.0 * math.degrees(bent), nx, "bases")
+        check_turn("cells[0]", nx, 2.0 * math.degrees(bent), "bases")
 
     def place(column: int, y: float, inside: float) -> tuple[float, float, float]:
         """Place of a point in its column, at some depth inside the cylinder of the grid points."""
@@ -125,6 +123,7 @@ def waterbomb(
 
 def _height(dihedral: float, h: float, w: float) -> float:
     """Height (m) of a middle above the center along the axis, from the dihedral (rad) of sides."""
+    from scipy.optimize import brentq
 
     def short(z: float) -> float:
         q = (w * w - h * h + z * z) / (w * w - (h - z) ** 2) if z > 0.0 else 0.0

@@ -59,7 +59,7 @@ def yoshimura(
         a, b = sizes(a, b)
         half = math.radians(fold_dihedral(dihedral)) / 2
         bent = 0.0 if dihedral == 180 else 4.0 * math.atan(2.0 * a / b * math.cos(half))
-        check_turn("cells[0]", nx, math.degrees(bent), nx, "bases")
+        check_turn("cells[0]", nx, math.degrees(bent), "bases")
     rise = a * math.sin(half)
     vertices: list[tuple[float, float, float]] = []
     first = []
@@ -84,5 +84,4 @@ def yoshimura(
         for k in range(1, nx):
             faces.append((short + k - 1, long + k, short + k)[::up])
             families["ring"].append((short + k - 1, short + k))
-    families = {name: list(dict.fromkeys(pairs)) for name, pairs in families.items()}
     return assembled("yoshimura", vertices, faces, families, {"ring": "V", "diagonal": "M"})

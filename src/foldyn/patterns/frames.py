@@ -1,4 +1,4 @@
-"""`Frame`: one state of a pattern among several in a file."""
+"""`Frame`: one state of a pattern among several, and how far its creases are folded there."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.patterns import Pattern
 from foldyn.patterns.geometry import crease_dihedrals, face_geometry
+from foldyn.patterns.pattern import Pattern
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,94 @@
+"""A picture of a sheet as SVG: what a pattern shows of itself in a notebook."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from foldyn.patterns.pattern import Pattern
+
+WIDTH, HEIGHT, MARGIN = 520.0, 300.0, 8.0
+"""Pixels."""
+VIEW = (28.0, -60.0)
+"""Elevation above the xy plane and azimuth around z (degrees) from which sheets are looked at."""
+MOST_PANELS = 600
+"""Beyond, the picture would be too large for a notebook; there is none."""
+MOST_WORDS = 200
+"""Letters below it."""
+PAPER = (242, 223, 184)
+BACK = (217, 195, 154)
+LINES = {
+    "M": ("#d55e00", "1.6", ""), "V": ("#0072b2", "1.6", "5 3"), "F": ("#767676", "1.2", "1.5 2"),
+    "U": ("#b8578e", "1.4", "5 2 1 2"), "B": ("#444", "1.1", ""),
+}  # fmt: skip
+"""Color, width and dashes of edges by their letter, "B" for boundaries."""
+
+
+def picture(pattern: Pattern, words: str = "") -> str | None:
+    """Picture of a pattern as HTML with words below; None where it has too many panels.
+
+    Panels are drawn from back to front, each with the edges that no nearer panel has.
+    """
+    if len(pattern.faces) > MOST_PANELS:
+        return None
+    words = words if len(words) <= MOST_WORDS else f"{words[: MOST_WORDS - 4]} ..."
+    right, up, toward = _directions(*VIEW)
+    x = pattern.vertices @ np.stack([right, -up, toward], axis=1)
+    used = sorted({corner for face in pattern.faces for corner in face})
+    low, size = x[used, :2].min(axis=0), np.ptp(x[used, :2], axis=0)
+    room = np.array([WIDTH, HEIGHT]) - 2 * MARGIN
+    scale = float((room / np.maximum(size, 1e-9 * size.max())).min())
+    places = np.round((x[:, :2] - low) * scale + MARGIN, 1)
+    width, height = np.ceil(size * scale + 2 * MARGIN).astype(int).tolist()
+    body = "".join(_panels(pattern, places, x[:, 2], toward))
+    return (
+        f'<figure style="margin: 0"><svg xmlns="http://www.w3.org/2000/svg" width="{width}" '
+        f'height="{height}" viewBox="0 0 {width} {height}" role="img" '
+        f'aria-label="{escape(words)}" fill="none" stroke-linejoin="round">{body}</svg>'
+        f"<figcaption><code>{escape(words)}</code></figcaption></figure>"
+    )
+
+
+def _panels(pattern: Pattern, places: NDArray, depth: NDArray, toward: NDArray) -> list[str]:
+    """Panels and edges from back to front."""
+    letters = {
+        tuple(pair): letter
+        for pair, letter in zip(pattern.creases.tolist(), pattern.assignments, strict=True)
+    }
+    letters |= {tuple(pair): "B" for pair in pattern.boundary.tolist()}
+    order = np.argsort([depth[list(face)].mean() for face in pattern.faces], kind="stable")
+    edges_of = [
+        [(min(pair), max(pair)) for pair in zip(face, (*face[1:], face[0]), strict=True)]
+        for face in pattern.faces
+    ]
+    last = {edge: face for face in order.tolist() for edge in edges_of[face]}  # the nearest panel
+    facing = (pattern.face_normals @ toward).tolist()
+    out = []
+    for face in order.tolist():
+        corners = " ".join(f"{a:g} {b:g}" for a, b in places[list(pattern.faces[face])].tolist())
+        base, bright = (PAPER if facing[face] >= 0.0 else BACK), 0.72 + 0.28 * abs(facing[face])
+        fill = "".join(f"{round(bright * part):02x}" for part in base)
+        out.append(f'<path d="M{corners}z" fill="#{fill}"/>')
+        for edge in edges_of[face]:
+            if last[edge] == face and edge in letters:
+                color, width, dashes = LINES[letters[edge]]
+                (a, b), (c, d) = places[list(edge)].tolist()
+                dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
+                out.append(
+                    f'<path d="M{a:g} {b:g} {c:g} {d:g}" stroke="{color}" '
+                    f'stroke-width="{width}"{dashed}/>'
+                )
+    return out
+
+
+def _directions(elevation: float, azimuth: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Unit vectors to the right, up and towards the viewer."""
+    e, a = math.radians(elevation), math.radians(azimuth)
+    toward = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    return right, np.cross(toward, right), toward
