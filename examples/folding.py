@@ -12,47 +12,25 @@ from pathlib import Path
 import numpy as np
 
 import foldyn as fd
-from foldyn.plots import scene, style
+from foldyn.plots import draw_folding, scene, style
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, edge_keys
 
-P = fd.patterns
 VIEW = View(38.0, -62.0)
 CELL, COLUMNS = 1.6, 3  # inches; patterns beside each other
 BENDS = "square twist, valleys in the middle"
 """The pattern whose panels must bend."""
-
-
-def bird_base() -> fd.Pattern:
-    """The bird base, a square of 2 m."""
-    t = 2.0 - np.sqrt(2.0)
-    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    middles = [(0, -1), (1, 0), (0, 1), (-1, 0)]
-    inner = [(t * x, t * y) for x, y in middles]
-    faces, letters = [], {}
-    for k in range(4):
-        after, middle, peak = (k + 1) % 4, 4 + k, 8 + k
-        faces += [(k, middle, peak), (middle, after, peak), (k, peak, 12), (peak, after, 12)]
-        letters |= {(k, peak): "M", (after, peak): "M", (middle, peak): "V", (peak, 12): "M"}
-    letters |= {(k, 12): "V" for k in range(4)}
-    # only one of the diagonals is folded
-    faces = [face for face in faces if 12 not in face]
-    faces += [(k, 8 + k, 12, 8 + (k - 1) % 4) for k in (0, 2)]
-    faces += [(8 + (k - 1) % 4, k, 12) for k in (1, 3)] + [(12, k, 8 + k) for k in (1, 3)]
-    letters = {pair: letter for pair, letter in letters.items() if pair not in ((0, 12), (2, 12))}
-    return fd.Pattern([*corners, *middles, *inner, (0, 0)], faces, letters, "bird base")
-
-
+FILES = Path(__file__).parent / "patterns"
 PATTERNS = {
-    "Miura-ori": (P.miura((3, 3), dihedral=180), 0.75),
-    "waterbomb": (P.waterbomb((4, 5), dihedral=180), 0.6),
-    "Resch": (P.resch((3, 3), dihedral=180), 0.95),
-    "square twist": (P.square_twist(dihedral=180), 0.7),
+    "Miura-ori": (fd.read_pattern(FILES / "miura.fold"), 0.75),
+    "waterbomb": (fd.read_pattern(FILES / "waterbomb.fold"), 0.6),
+    "Resch": (fd.read_pattern(FILES / "resch.fold"), 0.95),
+    "square twist": (fd.read_pattern(FILES / "square-twist.fold"), 0.7),
     BENDS: (
-        P.square_twist(panel_angle=60, dihedral=180, symmetric=True),
+        fd.patterns.square_twist(panel_angle=60, dihedral=180, symmetric=True),
         0.5,
     ),
-    "bird base": (bird_base(), 0.8),
+    "bird base": (fd.read_pattern(FILES / "bird-base.fold"), 0.8),
 }
 """Flat patterns, and how far they are folded."""
 
@@ -76,7 +54,7 @@ def check(results: dict) -> None:
 
 def row(name: str, folding: fd.Folding) -> str:
     """Row of the table."""
-    letters = np.array(folding.assignments)
+    letters = np.array(folding.pattern.assignments)
     turning = np.isin(letters, ["M", "V"])
     size = np.degrees(np.abs(folding.angles[turning]))
     bend = np.degrees(folding.bend) if folding.kind != "rigid" else 0.0
@@ -111,9 +89,18 @@ def draw(results: dict, folder: Path) -> None:
     style.finish(figure, keys).savefig(folder / "folding.png", dpi=90)
 
 
+def draw_crane(folder: Path) -> None:
+    """The crane, opened from its flat state by panels that bend."""
+    flat = fd.read_pattern(FILES / "crane.fold").rotated(45.0)
+    crane = fd.fold(flat, fraction=0.8, start="folded", panels="subdivided")
+    draw_folding(crane, view=(50.0, -75.0)).savefig(folder / "crane.png", dpi=90)
+
+
 if __name__ == "__main__":
     _, computed = compute()
     check(computed)
     for title, one in computed.items():
         print(row(title, one))
-    draw(computed, Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    pictures = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    draw(computed, pictures)
+    draw_crane(pictures)

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import Factorization
@@ -78,6 +77,8 @@ class Section:
         ends : the two; those of the section unless given.
         nearest : whether equilibria are sought from between the nearest marks known.
         """
+        from scipy.optimize import brentq
+
         low, high = ends or self.ends
         marks = {low.share: low, high.share: high}
 

@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.crossings import crossing_panels
+from foldyn.patterns.picture import picture
+from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.statics.folding.energy import FoldEnergy
+from foldyn.statics.folding.layer_order import with_layers
 from foldyn.statics.folding.record import folded_pattern, path_of
+from foldyn.statics.folding.subdivision import subdivided
 from foldyn.statics.folding.targets import fold_targets, full_angles
 from foldyn.statics.folding.ways import (
+    BENDING,
     ISOMETRIC,
-    PAPER,
     PLANE,
-    PLATES,
+    Bending,
     Way,
     from_folded,
     from_pattern,
@@ -48,10 +52,8 @@ class Folding:
     pattern : Pattern
         The folded state, free of stress: its shape is the shape at rest. Vertices, assignments,
         families, fold angles to reach and further data are those of the pattern that was folded.
-        Panels that have bent are cut along their bends, which are flat creases ("F").
-    assignments : tuple of str
-        Letters of the creases that the path, the targets and the angles have, which are those of
-        the pattern that was folded.
+        Panels that have bent are cut along their bends, which are welds: its creases are those
+        that were folded.
     path : xarray.Dataset
         The states on the way, with dimensions step, node, axis and crease: `position` (m),
         `fold_angle` (rad, valleys positive), `strain` and `bend` (rad), the largest of a bar and of
@@ -75,7 +77,6 @@ class Folding:
     """
 
     pattern: Pattern
-    assignments: tuple[str, ...]
     path: xarray.Dataset
     targets: NDArray[np.float64]
     angles: NDArray[np.float64]
@@ -89,6 +90,10 @@ class Folding:
     def __repr__(self) -> str:
         """One line."""
         return f"<Folding {self.kind}, {self._turned}, strain {self.strain:.2g}>"
+
+    def _repr_html_(self) -> str | None:
+        """A picture for notebooks."""
+        return picture(self.pattern, repr(self))
 
     @property
     def kind(self) -> Literal["rigid", "bent", "stretched"]:
@@ -115,8 +120,18 @@ class Folding:
         return np.flatnonzero(np.abs(self.angles) > math.pi - SHUT)
 
     @property
+    def layers(self) -> NDArray[np.int64] | None:
+        """Order of the layers of a state that lies flat, None of others.
+
+        Rows (f, g, s), as FOLD's faceOrders: panel f lies on the side of panel g to which the front
+        of g faces (s = 1) or on the other (-1). There is one for each pair that overlaps.
+        """
+        found = self.pattern.custom.get(FACE_ORDERS)
+        return None if found is None else np.array(found, np.int64).reshape(-1, 3)
+
+    @property
     def _turned(self) -> str:
-        total = sum(letter in "MV" for letter in self.assignments)
+        total = sum(letter in "MV" for letter in self.pattern.assignments)
         return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
 
     def report(self) -> str:
@@ -144,9 +159,12 @@ class Folding:
         if self.started_from == "folded":
             lines.append("the path opens from the folded state, which rotations of the panels give")
         if len(self.closed):
-            order = "in the order in which they have come"
-            if self.first_crossings:
+            if self.layers is not None:
+                order = f"in an order without crossings ({len(self.layers)} pairs that overlap)"
+            elif self.first_crossings:
                 order = "in an order that is not known, since panels cross"
+            else:
+                order = "in the order in which they have come"
             lines.append(
                 f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
             )
@@ -169,6 +187,7 @@ def fold(
     *,
     steps: int = 20,
     start: Literal["auto", "pattern", "folded"] = "auto",
+    panels: Literal["whole", "subdivided"] = "whole",
     progress: Callable[[int, int], None] | None = None,
 ) -> Folding:
     """Fold a flat or partly folded pattern.
@@ -199,6 +218,10 @@ def fold(
         Where the path begins. "folded" takes the state that rotations of the panels by the full
         angles give, where they close, and opens it to the angles wanted. "auto" folds the pattern
         as it is, and where creases turn the wrong way tries the folded state as well.
+    panels : {"whole", "subdivided"}
+        "subdivided" cuts panels from their middles to their corners and to the middles of their
+        edges, so that they can bend as paper does where whole ones, cut once, stretch. The path and
+        the folded pattern then have more vertices, after the others, and each crease is two.
     progress : callable, optional
         Called with a step and the count of steps, which begin again where another way is tried.
 
@@ -209,7 +232,8 @@ def fold(
     Raises
     ------
     InputError
-        An argument out of range; angles that contradict the assignments or close a crease.
+        An argument out of range; angles that contradict the assignments; a folded state that lies
+        flat, but in no order of its layers (or not in the one that the pattern's file gives).
 
     Warns
     -----
@@ -241,7 +265,11 @@ def fold(
         raise InputError(": has no creases to fold", "pattern")
     steps = whole("steps", steps, least=1, most=1000)
     choice("start", start, STARTS)
+    choice("panels", panels, tuple(BENDING))
     targets = fold_targets(pattern, angles, fraction)
+    if panels == "subdivided":
+        pattern, rows = subdivided(pattern)
+        targets = targets[rows]
     letters = np.array(pattern.assignments)
     energy = FoldEnergy(pattern, (letters == "F") & (np.nan_to_num(targets) == 0.0))
 
@@ -249,15 +277,15 @@ def fold(
         if progress is not None:
             progress(step, steps)
 
-    way = _best_way(pattern, energy, targets, steps, start, tell)
+    way = _best_way(pattern, energy, BENDING[panels], targets, steps, start, tell)
     folding = _result(pattern, energy, way, targets)
     _warn(folding)
     return folding
 
 
 def _best_way(
-    pattern: Pattern, energy: FoldEnergy, targets: NDArray, steps: int, start: str,
-    tell: Callable[[int], None],
+    pattern: Pattern, energy: FoldEnergy, bending: Bending, targets: NDArray,
+    steps: int, start: str, tell: Callable[[int], None],
 ) -> Way:  # fmt: skip
     """The way with the fewest creases that turn the wrong way, without strain, near the targets.
 
@@ -270,12 +298,14 @@ def _best_way(
 
     best = None
     if start != "folded":
-        best = from_pattern(energy, PLATES, targets, steps, tell)
-        if any(cost(best)[:3]) or _bend(energy, best) > PLANE:
-            best = min(best, from_pattern(energy, PAPER, targets, steps, tell), key=cost)
-        if start == "pattern" or not any(cost(best)[:2]):
+        stiffest, *others = bending.folding
+        best = from_pattern(energy, stiffest, targets, steps, tell)
+        for softer in others:
+            if any(cost(best)[:3]) or _bend(energy, best) > PLANE:
+                best = min(best, from_pattern(energy, softer, targets, steps, tell), key=cost)
+        if start == "pattern" or not any(cost(best)[:3]):
             return best
-    way = from_folded(energy, pattern, full_angles(pattern), targets, steps, tell)
+    way = from_folded(energy, bending.opening, pattern, full_angles(pattern), targets, steps, tell)
     if best is not None:
         if way is None or _off(energy, way, targets) >= _off(energy, best, targets):
             return best
@@ -321,12 +351,14 @@ def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) ->
             first[step] = np.array(sorted(now - before))
         before = now
     last = way.shapes[-1]
+    angles = energy.creases(last.turns).copy()
+    folded = folded_pattern(pattern, energy, last, path["position"].values[-1])
+    given = pattern.custom.get(FACE_ORDERS, ()) if folded.faces == pattern.faces else ()
     return Folding(
-        pattern=folded_pattern(pattern, energy, last, path["position"].values[-1]),
-        assignments=pattern.assignments,
+        pattern=with_layers(folded, angles, math.pi - SHUT, given),
         path=path,
         targets=targets,
-        angles=energy.creases(last.turns).copy(),
+        angles=angles,
         wrong=tuple(_wrong(energy, way, targets).tolist()),
         strain=_strain(way),
         bend=_bend(energy, way),

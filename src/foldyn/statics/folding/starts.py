@@ -54,8 +54,11 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
 
     The latter is the largest distance (m) of a vertex from where another of its panels has it.
     """
+    axes = pattern.vertices[np.concatenate([pattern.creases, pattern.welds]).astype(np.int64)]
+    turns = np.concatenate([angles, np.zeros(len(pattern.welds))])
     neighbors: list[list[tuple[int, int, float]]] = [[] for _ in pattern.faces]
-    for k, (front, back) in enumerate(pattern.crease_faces.tolist()):
+    sides = [*pattern.crease_faces.tolist(), *pattern.weld_faces.tolist()]
+    for k, (front, back) in enumerate(sides):
         neighbors[front].append((back, k, -1.0))
         neighbors[back].append((front, k, 1.0))
     placed: dict[int, tuple[NDArray, NDArray]] = {}
@@ -69,8 +72,8 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray, float]:
             rotation, shift = placed[face]
             for other, k, way in neighbors[face]:
                 if other not in placed:
-                    a, b = pattern.vertices[pattern.creases[k]]
-                    own = _rotation(b - a, way * angles[k])
+                    a, b = axes[k]
+                    own = _rotation(b - a, way * turns[k])
                     placed[other] = rotation @ own, rotation @ (a - own @ a) + shift
                     queue.append(other)
     total, count = np.zeros_like(pattern.vertices), np.zeros(len(pattern.vertices))

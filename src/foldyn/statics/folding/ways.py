@@ -16,7 +16,8 @@ from foldyn.statics.folding.starts import FIRST_TURN, ajar, composed, opened
 
 PLATES = Stiffness(bends=0.3, creases=1e-3, sides=0.1)  # panels that hardly bend
 PAPER = Stiffness(bends=0.03, creases=5e-3, sides=0.1)  # and some that do, driven harder
-CLOSED = Stiffness(bends=0.3, creases=1e-3, sides=10.0)  # so that closed creases stay within 180
+THIN = Stiffness(bends=1e-3, creases=1e-3, sides=1.0)
+CLOSING = 10.0  # stiffness of sides, so that closed creases stay within 180
 AJAR = math.radians(179.8)  # most turn of creases that are to open from the folded state
 FREE_MARGIN = math.radians(1.0)  # of mountains and valleys without an angle to reach
 WEAKER = (1e-3, 1e-6, 1e-9)  # springs of the creases, while what they held is let go
@@ -25,6 +26,19 @@ TURNED = 1e-3  # rad, least turn that counts as one
 ISOMETRIC = 1e-9  # strain
 PLANE = 1e-6  # rad, bend of a panel
 CLOSES = 0.02  # of the size of the pattern: gap that a start from the folded state may have
+
+
+class Bending(NamedTuple):
+    """Stiffnesses to fold with, in turn, and those to open the folded state with."""
+
+    folding: tuple[Stiffness, ...]
+    opening: Stiffness
+
+
+BENDING = {
+    "whole": Bending((PLATES, PAPER), PLATES._replace(sides=CLOSING)),
+    "subdivided": Bending((THIN,), THIN._replace(sides=CLOSING)),
+}
 
 
 class Way(NamedTuple):
@@ -56,8 +70,8 @@ def from_pattern(
 
 
 def from_folded(
-    energy: FoldEnergy, pattern: Pattern, full: NDArray, targets: NDArray, steps: int,
-    progress: Callable[[int], None],
+    energy: FoldEnergy, stiffness: Stiffness, pattern: Pattern, full: NDArray, targets: NDArray,
+    steps: int, progress: Callable[[int], None],
 ) -> Way | None:  # fmt: skip
     """Open from the folded state; None where the panels of a flat pattern do not close in it."""
     folded = np.nan_to_num(full)
@@ -71,7 +85,7 @@ def from_folded(
     shape = energy.moved(energy.start._replace(turns=turns), x)
     start = ajar(energy, shape)
     states, shares = _followed(
-        energy, CLOSED, shape, start, (folded, targets), steps, progress, AJAR
+        energy, stiffness, shape, start, (folded, targets), steps, progress, AJAR
     )
     return Way(states, shares, "folded")
 
@@ -93,6 +107,8 @@ def _followed(
         shape = minimum(energy, shape, aim, stiffness, settled=1e-10 if last else 1e-4)
         kept = relaxed(energy, stiffness, shape, aim, angles[0]) if lets_go or last else None
         lets_go = kept is not None
+        if last and kept is None:
+            kept = eased(energy, stiffness, shape, aim, angles[0])
         shapes.append(shape if kept is None else kept)
         shares.append(k / steps)
         progress(k)
@@ -129,6 +145,26 @@ def relaxed(
             if len(wrong_ways(energy, kept.turns, aim.angles)) <= wrong:
                 return kept
     return None
+
+
+def eased(
+    energy: FoldEnergy, stiffness: Stiffness, shape: Shape, aim: Aim, first: NDArray
+) -> Shape:
+    """The shape with springs and bends so much weaker as it stays near and strains get less."""
+    turned = np.abs(energy.creases(shape.turns) - first).sum() + TURNED
+    wrong, kept = len(wrong_ways(energy, shape.turns, aim.angles)), shape
+    for weaker in (0.1, 0.01, 0.001):
+        weak = stiffness._replace(
+            bends=stiffness.bends * weaker, creases=stiffness.creases * weaker
+        )
+        weakened = minimum(energy, kept, aim, weak)
+        moved = np.abs(energy.creases(weakened.turns - shape.turns)).sum()
+        if moved > HELD * turned or largest_strain(weakened) > largest_strain(kept):
+            break
+        if len(wrong_ways(energy, weakened.turns, aim.angles)) > wrong:
+            break
+        kept = weakened
+    return kept
 
 
 def largest_strain(shape: Shape) -> float:

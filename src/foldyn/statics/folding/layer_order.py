@@ -1,0 +1,91 @@
+"""The order of the layers of a folded sheet that lies flat: found, or why there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.errors import ComputationError, InputError
+from foldyn.patterns import Pattern
+from foldyn.patterns.topology import edge_lookup, edge_of
+from foldyn.patterns.transforms import FACE_ORDERS
+from foldyn.statics.folding.layer_constraints import FlatState, layer_constraints
+from foldyn.statics.folding.layers import CrossingError, ordered
+
+Orders = Sequence[Sequence[int]]
+EXACT = 1e-6  # of the size of the pattern: thickness of a state that lies flat, at least
+
+
+def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | None:
+    """A folded pattern as a flat state; None where it does not lie flat.
+
+    angles : fold angles (nc,), rad. closed : least size of one that counts as closed; as far from 0
+    one counts as open.
+    """
+    size = np.abs(angles)
+    if ((size > math.pi - closed) & (size < closed)).any() or not (size >= closed).any():
+        return None
+    middle = pattern.vertices - pattern.vertices.mean(axis=0)
+    _, _, axes = np.linalg.svd(middle, full_matrices=False)
+    thickness = float(np.ptp(middle @ axes[2]))
+    points = middle @ axes[:2].T
+    areas = []
+    for face in pattern.faces:
+        a, b = points[list(face)].T
+        areas.append(float(a @ np.roll(b, -1) - b @ np.roll(a, -1)))
+    signs = np.where(size >= closed, np.sign(angles), 0.0).astype(np.int64)
+    near = max(EXACT * pattern.size, 2.0 * thickness)
+    return FlatState(points, np.array(areas) > 0.0, signs, near)
+
+
+def with_layers(pattern: Pattern, angles: NDArray, closed: float, given: Orders) -> Pattern:
+    """The pattern with the order of its layers in its custom data, if it lies flat.
+
+    Without an order where the search is given up. Arguments and errors as of the functions above
+    and below.
+    """
+    state = flat_state(pattern, angles, closed)
+    if state is None:
+        return pattern
+    try:
+        orders = layer_order(pattern, state, given).tolist()
+    except ComputationError:
+        return pattern
+    return pattern.changed(custom={**pattern.custom, FACE_ORDERS: orders})
+
+
+def layer_order(pattern: Pattern, state: FlatState, given: Orders = ()) -> NDArray[np.int64]:
+    """Order of the panels that overlap: rows (f, g, s) as FOLD's faceOrders.
+
+    s is 1 where panel f lies on the side of g to which the front of g faces, -1 on the other.
+    `given` are rows that are to hold.
+
+    Raises
+    ------
+    InputError
+        No order keeps the panels from passing through each other.
+    ComputationError
+        The search was given up.
+    """
+    constraints = layer_constraints(pattern, state)
+    pairs = constraints.pairs
+    row = edge_lookup(pairs)
+    for f, g, side in given:
+        if side and edge_of(f, g) in row:
+            above = side if state.up[g] else -side
+            constraints.products.append(((row[edge_of(f, g)],), above if f < g else -above))
+    try:
+        orders = ordered(constraints)
+    except CrossingError as crossing:
+        panels = np.unique(pairs[list(crossing.rows)]).tolist()
+        raise InputError(
+            ": lies flat when folded, but no order of its layers keeps panels from passing through "
+            f"each other (found at panels {', '.join(map(str, panels))}); change assignments "
+            "there, or fold it less",
+            "pattern",
+        ) from None
+    above = np.where(state.up[pairs[:, 1]], orders, -orders)
+    return np.column_stack([pairs, above])
