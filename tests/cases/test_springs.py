@@ -237,7 +237,7 @@ def test_a_pendulum_on_a_spring_keeps_its_energy():
     [
         "rk4",
         pytest.param("central_difference", marks=pytest.mark.slow),
-        "dormand_prince",
+        pytest.param("dormand_prince", marks=pytest.mark.slow),
         "newmark",
     ],
 )

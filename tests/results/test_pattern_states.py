@@ -8,7 +8,8 @@ import pytest
 import foldyn as fd
 from foldyn.analyses import read_case
 from foldyn.errors import InputError
-from foldyn.results import frames_of, state_of
+from foldyn.results import frames_of, shapes_of, state_of
+from foldyn.results.frames import SWING
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 
@@ -84,6 +85,37 @@ def test_every_so_many_states_and_the_last(motion):
     assert [f.title for f in frames_of(motion, every=10**6)[1]] == [titles[0], titles[-1]]
 
 
+def test_so_many_states_and_larger_displacements(motion):
+    count = motion.sizes["time"]
+    found = shapes_of(motion, frames=3, scale=2.0)
+    assert found.samples.tolist() == [0, round((count - 1) / 2), count - 1]
+    u = motion["displacement"].values[found.samples]
+    np.testing.assert_array_equal(found.displacement, 2.0 * u)
+    np.testing.assert_array_equal(found.nodes, motion["rest_position"].values)
+    assert len(shapes_of(motion, frames=10**6).samples) == count
+    last = state_of(motion, scale=3.0).vertices
+    np.testing.assert_allclose(last, found.nodes[:9] + 3.0 * motion["displacement"].values[-1, :9])
+    with pytest.raises(InputError, match="either every or frames"):
+        shapes_of(motion, every=2, frames=2)
+    with pytest.raises(InputError, match="frames = 1: must be a whole number, at least 2"):
+        shapes_of(motion, frames=1)
+
+
+def test_shapes_of_modes(motion):
+    case = fd.case_of(motion)
+    found = fd.modes(fd.Case(case.structure, case.supports), count=3)
+    shapes = shapes_of(found, scale=0.5)
+    size = case.structure.pattern.size
+    np.testing.assert_allclose(
+        np.linalg.norm(shapes.displacement, axis=2).max(axis=1), 0.5 * SWING * size
+    )
+    assert np.diag(fd.mac(shapes.displacement, found)) == pytest.approx(1.0)
+    assert shapes.titles[0] == f"mode 1: {float(found.frequency[0]):.6g} Hz"
+    unstable = found.copy(deep=True)
+    unstable["frequency"][0] = np.nan
+    assert shapes_of(unstable).titles[0] == "mode 1: unstable"
+
+
 def test_a_state_of_a_path(path):
     assert frames_of(path)[1][-1].title == "load factor 1"
     last = state_of(path)
@@ -94,9 +126,17 @@ def test_a_state_of_a_path(path):
 
 
 def test_what_has_no_states(motion):
-    case = fd.Case(fd.case_of(motion).structure, [fd.Fix([0, 1, 2])])
-    with pytest.raises(InputError, match=r"result: is of kind 'modes'.*motion or a path"):
-        frames_of(fd.modes(case, count=1))
+    other = motion.assign_attrs(foldyn_result="frf")
+    for function in (frames_of, state_of):
+        with pytest.raises(InputError, match=r"result: is of kind 'frf'.*motion, a path or modes"):
+            function(other)
+    with pytest.raises(InputError, match="has no samples"):
+        frames_of(motion.isel(time=slice(0)))
+    broken = motion.copy(deep=True)
+    broken["displacement"][2:] = np.nan
+    with pytest.raises(InputError, match=r"sample 2 is not finite.*isel\(time=slice\(2\)\)"):
+        frames_of(broken)
+    assert len(frames_of(broken.isel(time=slice(2))).frames) == 2
     with pytest.raises(InputError, match="every = 0"):
         frames_of(motion, every=0)
     with pytest.raises(InputError, match="frame = 999: the result has the samples 0 to"):
@@ -168,3 +208,22 @@ def test_unit_scale_and_frame_in_a_case_file(tmp_path):
         read(tmp_path, '[pattern]\nfile = "x.fold"\nframe = 7\n')
     with pytest.raises(InputError, match=r"pattern\.unt"):
         read(tmp_path, '[pattern]\nfile = "x.fold"\nunt = "mm"\n')
+
+
+def test_a_folding_is_a_result_of_a_pattern_alone(tmp_path):
+    """It is stored with its pattern, and has states, but no case."""
+    flat = fd.patterns.miura(dihedral=180)
+    way = fd.fold(flat, fraction=0.5, steps=3).path
+    fd.save(way, tmp_path / "way.nc")
+    found = fd.load(tmp_path / "way.nc")
+    assert found.identical(way)
+    pattern, frames = frames_of(found)
+    assert pattern.assignments == flat.assignments and len(frames) == 4
+    np.testing.assert_array_equal(pattern.vertices, flat.vertices)
+    np.testing.assert_allclose(frames[-1].vertices, way["position"].values[-1], atol=1e-15)
+    assert [frame.title for frame in frames[::3]] == ["0 of the way", "1 of the way"]
+    np.testing.assert_array_equal(
+        state_of(found, 2).vertices, flat.vertices + way["displacement"].values[2]
+    )
+    with pytest.raises(InputError, match="it is of a pattern alone, which has no sheet"):
+        fd.case_of(found)

@@ -22,6 +22,7 @@ from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.attached_body import GROUP, attached
 from foldyn.mechanics.body import Body
+from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
 from foldyn.values import brief, show
@@ -101,6 +102,11 @@ class Case(Supported, Loaded, Damped):
     loads: Sequence[Load] = ()
     damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)
     masses: Sequence[PointMass] = ()
+
+    def _repr_html_(self) -> str | None:
+        """A picture for notebooks."""
+        pattern = self.structure.pattern
+        return None if pattern is None else picture(pattern, repr(self))
 
     def __post_init__(self) -> None:
         """Check the arguments."""

@@ -75,7 +75,18 @@ def to_document(case: Case, stage_times: NDArray[np.float64] | None = None) -> D
     -------
     Document
     """
-    return _Writer(case, stage_times).document()
+    return _Writer(stage_times).document(case)
+
+
+def pattern_document(pattern: Pattern) -> Document:
+    """Write down a pattern alone, which has no sheet and is no case."""
+    writer = _Writer(None)
+    sections = {
+        "pattern": writer.pattern(pattern),
+        "nodes": writer.store("rest_position", pattern.vertices),
+    }
+    obstacles = (*writer.obstacles, "it is of a pattern alone, which has no sheet")
+    return Document(sections, writer.arrays, obstacles)
 
 
 def from_document(sections: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> Case:
@@ -116,18 +127,17 @@ def _undamaged(read: Callable[[Any], T], table: Any, arrays: Mapping[str, NDArra
 class _Writer:
     """Collects the arrays and obstacles while the sections are written."""
 
-    def __init__(self, case: Case, stage_times: NDArray[np.float64] | None) -> None:
-        self.case = case
+    def __init__(self, stage_times: NDArray[np.float64] | None) -> None:
         self.stage_times = stage_times
         self.arrays: dict[str, NDArray] = {}
         self.obstacles: list[str] = []
         self.histories: list[tuple[History, bool, dict[str, Any]]] = []
 
-    def document(self) -> Document:
-        case, structure = self.case, self.case.structure
+    def document(self, case: Case) -> Document:
+        structure = case.structure
         sections: dict[str, Any] = {
-            "pattern": self._pattern(structure.pattern),
-            "nodes": self._store("rest_position", structure.nodes),
+            "pattern": self.pattern(structure.pattern),
+            "nodes": self.store("rest_position", structure.nodes),
             "sheet": self._sheet(structure.sheet),
             "model": self._model(structure),
             "damping": damping_table(case.dampings),
@@ -142,11 +152,11 @@ class _Writer:
             )
         return Document(sections, self.arrays, tuple(dict.fromkeys(self.obstacles)))
 
-    def _store(self, name: str, values: Any) -> dict[str, str]:
+    def store(self, name: str, values: Any) -> dict[str, str]:
         self.arrays[name] = np.asarray(values)
         return {"variable": name}
 
-    def _pattern(self, pattern: Pattern | None) -> dict[str, Any]:
+    def pattern(self, pattern: Pattern | None) -> dict[str, Any]:
         if pattern is None:
             self.obstacles.append("its structure has no pattern")
             return {}
@@ -154,12 +164,12 @@ class _Writer:
         flat = [vertex for face in pattern.faces for vertex in face]
         return {
             "name": pattern.name,
-            "vertices": self._store("vertices", pattern.vertices),
-            "faces": self._store("faces", np.array(flat, dtype=np.int64)),
-            "face_offsets": self._store(
+            "vertices": self.store("vertices", pattern.vertices),
+            "faces": self.store("faces", np.array(flat, dtype=np.int64)),
+            "face_offsets": self.store(
                 "face_offsets", np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
             ),
-            "assignments": self._store("assignments", np.array(pattern.assignments, dtype="<U1")),
+            "assignments": self.store("assignments", np.array(pattern.assignments, dtype="<U1")),
             **self._boards(pattern.boards),
             **self._more(pattern),
         }
@@ -168,12 +178,12 @@ class _Writer:
         """What a pattern says of its creases beside their letters, where it says anything."""
         table: dict[str, Any] = {}
         if not np.isnan(pattern.fold_angles).all():
-            table["fold_angles"] = self._store("fold_angles", pattern.fold_angles)
+            table["fold_angles"] = self.store("fold_angles", pattern.fold_angles)
         if len(pattern.welds):
-            table["welds"] = self._store("welds", pattern.welds)
+            table["welds"] = self.store("welds", pattern.welds)
         if pattern.families:
             table["families"] = [
-                {"name": name, "creases": self._store(f"tables_family{i}_creases", rows)}
+                {"name": name, "creases": self.store(f"tables_family{i}_creases", rows)}
                 for i, (name, rows) in enumerate(pattern.families.items())
             ]
         if pattern.custom:
@@ -187,8 +197,8 @@ class _Writer:
         if boards is None:
             return {}
         return {
-            "board_corners": self._store("board_corners", boards.corners),
-            "board_thickness": self._store("board_thickness", boards.thickness),
+            "board_corners": self.store("board_corners", boards.corners),
+            "board_thickness": self.store("board_thickness", boards.thickness),
         }
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
@@ -199,7 +209,7 @@ class _Writer:
         }
         if sheet.panels:
             section["panels"] = [
-                {"panels": self._store(f"tables_sheet{i}_panels", part.panels), **part.own}
+                {"panels": self.store(f"tables_sheet{i}_panels", part.panels), **part.own}
                 for i, part in enumerate(sheet.panels)
             ]
         return section
@@ -215,7 +225,7 @@ class _Writer:
                 section[name] = self._law(name, value)
             elif name in PER_CREASE and not isinstance(value, Mapping):
                 array = np.asarray(value, dtype=np.float64)
-                section[name] = self._store(f"tables_{name}", array) if array.ndim else float(value)
+                section[name] = self.store(f"tables_{name}", array) if array.ndim else float(value)
             else:
                 section[name] = plain(value)
         if structure.kind != BARS_AND_HINGES:
@@ -268,7 +278,7 @@ class _Writer:
         for item in dataclasses.fields(cast(Any, history)):
             value = getattr(history, item.name)
             if isinstance(value, np.ndarray):
-                value = self._store(f"tables_{len(self.histories)}_{item.name}", value)
+                value = self.store(f"tables_{len(self.histories)}_{item.name}", value)
             table[item.name] = plain(value)
         return table
 

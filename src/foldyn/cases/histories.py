@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
@@ -315,6 +314,8 @@ class Table(Formula):
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """See `History.polynomials`."""
+        from scipy.interpolate import CubicSpline
+
         cubics = np.zeros((len(self.times), 4))
         if self.smooth:
             cubics[:-1] = CubicSpline(self.times, self.values).c.T

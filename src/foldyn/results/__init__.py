@@ -3,27 +3,31 @@
 from foldyn.results.contents import case_of, check_result
 from foldyn.results.dataset import (
     fidelity_dataset,
+    folding_dataset,
     frf_dataset,
     modes_dataset,
     path_dataset,
     trajectory_dataset,
 )
-from foldyn.results.frames import States, frames_of, state_of
+from foldyn.results.frames import Shapes, States, frames_of, shapes_of, state_of
 from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
 
 __all__ = [
     "Quantity",
+    "Shapes",
     "States",
     "case_of",
     "check_result",
     "fidelity_dataset",
+    "folding_dataset",
     "frames_of",
     "frf_dataset",
     "load",
     "modes_dataset",
     "path_dataset",
     "save",
+    "shapes_of",
     "state_of",
     "trajectory_dataset",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,14 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn import __version__
 from foldyn.cases import HISTORIES, Case
-from foldyn.cases.document import Document, to_document
+from foldyn.cases.document import Document, pattern_document, to_document
+from foldyn.patterns import Pattern
+from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
     ESTIMATES,
     FIDELITY,
+    FOLDING,
     INTERNAL,
     MODES,
     MOTION,
@@ -30,19 +31,29 @@ from foldyn.results.quantities import (
     with_reason,
 )
 
-FORMAT = 1
-"""Number of the layout of results, raised when older programs could not read a new one."""
-
 AXIS = np.array(["x", "y", "z"])
 
+DOCUMENT: Mapping[str, tuple[str, ...]] = {
+    "case": (),
+    "rest_position": PLACE,
+    "vertices": ("vertex", "axis"),
+    "faces": ("face_corner",),
+    "face_offsets": ("face_bound",),
+    "assignments": ("crease",),
+    "fold_angles": ("crease",),
+    "welds": ("weld", "end"),
+    "board_corners": ("face_corner", "axis"),
+    "board_thickness": ("face",),
+    "tables_crease_stiffness": ("crease",),
+    "tables_crease_rest": ("crease",),
+}
+"""Variables of the case, which every result has, with their dimensions; other tables have one of
+their own."""
 TAKEN = frozenset(
-    {*MOTION, "time", "node", "axis", "support", "support_node", "support_axis", "case"}
-    | {"rest_position", "vertices", "faces", "face_offsets", "assignments"}
-    | {"board_corners", "board_thickness", "fold_angles"}
+    {*MOTION, *DOCUMENT, "time", "node", "axis", "support", "support_node", "support_axis"}
 )
 """Names that every motion has."""
 LENGTHS = ("rest_position", "vertices", "board_corners", "board_thickness")
-_OWN = ("foldyn_result", "foldyn_format", "foldyn_version", "rerunnable", "not_rerunnable_because")
 
 
 def trajectory_dataset(
@@ -252,6 +263,44 @@ def fidelity_dataset(
     return result_dataset("fidelity", case, data, along, statistics)
 
 
+def folding_dataset(
+    pattern: Pattern,
+    share: ArrayLike,
+    values: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any],
+) -> xr.Dataset:
+    """Dataset of the states in which a pattern folds, which carries the pattern.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        What is folded.
+    share : array_like, shape (ns,)
+        How far along the way each state is, from 0 to 1.
+    values : mapping of str to array_like
+        Variables of `quantities.FOLDING`.
+    statistics : mapping
+        Facts about the folding, each stored as an attribute.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables along the dimension step, and the pattern as in `trajectory_dataset`; without
+        a sheet there is no case to rebuild.
+    """
+    document = pattern_document(pattern)
+    coordinates = {
+        "step": np.arange(len(np.asarray(share))),
+        "share": ("step", np.array(share, float), {"long_name": "share of the way"}),
+        "node": np.arange(len(pattern.vertices)),
+        "axis": AXIS,
+        "crease_vertices": (("crease", "end"), pattern.creases),
+    }
+    data = variables(FOLDING, "step", values)
+    attributes = own_attributes("folding", document.obstacles) | facts(statistics)
+    return xr.Dataset({**data, **_case_variables(document)}, coordinates, attributes)
+
+
 def result_dataset(
     kind: str,
     case: Case,
@@ -279,16 +328,7 @@ def result_dataset(
     """
     support = case.reaction_dofs
     document = to_document(case, times)
-    obstacles = (*document.obstacles, *obstacles)
-    attributes: dict[str, Any] = {
-        "foldyn_result": kind,
-        "foldyn_format": FORMAT,
-        "foldyn_version": __version__,
-        "rerunnable": 0 if obstacles else 1,
-    }
-    if obstacles:
-        attributes["not_rerunnable_because"] = "; ".join(obstacles)
-    attributes.update(_attributes(statistics))
+    attributes = own_attributes(kind, (*document.obstacles, *obstacles)) | facts(statistics)
     coordinates = {
         **along,
         "node": np.arange(len(case.structure.nodes)),
@@ -313,45 +353,17 @@ def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
 
 
 def _case_variables(document: Document) -> dict[str, Any]:
-    dimensions = {
-        "rest_position": ("node", "axis"),
-        "vertices": ("vertex", "axis"),
-        "faces": ("face_corner",),
-        "face_offsets": ("face_bound",),
-        "assignments": ("crease",),
-        "fold_angles": ("crease",),
-        "welds": ("weld", "end"),
-        "board_corners": ("face_corner", "axis"),
-        "board_thickness": ("face",),
-        "tables_crease_stiffness": ("crease",),
-        "tables_crease_rest": ("crease",),
-    }
     variables: dict[str, Any] = {
-        "case": ((), tomli_w.dumps(document.sections), {"long_name": "the case (TOML)"})
+        "case": (
+            DOCUMENT["case"],
+            tomli_w.dumps(document.sections),
+            {"long_name": "the case (TOML)"},
+        )
     }
     for name, array in document.arrays.items():
         # the times and values of one table share a dimension
         own = (f"{name.rsplit('_', 1)[0]}_point",)
         unit = "m" if name in LENGTHS else "rad" if name == "fold_angles" else ""
         attributes = {"units": unit} if unit else {}
-        variables[name] = (dimensions.get(name, own), array, attributes)
+        variables[name] = (DOCUMENT.get(name, own), array, attributes)
     return variables
-
-
-def _attributes(statistics: Mapping[str, Any]) -> dict[str, Any]:
-    """Statistics as NetCDF holds them: numbers, text and lists of numbers."""
-    attributes: dict[str, Any] = {}
-    for name, value in statistics.items():
-        if name in _OWN:
-            raise ValueError(f"statistics: {name} is an attribute of every result")
-        if value is None:
-            continue
-        if isinstance(value, bool | np.bool_ | Integral):
-            attributes[name] = int(value)
-        elif isinstance(value, Real):
-            attributes[name] = float(value)
-        elif isinstance(value, list | tuple | np.ndarray):
-            attributes[name] = np.asarray(value)
-        else:
-            attributes[name] = str(value)
-    return attributes

@@ -1,22 +1,135 @@
-"""States of a result as frames of a pattern file, or as a pattern of its own."""
+"""Shapes that results go through: as frames of a pattern file, as a pattern, or of all nodes."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.formats.frames import Frame
 from foldyn.patterns import Pattern
+from foldyn.patterns.frames import Frame
 from foldyn.results.contents import check_result, check_variable, pattern_of
-from foldyn.values import whole
+from foldyn.values import number, whole
 
 ALONG = {
-    "trajectory": ("time", "time", "t = {:.6g} s"),
-    "path": ("step", "load_factor", "load factor {:.6g}"),
+    "trajectory": ("time", "time", "displacement", "t = {:.6g} s"),
+    "path": ("step", "load_factor", "displacement", "load factor {:.6g}"),
+    "modes": ("mode", "frequency", "shape", "{:.6g} Hz"),
+    "folding": ("step", "share", "displacement", "{:.4g} of the way"),
 }
-"""Kinds of results that have states: their dimension, its coordinate, and titles."""
+"""Kinds of results that have shapes: their dimension, what counts them, what moves, and titles."""
+SWING = 0.12
+"""Largest displacement of a mode that is shown, in sizes of the pattern."""
+
+LARGEST = 1e6
+"""Factor on displacements: beyond it, they would leave the range of single precision."""
+
+
+class Shapes(NamedTuple):
+    """Shapes of all nodes of a result, one after the other.
+
+    Attributes
+    ----------
+    samples : ndarray, shape (k,)
+        Their numbers in the result, from 0.
+    values : ndarray, shape (k,)
+        Times (s), load factors, or frequencies (Hz).
+    titles : list of str
+        "t = 0.1 s", "load factor 1", "mode 2: 1.05 Hz".
+    nodes : ndarray, shape (n, 3)
+        Where displacements start from, m: at rest; for modes, in the state about which they swing.
+    displacement : ndarray, shape (k, n, 3)
+        m, with the factor that was asked for. Of modes, the largest is `SWING` times that.
+    """
+
+    samples: NDArray[np.int64]
+    values: NDArray[np.float64]
+    titles: list[str]
+    nodes: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+
+
+def shapes_of(
+    result: xr.Dataset, every: int | None = None, frames: int | None = None, scale: float = 1.0
+) -> Shapes:
+    """Shapes of all nodes that a motion, a path or modes go through.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        A motion, an equilibrium path, or modes.
+    every : int, optional
+        Take every such sample; the last one is always taken.
+    frames : int, optional
+        Take so many samples, spread evenly, the first and the last among them.
+    scale : float
+        Factor on all displacements.
+
+    Returns
+    -------
+    Shapes
+        Of all samples, unless fewer are asked for.
+
+    Raises
+    ------
+    InputError
+        Another kind of result, one with displacements that are not finite, or a number of samples
+        that makes no sense.
+    """
+    check_result(result, "result: ")
+    count = result.sizes[_along(result)[0]]
+    return _shapes(result, chosen_samples(count, every, frames), scale)
+
+
+def _along(result: xr.Dataset) -> tuple[str, str, str, str]:
+    kind = result.attrs["foldyn_result"]
+    if kind not in ALONG:
+        raise InputError(
+            f": is of kind {kind!r}, which has no shapes in turn; give a motion, a path or modes",
+            "result",
+        )
+    return ALONG[kind]
+
+
+def chosen_samples(count: int, every: int | None, frames: int | None) -> NDArray[np.int64]:
+    """Numbers of the samples to take of so many."""
+    if count == 0:
+        raise InputError(": has no samples; compute it again", "result")
+    if every is not None and frames is not None:
+        raise InputError(": give either every or frames, not both", "frames")
+    if frames is not None:
+        wanted = min(whole("frames", frames, least=2), count)
+        return np.unique(np.rint(np.linspace(0.0, count - 1.0, wanted)).astype(np.int64))
+    step = 1 if every is None else whole("every", every, least=1)
+    return np.unique([*range(0, count, step), count - 1])
+
+
+def _shapes(result: xr.Dataset, samples: NDArray[np.int64], scale: float) -> Shapes:
+    dimension, name, moving, title = _along(result)
+    factor = number("scale", scale, largest=LARGEST)
+    moved = check_variable(result, moving, (dimension, "node", "axis")).values[samples]
+    values = check_variable(result, name, (dimension,)).values[samples]
+    nodes = check_variable(result, "rest_position", ("node", "axis")).values
+    lost = np.flatnonzero(~np.isfinite(moved).all(axis=(1, 2)))
+    if len(lost):
+        raise InputError(
+            f": sample {samples[lost[0]]} is not finite: the computation failed there; cut the "
+            f"result before it, as result.isel({dimension}=slice({samples[lost[0]]}))",
+            "result",
+        )
+    titles = [title.format(value) for value in values]
+    if dimension == "mode":
+        nodes = nodes + check_variable(result, "displacement", ("node", "axis")).values
+        largest = np.linalg.norm(moved, axis=2).max(axis=1)
+        factor = (factor * SWING * pattern_of(result).size / largest)[:, None, None]
+        titles = [
+            f"mode {k}: {text if np.isfinite(value) else 'unstable'}"
+            for k, text, value in zip(result["mode"].values[samples], titles, values, strict=True)
+        ]
+    return Shapes(samples, values, titles, nodes, factor * moved)
 
 
 class States(NamedTuple):
@@ -26,21 +139,21 @@ class States(NamedTuple):
     frames: list[Frame]
 
 
-def frames_of(result: xr.Dataset, every: int = 1) -> States:
-    """States of a motion or a path, for `write_pattern`.
+def frames_of(
+    result: xr.Dataset, every: int | None = None, frames: int | None = None, scale: float = 1.0
+) -> States:
+    """States of a motion, a path, modes or a folding, for `write_pattern`.
 
     Parameters
     ----------
-    result : xarray.Dataset
-        A motion or an equilibrium path.
-    every : int
-        Take every such sample; the last one is always taken.
+    result, every, frames, scale
+        As for `shapes_of`.
 
     Returns
     -------
     States
         The `pattern` at rest, and its `frames`: coordinates (m) of its vertices in each state,
-        titled by the time or the load factor.
+        titled by the time, the load factor, the mode or the share of the way.
 
     Raises
     ------
@@ -52,34 +165,26 @@ def frames_of(result: xr.Dataset, every: int = 1) -> States:
     >>> pattern, frames = frames_of(trajectory, every=10)  # doctest: +SKIP
     >>> fd.write_pattern("run.fold", pattern, frames)  # doctest: +SKIP
     """
-    every = whole("every", every, least=1)
-    check_result(result, "result: ")
-    kind = result.attrs["foldyn_result"]
-    if kind not in ALONG:
-        raise InputError(
-            f": is of kind {kind!r}, which has no states in turn; give a motion or a path", "result"
-        )
+    return _states(result, shapes_of(result, every, frames, scale))
+
+
+def _states(result: xr.Dataset, shapes: Shapes) -> States:
     pattern = pattern_of(result)
-    dimension, name, title = ALONG[kind]
-    moved = check_variable(result, "displacement", (dimension, "node", "axis")).values
-    moved = moved[:, : len(pattern.vertices)]
-    last = len(moved) - 1
-    rows = sorted({*range(0, last + 1, every), last} if last >= 0 else set())
-    values = check_variable(result, name, (dimension,)).values
-    return States(
-        pattern, [Frame(title.format(values[k]), pattern.vertices + moved[k]) for k in rows]
-    )
+    vertices = (shapes.nodes + shapes.displacement)[:, : len(pattern.vertices)]
+    return States(pattern, list(map(Frame, shapes.titles, vertices)))
 
 
-def state_of(result: xr.Dataset, frame: int | None = None) -> Pattern:
-    """Pattern in one state of a motion or a path.
+def state_of(result: xr.Dataset, frame: int | None = None, scale: float = 1.0) -> Pattern:
+    """Pattern in one state of a motion, a path, modes or a folding.
 
     Parameters
     ----------
     result : xarray.Dataset
-        A motion or an equilibrium path.
+        A motion, an equilibrium path, modes, or `Folding.path`.
     frame : int, optional
         Number of the sample, from 0; by default the last one.
+    scale : float
+        Factor on all displacements.
 
     Returns
     -------
@@ -91,13 +196,15 @@ def state_of(result: xr.Dataset, frame: int | None = None) -> Pattern:
     InputError
         Not such a result, or no such sample.
     """
-    pattern, frames = frames_of(result)
+    check_result(result, "result: ")
+    count = result.sizes[_along(result)[0]]
     if frame is None:
-        frame = len(frames) - 1
-    if isinstance(frame, bool) or not isinstance(frame, int) or not 0 <= frame < len(frames):
+        frame = count - 1
+    if isinstance(frame, bool) or not isinstance(frame, int) or not 0 <= frame < count:
         raise InputError(
-            f" = {frame!r}: the result has the samples 0 to {len(frames) - 1}; give one of these",
+            f" = {frame!r}: the result has the samples 0 to {count - 1}; give one of these",
             "frame",
         )
-    name = f"{pattern.name}, {frames[frame].title}" if pattern.name else frames[frame].title
-    return pattern.changed(vertices=frames[frame].vertices, name=name, boards=None)
+    pattern, (state,) = _states(result, _shapes(result, np.array([frame]), scale))
+    name = f"{pattern.name}, {state.title}" if pattern.name else state.title
+    return pattern.changed(vertices=state.vertices, name=name, boards=None)

@@ -14,6 +14,7 @@ import hashlib
 import io
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +27,15 @@ from xarray.backends import list_engines
 from foldyn.errors import InputError
 from foldyn.input_files import check_file
 from foldyn.results.apart import apart
+from foldyn.results.attributes import FORMAT
 from foldyn.results.contents import check_result, whole_attribute
-from foldyn.results.dataset import FORMAT
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
 OTHERS = (
-    ".cp", ".csv", ".dat", ".dxf", ".fold", ".gif", ".html", ".json", ".mat", ".mp4", ".npy",
-    ".npz", ".obj", ".opx", ".parquet", ".pkl", ".png", ".stl", ".svg", ".toml", ".tsv", ".txt",
-    ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
+    ".cp", ".csv", ".dat", ".dxf", ".fold", ".gif", ".glb", ".html", ".inp", ".json", ".mat",
+    ".mp4", ".npy", ".npz", ".obj", ".opx", ".parquet", ".pkl", ".png", ".stl", ".svg", ".tcl",
+    ".toml", ".tsv", ".txt", ".uff", ".unv", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
 )  # fmt: skip
 """Suffixes that promise another kind of file."""
 _PARTS = ("real", "imag")
@@ -126,29 +127,29 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         raise InputError(f"{path}: is a folder; give the name of a file")
     if path.suffix.lower() in OTHERS:
         raise InputError(
-            f"{path}: only NetCDF is written; name the file {path.stem}.nc, or write a table "
-            "yourself, as ds[variable].to_series().to_csv(path)"
+            f"{path}: only NetCDF is written; name the file {path.stem}.nc, or write it for other "
+            "programs by fd.export"
         )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     try:
         with whole(path) as part:
-            with Sink(part, "w+") as sink:
-                _fill(sink, ds)
+            fill(part, lambda sink: ds.to_netcdf(sink, engine=ENGINE))
             _seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
 
 
-def _fill(sink: Sink, ds: xr.Dataset) -> None:
-    """Write a dataset; a failure of the file takes precedence over what HDF5 makes of it."""
-    try:
-        ds.to_netcdf(sink, engine=ENGINE)
-    except Exception:
-        if sink.failure is None:
-            raise
-    if sink.failure is not None:
-        raise sink.failure
+def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
+    """Write an HDF5 file; a failure of the file takes precedence over what HDF5 makes of it."""
+    with Sink(path, "w+") as sink:
+        try:
+            write_to(sink)
+        except Exception:
+            if sink.failure is None:
+                raise
+        if sink.failure is not None:
+            raise sink.failure
 
 
 def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:

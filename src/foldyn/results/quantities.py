@@ -55,6 +55,13 @@ PATH: Mapping[str, Quantity] = STATE | {
     "iterations": Quantity(text="Newton iterations"),
     "residual": Quantity(text="residual as a fraction of the forces at play"),
 }
+FOLDING: Mapping[str, Quantity] = {
+    "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),
+    "position": Quantity("m", "position of the vertex", PLACE),
+    "fold_angle": Quantity("rad", "fold angle, valleys positive", ("crease",)),
+    "strain": Quantity(text="largest strain of a bar"),
+    "bend": Quantity("rad", "largest turn of a bend within a panel"),
+}
 MODES: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency"),
     "eigenvalue": Quantity("rad2/s2", "square of the angular frequency (negative: unstable)"),

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
@@ -129,6 +128,8 @@ def frequency_response(
     >>> print(estimate.frequency[16], estimate.response[16].imag.round(12))
     25.0 -2.0
     """
+    import scipy.fft
+
     choice("estimator", estimator, ESTIMATORS)
     interval = records.checked_interval(dt)
     forces, responses = _records(force, response)
@@ -199,6 +200,8 @@ def _records(
 def _transform(
     x: NDArray[np.float64], weights: NDArray[np.float64], detrend: str | None
 ) -> NDArray[np.complex128]:
+    import scipy.fft
+
     return scipy.fft.rfft(records.detrended(x, detrend) * records.beside(weights, x), axis=0)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
@@ -58,6 +57,8 @@ def spectrum(
         Fewer than 4 samples, NaN or infinity in the record, complex samples, an interval that is
         not positive, an unknown window or detrend, or a padding factor below 1.
     """
+    import scipy.fft
+
     samples = records.real_numbers("x", x)
     if samples.ndim == 0 or not -samples.ndim <= axis < samples.ndim:
         raise InputError(f"axis: {axis} is no axis of a record of shape {samples.shape}")
