@@ -11,7 +11,8 @@ import foldyn as fd
 from foldyn import cases, patterns, structures
 from foldyn.errors import InputError
 from foldyn.plots import animate_modes, draw_modes, plot_mac
-from foldyn.plots.modes import chosen_modes, describe_mode
+from foldyn.plots.modes import describe_mode
+from foldyn.plots.readings import chosen_modes
 from foldyn.plots.scene import Sheet3D
 from foldyn.plots.sheet import DrawnSheet
 from foldyn.results import modes_dataset

@@ -11,5 +11,7 @@ from foldyn.facade import lazy
 
 ANIMATIONS = ("gif", "mp4")
 """Kinds of animation that can be written."""
+FIGURES = ("png", "svg", "pdf")
+"""Kinds of figures that commands can write."""
 
-__getattr__, __dir__, __all__ = lazy(__name__, __file__, "ANIMATIONS")
+__getattr__, __dir__, __all__ = lazy(__name__, __file__, "ANIMATIONS", "FIGURES")

@@ -3,7 +3,6 @@
 from foldyn.plots.animation import animate as animate, animate_modes as animate_modes
 from foldyn.plots.boards import draw_boards as draw_boards
 from foldyn.plots.energies import (
-    energy_shares as energy_shares,
     plot_energies as plot_energies,
     plot_path_energies as plot_path_energies,
 )
@@ -16,14 +15,17 @@ from foldyn.plots.loads import plot_load_history as plot_load_history
 from foldyn.plots.modes import draw_modes as draw_modes, plot_mac as plot_mac
 from foldyn.plots.nyquist import plot_nyquist as plot_nyquist
 from foldyn.plots.path import (
-    chosen_points as chosen_points,
     draw_shapes as draw_shapes,
-    moved_supports as moved_supports,
     plot_load_displacement as plot_load_displacement,
     plot_reaction as plot_reaction,
-    total_reaction as total_reaction,
 )
 from foldyn.plots.patterns import draw_patterns as draw_patterns
+from foldyn.plots.readings import (
+    chosen_points as chosen_points,
+    energy_shares as energy_shares,
+    moved_supports as moved_supports,
+    total_reaction as total_reaction,
+)
 from foldyn.plots.structure import draw_structure as draw_structure
 from foldyn.plots.tracks import (
     draw_overlay as draw_overlay,
@@ -32,3 +34,4 @@ from foldyn.plots.tracks import (
 )
 
 ANIMATIONS: tuple[str, ...]
+FIGURES: tuple[str, ...]

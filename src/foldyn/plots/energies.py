@@ -15,25 +15,16 @@ from foldyn.errors import InputError
 from foldyn.mechanics.attached_body import GROUP
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
-from foldyn.shells.body import GROUPS as OF_SHELLS
-from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
+from foldyn.plots.readings import STRAIN, energy_shares, parts_of, stacked
 
-PARTS: Mapping[str, tuple[str, str]] = {
-    "strain_bars": ("bars", style.VERMILLION),
-    "strain_membrane": ("membrane", style.VERMILLION),
-    "strain_bends": ("bends", style.PURPLE),
-    "strain_bending": ("bending", style.PURPLE),
-    "strain_folds": ("folds", style.GREEN),
-    GROUP: ("springs", style.SKY),
+COLORS: Mapping[str, str] = {
+    "strain_bars": style.VERMILLION,
+    "strain_membrane": style.VERMILLION,
+    "strain_bends": style.PURPLE,
+    "strain_bending": style.PURPLE,
+    "strain_folds": style.GREEN,
+    GROUP: style.SKY,
 }
-"""Names and colors of strain energies, stacked in this order from the bottom up: folds on top."""
-_NONE = 1e-9  # of the largest energy: below it there is nothing to share
-
-
-def parts_of(result: xr.Dataset) -> tuple[str, ...]:
-    """Parts of the strain energy of a result, in the order of its structure."""
-    own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
-    return (*own, *([GROUP] if GROUP in result else []))
 
 
 def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
@@ -74,7 +65,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     InputError
         Where an energy is missing from the trajectory.
     """
-    strain = {part: f"strain, {PARTS[part][0]}" for part in parts_of(trajectory)}
+    strain = {part: f"strain, {STRAIN[part]}" for part in parts_of(trajectory)}
     others = {"dissipated": "dissipated", "work": "work of the loads"}
     names = {"kinetic": "kinetic", **strain, **others}
     missing = [name for name in names if name not in trajectory]
@@ -106,27 +97,6 @@ def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
     """Return the energies (J) as the audit has them, a column each."""
     names = audit.audited(parts_of(trajectory))
     return np.column_stack([trajectory[name].values for name in names])
-
-
-def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Shares of the parts of the strain energy at each point; NaN where there is none.
-
-    Parameters
-    ----------
-    path : xarray.Dataset
-        A path of `foldyn.trace`.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (steps,)
-        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", and
-        "springs" if there are any, each from 0 to 1.
-    """
-    check_path(path, "path")
-    energies = _stacked(path)
-    total = np.asarray(sum(energies.values()))
-    total = np.where(total > _NONE * max(float(total.max(initial=0.0)), 0.0), total, np.nan)
-    return {PARTS[part][0]: energy / total for part, energy in energies.items()}
 
 
 def plot_path_energies(
@@ -165,8 +135,8 @@ def plot_path_energies(
     x, name = _abscissa(path, nodes, direction)
     labels = ["strain energy (J)", "share"]
     figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
-    energies = _stacked(path)
-    names, colors = zip(*(PARTS[part] for part in energies), strict=True)
+    energies = stacked(path)
+    names, colors = zip(*((STRAIN[part], COLORS[part]) for part in energies), strict=True)
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
     work = float(sum(layer[0] for layer in energies.values())) + path["work"].values
     (line,) = upper.plot(
@@ -181,11 +151,6 @@ def plot_path_energies(
         axes.set_axisbelow(False)  # the grid must show through the areas
     style.exponents(upper)
     return style.finish(figure, [*reversed(handles), line], columns=4)
-
-
-def _stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Return the parts of the strain energy (J) in the order of a stack."""
-    return {part: path[part].values for part in PARTS if part in parts_of(path)}
 
 
 def _abscissa(

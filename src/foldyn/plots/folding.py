@@ -132,10 +132,11 @@ def _sheet(folding: Folding, nodes: NDArray) -> Sheet3D:
 def _caption(folding: Folding, number: int) -> str:
     """Text below a state: how far its creases have turned."""
     turned = np.abs(np.degrees(folding.path["fold_angle"].values[number]))
-    letters = np.array(folding.assignments)
+    letters = np.array(folding.pattern.assignments)
     folded = turned[(letters == "M") | (letters == "V")]
     if not folded.size:
         folded = turned
     if folded.max() < 0.05:
         return "flat"
-    return f"{folded.min():.0f} to {folded.max():.0f} degrees"
+    least, most = f"{folded.min():.0f}", f"{folded.max():.0f}"
+    return f"{most} degrees" if least == most else f"{least} to {most} degrees"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from foldyn import mechanics
 from foldyn.cases import Case, CreaseMoment, Pressure, Temperature
 from foldyn.cases.regions import resolve_panels
-from foldyn.plots.scene import Points
+
+if TYPE_CHECKING:
+    from foldyn.plots.scene import Points
 
 STEPS = 12  # of an arc
 NEAR, FAR = 0.15, 1.0  # rad, from a panel to the ends of an arc, at most

@@ -20,7 +20,7 @@ from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of, directions
 from foldyn.plots.modes import hertz
-from foldyn.results.quantities import RESPONSES
+from foldyn.plots.readings import along_drive, unit_of
 from foldyn.values import number
 
 _APART = 0.07  # of the frequency axis: peaks nearer than that share one label
@@ -149,19 +149,6 @@ def curves_of(
             coherence = here["coherence"].values if "coherence" in response else None
             curves.append(Curve(label, node, axis, frequency, values, coherence))
     return curves, shown
-
-
-def along_drive(response: xr.Dataset) -> list[str]:
-    """Each axis in the direction in which forces drive along it; as it is where none does."""
-    forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
-    backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
-    return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]
-
-
-def unit_of(quantity: str) -> str:
-    """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
-    unit = RESPONSES[quantity].units.replace("s2", "s²")
-    return "" if unit == "1" else f" ({unit})"
 
 
 def phase_line(

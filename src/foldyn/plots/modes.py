@@ -16,19 +16,18 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.readings import chosen_modes
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
 from foldyn.values import length
 
-MOST_MODES = 12
 """Modes that one figure shows at most."""
 _AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
 _STRETCH = 0.4  # largest displacement of a bar's ends against each other, as a part of its length
 _SHADES = LinearSegmentedColormap.from_list("mac", ["#FFFFFF", "#9CC7E4", style.BLUE, "#00304A"])
 _MOST_NUMBERS = 16  # rows or columns with which the numbers can be read
 _CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
-_NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
 
 
 def draw_modes(
@@ -122,27 +121,6 @@ class ShownModes:
         named = mode_names(sheet, modes, names)
         captions = [describe_mode(modes, number, named.get(number, "")) for number in numbers]
         return cls(sheet, swings, captions, rest_keys(state=state))
-
-
-def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
-    """Numbers of the modes to show: those asked for, else the first that are not rigid."""
-    missing = [key for key in _NEEDED if key not in modes]
-    if missing:
-        raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
-    stored = modes["mode"].values.tolist()
-    if which is None:
-        rigid = modes["rigid"].values.astype(bool)
-        elastic = [number for number, is_rigid in zip(stored, rigid, strict=True) if not is_rigid]
-        return (elastic or stored)[:MOST_MODES]
-    numbers = [int(number) for number in which]
-    if not numbers:
-        raise InputError("which: empty; give the number of at least one mode")
-    if len(numbers) > MOST_MODES:
-        raise InputError(f"which: {len(numbers)} modes; one figure shows at most {MOST_MODES}")
-    for number in numbers:
-        if number not in stored:
-            raise InputError(f"which: {number}; there are modes {stored[0]} to {stored[-1]}")
-    return numbers
 
 
 def mode_names(

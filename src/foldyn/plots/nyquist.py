@@ -17,8 +17,9 @@ from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import SIDES
 from foldyn.plots import style
-from foldyn.plots.frf import Curve, curves_of, unit_of
+from foldyn.plots.frf import Curve, curves_of
 from foldyn.plots.modes import hertz
+from foldyn.plots.readings import unit_of
 
 MOST_CIRCLES = 6
 _COLUMNS = 3

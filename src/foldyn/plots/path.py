@@ -12,8 +12,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.cases.directions import signed
-from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import (
     CRITICAL,
@@ -21,10 +19,9 @@ from foldyn.plots.along import (
     asked,
     check_path,
     displacements,
-    evenly,
-    farthest,
     stretches,
 )
+from foldyn.plots.readings import chosen_points, total_reaction
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
@@ -129,36 +126,6 @@ def plot_reaction(
     return _draw(curves, title, xlabel, f"force along {direction} (N)")
 
 
-def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:
-    """Sum of the forces of supports on nodes in a direction.
-
-    Parameters
-    ----------
-    path : xarray.Dataset
-        A path of `foldyn.trace`.
-    nodes : sequence of int
-    direction : {"x", "y", "z", "-x", "-y", "-z"}
-
-    Returns
-    -------
-    ndarray, shape (steps,)
-        The sum (N) at each point.
-
-    Raises
-    ------
-    InputError
-        A node is not supported along the direction.
-    """
-    _, sign = signed("direction", direction)
-    axis = direction[-1]
-    chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
-    held = path["support_node"].values[chosen.values]
-    loose = sorted(set(nodes) - set(held.tolist()))
-    if loose:
-        raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
-    return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # no -0
-
-
 class _Curve(NamedTuple):
     """What is drawn of a path, and its name."""
 
@@ -213,17 +180,6 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
             axes.plot(x[at], y[at], label=f"_{kind}", **look)
 
 
-def moved_supports(case: Case) -> tuple[list[int], str] | None:
-    """Nodes that supports move together and farthest, and the direction; None where none moves."""
-    motion = sum((vector for vector, _ in case.prescribed_terms), np.zeros(case.imposed.shape))
-    if not motion.any():
-        return None
-    largest, direction = farthest(motion)
-    moved = motion[:, signed("direction", direction)[0]]
-    together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(together).tolist(), direction
-
-
 def draw_shapes(
     case_or_structure: Case | Structure,
     path: xr.Dataset,
@@ -271,21 +227,6 @@ def draw_shapes(
     captions = [describe_point(path, number) for number in numbers]
     notes = rest_keys(scale)
     return side_by_side(sheet, sheet.nodes + scale * moved, captions, View(*view), notes, title)[0]
-
-
-def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
-    """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
-    count = path.sizes["step"]
-    if isinstance(points, int | np.integer):
-        if points < 1:
-            raise InputError(f"points: {points}; give at least one")
-        return evenly(path, int(points))
-    for number in points:
-        if not -count <= number < count:
-            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
-    if not len(points):
-        raise InputError("points: empty; give at least one")
-    return [int(number) % count for number in points]
 
 
 def describe_point(path: xr.Dataset, number: int) -> str:

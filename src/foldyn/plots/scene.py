@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.palette import PAPER
 
 Points = NDArray[np.float64]
 """Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""
 Indices = NDArray[np.int64]
 """Numbers of nodes: an edge or a triangle in each row."""
-PAPER = "#F2DFB8"
 PAPERS = ("#CFB387", "#B9CBB0", "#C9B4C6", "#A9BFCC")
 """Colors of panels that differ from the rest of the sheet, by turns."""
 WIDTH = 7.0

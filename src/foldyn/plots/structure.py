@@ -16,7 +16,7 @@ from foldyn.cases import Case, Fix, Impose, Pressure, Temperature
 from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.plots import dashpots, following, marks, scene, style, ties
-from foldyn.plots import loads as histories
+from foldyn.plots import load_curves as histories
 from foldyn.plots.attachments import attachments
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, panel_keys, rest_keys
@@ -197,7 +197,7 @@ def _supports(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[
 def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[_Arrows]:
     """Return arrows of imposed displacements, and of the base at the middle of its nodes."""
     imposed = [(points, vectors) for vectors, _ in sheet.case.prescribed_terms]
-    moved = [ties.base_vectors(sheet.case, vectors) for vectors, _ in sheet.case.base_terms]
+    moved = [histories.base_vectors(sheet.case, vectors) for vectors, _ in sheet.case.base_terms]
     base = [
         (points[vectors.any(axis=1)].mean(axis=0)[None], histories.signed_peak(vectors)[None])
         for vectors in moved

@@ -17,24 +17,25 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-# Okabe and Ito's palette: told apart with every common kind of color blindness.
-BLUE = "#0072B2"
-VERMILLION = "#D55E00"
-GREEN = "#009E73"
-PURPLE = "#CC79A7"
-SKY = "#56B4E9"
-ORANGE = "#E69F00"
-YELLOW = "#F0E442"
-BLACK = "#1A1A1A"
-GRAY = "#767676"
-LIGHT = "#C8C8C8"
+from foldyn.plots.palette import (  # noqa: F401  figures take all colors from here
+    BLACK,
+    BLUE,
+    CREASE_NAMES,
+    CREASES,
+    GRAY,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    YELLOW,
+)
 
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
 # Line kinds change with the color, so curves are told apart in gray print too.
 DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)))
 
-CREASES = {"M": VERMILLION, "V": BLUE, "F": GRAY, "U": PURPLE}
-CREASE_NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned"}
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
 ACTUATED = YELLOW
 SUPPORT = GREEN

@@ -57,9 +57,3 @@ def links(case: Case, points: Points) -> Links:
             segments += [[points[a], points[b]] for a in first for b in others]
             tied += [points[node] for node in nodes]
     return Links(np.array(segments).reshape(-1, 2, 3), np.array(tied).reshape(-1, 3))
-
-
-def base_vectors(case: Case, vectors: Points) -> Points:
-    """Displacements of a base (n, 3) at the nodes held along axes, if there are such."""
-    alone = np.where(case.fixed, vectors, 0.0)
-    return alone if alone.any() else vectors

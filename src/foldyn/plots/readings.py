@@ -1,0 +1,155 @@
+"""What figures and pages read from results of each kind, without drawing it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.cases.directions import signed
+from foldyn.errors import InputError
+from foldyn.linear.frf import PER_FORCE, quantity_of
+from foldyn.mechanics.attached_body import GROUP
+from foldyn.plots.along import AXES, check_path, evenly, farthest
+from foldyn.results.quantities import RESPONSES
+from foldyn.shells.body import GROUPS as OF_SHELLS
+from foldyn.structures.body import GROUPS as OF_BARS_AND_HINGES
+
+STRAIN: Mapping[str, str] = {
+    "strain_bars": "bars",
+    "strain_membrane": "membrane",
+    "strain_bends": "bends",
+    "strain_bending": "bending",
+    "strain_folds": "folds",
+    GROUP: "springs",
+}
+"""Names of strain energies, stacked in this order from the bottom up: folds on top."""
+MOST_MODES = 12
+NEEDED = ("frequency", "eigenvalue", "shape", "rigid", "displacement")
+"""What figures need of modes."""
+_NONE = 1e-9  # of the largest energy: below it there is nothing to share
+
+
+def moved_supports(case: Case) -> tuple[list[int], str] | None:
+    """Nodes that supports move together and farthest, and the direction; None where none moves."""
+    motion = sum((vector for vector, _ in case.prescribed_terms), np.zeros(case.imposed.shape))
+    if not motion.any():
+        return None
+    largest, direction = farthest(motion)
+    moved = motion[:, signed("direction", direction)[0]]
+    together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
+    return np.flatnonzero(together).tolist(), direction
+
+
+def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:
+    """Sum of the forces of supports on nodes in a direction.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+    nodes : sequence of int
+    direction : {"x", "y", "z", "-x", "-y", "-z"}
+
+    Returns
+    -------
+    ndarray, shape (steps,)
+        The sum (N) at each point.
+
+    Raises
+    ------
+    InputError
+        A node is not supported along the direction.
+    """
+    _, sign = signed("direction", direction)
+    axis = direction[-1]
+    chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
+    held = path["support_node"].values[chosen.values]
+    loose = sorted(set(nodes) - set(held.tolist()))
+    if loose:
+        raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
+    return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # no -0
+
+
+def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
+    """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
+    count = path.sizes["step"]
+    if isinstance(points, int | np.integer):
+        if points < 1:
+            raise InputError(f"points: {points}; give at least one")
+        return evenly(path, int(points))
+    for number in points:
+        if not -count <= number < count:
+            raise InputError(f"points: {number}; the path has points 0 to {count - 1}")
+    if not len(points):
+        raise InputError("points: empty; give at least one")
+    return [int(number) % count for number in points]
+
+
+def parts_of(result: xr.Dataset) -> tuple[str, ...]:
+    """Parts of the strain energy of a result, in the order of its structure."""
+    own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
+    return (*own, *([GROUP] if GROUP in result else []))
+
+
+def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Return the parts of the strain energy (J) in the order of a stack."""
+    return {part: path[part].values for part in STRAIN if part in parts_of(path)}
+
+
+def energy_shares(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Shares of the parts of the strain energy at each point; NaN where there is none.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        A path of `foldyn.trace`.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (steps,)
+        "bars", "bends" and "folds", or of a shell "membrane", "bending" and "folds", and
+        "springs" if there are any, each from 0 to 1.
+    """
+    check_path(path, "path")
+    energies = stacked(path)
+    total = np.asarray(sum(energies.values()))
+    total = np.where(total > _NONE * max(float(total.max(initial=0.0)), 0.0), total, np.nan)
+    return {STRAIN[part]: energy / total for part, energy in energies.items()}
+
+
+def chosen_modes(modes: xr.Dataset, which: Sequence[int] | None) -> list[int]:
+    """Numbers of the modes to show: those asked for, else the first that are not rigid."""
+    missing = [key for key in NEEDED if key not in modes]
+    if missing:
+        raise InputError(f"modes: has no {missing[0]}; give a result of fd.modes")
+    stored = modes["mode"].values.tolist()
+    if which is None:
+        rigid = modes["rigid"].values.astype(bool)
+        elastic = [number for number, is_rigid in zip(stored, rigid, strict=True) if not is_rigid]
+        return (elastic or stored)[:MOST_MODES]
+    numbers = [int(number) for number in which]
+    if not numbers:
+        raise InputError("which: empty; give the number of at least one mode")
+    if len(numbers) > MOST_MODES:
+        raise InputError(f"which: {len(numbers)} modes; one figure shows at most {MOST_MODES}")
+    for number in numbers:
+        if number not in stored:
+            raise InputError(f"which: {number}; there are modes {stored[0]} to {stored[-1]}")
+    return numbers
+
+
+def along_drive(response: xr.Dataset) -> list[str]:
+    """Each axis in the direction in which forces drive along it; as it is where none does."""
+    forces = response["drive"].transpose("node", "axis").values.sum(axis=0)
+    backward = (forces < 0.0) & (quantity_of(response) in PER_FORCE)
+    return ["-" + axis if back else axis for axis, back in zip(AXES, backward, strict=True)]
+
+
+def unit_of(quantity: str) -> str:
+    """What stands behind a quantity at an axis: its unit in parentheses, or nothing."""
+    unit = RESPONSES[quantity].units.replace("s2", "s²")
+    return "" if unit == "1" else f" ({unit})"
