@@ -40,7 +40,7 @@ def write(tmp_path, text):
     file.write_text(FOLD + text, "utf-8")
     case_file = read_case(file)
     path = case_file.run()
-    page = case_file.analysis.page(case_file, {case_file.masses[0]: path}, tmp_path)
+    page = case_file.analysis.page(case_file, {case_file.masses[0]: path}, tmp_path, figures="png")
     return path, page.read_text("utf-8")
 
 
@@ -50,7 +50,7 @@ def test_loads_that_are_constant_are_named(tmp_path):
     text = loads + '[analysis]\nkind = "statics"\nconstant = "gravity"\nsteps = 2\n'
     path, page = write(tmp_path, text)
     assert path.attrs["constant"].tolist() == [1]
-    assert "above, except load 1 (in full throughout)." in page
+    assert "all loads and imposed displacements, except load 1 (in full throughout)." in page
 
 
 def test_there_and_back(tmp_path):

@@ -41,7 +41,9 @@ def write(tmp_path, monkeypatch):
         file.write_text(SHEET + text, "utf-8")
         case_file = read_case(file)
         results = {rule: case_file.run(rule) for rule in case_file.masses}
-        page = case_file.analysis.page(case_file, results, tmp_path).read_text("utf-8")
+        page = case_file.analysis.page(case_file, results, tmp_path, figures="png").read_text(
+            "utf-8"
+        )
         return next(iter(results.values())), page
 
     return write_page

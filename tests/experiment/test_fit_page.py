@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
+from html import unescape
 
 import fit_cases
 import numpy as np
@@ -10,12 +13,8 @@ import pytest
 
 import foldyn as fd
 from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
-from foldyn.experiment.calibration.fit_page import (
-    plot_correlation,
-    plot_histories,
-    plot_shapes,
-    write_fit,
-)
+from foldyn.experiment.calibration.fit_figures import plot_correlation, plot_histories, plot_shapes
+from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.fit_problem import problem
 
 TIME = np.linspace(0.0, 2.0, 80)
@@ -58,7 +57,7 @@ def fitted(tmp_path_factory):
 
 def test_the_page_says_what_was_found_and_what_was_not(fitted, tmp_path) -> None:
     assert not fitted["model.fold_law.theta1"].determined
-    page = write_fit(fitted, tmp_path, "A fold").read_text("utf-8")
+    page = write_fit(fitted, tmp_path, "A fold", figures="png").read_text("utf-8")
     assert "<h1>A fold</h1>" in page
     assert "The data do not determine model.fold_law.theta1" in page
     assert "+1.00 model.fold_law.theta1" in page or "-1.00 model.fold_law.theta1" in page
@@ -68,6 +67,22 @@ def test_the_page_says_what_was_found_and_what_was_not(fitted, tmp_path) -> None
     drawn = sorted(path.name for path in tmp_path.glob("*.png"))
     assert drawn == ["correlation.png", *(f"data-{k}.png" for k in range(4))]
     assert page.count("data:image/png") == 5
+
+
+def test_the_page_shows_the_model_and_charts(fitted, tmp_path) -> None:
+    """Without figures: a path and a motion, with what was measured as dots beside them."""
+    page = write_fit(fitted, tmp_path).read_text("utf-8")
+    assert not list(tmp_path.glob("*.png"))
+    assert page.count("data-foldyn=") == 2
+    plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]
+    assert [plot["title"] for plot in plots] == [
+        "", "load factor 0.5", "load factor 1", "node 0", "node 2", "node 0", "node 2",
+    ]  # fmt: skip
+    model, seen = plots[0]["curves"]
+    assert (model["dots"], seen["dots"]) == (False, True)
+    at = [model["x"].index(x) for x in seen["x"]]
+    np.testing.assert_allclose(np.take(model["y"], at), seen["y"], atol=5e-5)
+    assert page.index("data-foldyn=") < page.index("Parameters") < page.index("How it was computed")
 
 
 def test_histories_are_drawn_where_they_are_compared(fitted) -> None:

@@ -191,7 +191,7 @@ def test_everything_is_escaped(tmp_path):
         Picture(_png(), caption=bad),
         title=bad,
     )
-    assert "script" not in {tag for tag, _ in page.tags}
+    assert [tag for tag, _ in page.tags].count("script") == 1  # that of tables
     assert page.rows == [[bad], [bad]]
     assert page.images[0]["alt"] == bad
     for tag in ("title", "h1", "h2", "p", "caption", "figcaption"):

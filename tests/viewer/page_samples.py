@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from functools import cache
 
-import foldyn as fd
-from foldyn.report import write_report
-from foldyn.viewer import stage
+from PIL import Image
 
+import foldyn as fd
+from foldyn.experiment.camera import Camera
+from foldyn.report import write_report
+from foldyn.viewer import Backdrop, projection, stage
+
+KINDS = ("motion", "path", "modes", "response")
+ALL = (*KINDS, "film")
+PAINTERS = ("webgl", "plain")
+"""What a page may be asked for."""
+PAGE = "document.querySelector('.foldyn').page"
 SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
 
 
@@ -28,14 +37,30 @@ def results(kind):
     if kind == "path":
         return {"fold": fd.trace(case(), load_factors=[0.5, 1.0, 1.5, 2.0])}
     if kind == "modes":
-        return {"fold": fd.modes(case(loaded=False), 4)}
+        rules = ("circumcenter", "panel")
+        return {rule: fd.modes(case(loaded=False, mass=rule), 4) for rule in rules}
     drive = [fd.Force([0, 1], (-1.0, 0.0, 0.0))]
     frequencies = [0.2 * k for k in range(1, 40)]
     return {"fold": fd.frf(case(loaded=False), drive, frequencies)}
 
 
 def page(kind, folder):
-    shown = results(kind)
+    shown = results("motion" if kind == "film" else kind)
     cases = {name: fd.case_of(result) for name, result in shown.items()}
-    part = stage(shown, cases, f"A {kind}", [0])
+    part = stage(shown, cases, f"A {kind}", [0], film() if kind == "film" else None)
     return write_report(folder / f"{kind}.html", f"A {kind}", [part])
+
+
+def camera():
+    return Camera.looking_at((0.7, 0.5, 0.3), 4.0, 5e-3, (640, 480), turned=(10, 30, 5))
+
+
+def film():
+    """Two gray photographs, of the start and of 1 s, by `camera`."""
+    pictures = {}
+    for moment, shade in ((0.0, 90), (1.0, 160)):
+        found = io.BytesIO()
+        Image.new("RGB", (640, 480), (shade, shade, shade)).save(found, "PNG")
+        pictures[moment] = found.getvalue()
+    nodes = case().structure.nodes
+    return Backdrop(pictures, (640, 480), projection(nodes, camera().project(nodes)))

@@ -2,77 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from page_samples import case, page, results
-
-playwright = pytest.importorskip("playwright.sync_api")
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
-KINDS = ("motion", "path", "modes", "response")
-SHAKY = ("GL Driver Message", "GPU stall")  # of software rendering
+from page_samples import KINDS, PAGE, PAINTERS, case, results
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader"]
-        chromium = started.chromium.launch(executable_path=BROWSER, args=arguments)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pages")
-    return {kind: page(kind, folder) for kind in KINDS}
-
-
-@pytest.fixture
-def opened(browser, pages, request):
-    """Opens a page; what it complained of and asked for is in `errors` and `asked`."""
-    contexts = []
-
-    def open_page(kind, width=1400, plain=False, **options):
-        context = browser.new_context(
-            viewport={"width": width, "height": 900}, offline=True, **options
-        )
-        contexts.append(context)
-        tab = context.new_page()
-        tab.errors, tab.asked = [], []
-        tab.on("pageerror", lambda error: tab.errors.append(str(error)))
-        tab.on(
-            "console",
-            lambda m: (
-                m.type in ("error", "warning")
-                and not any(word in m.text for word in SHAKY)
-                and tab.errors.append(m.text)
-            ),
-        )
-        tab.on("request", lambda asked: tab.asked.append(asked.url))
-        tab.goto(f"file://{pages[kind]}" + ("?plain" if plain else ""))
-        tab.wait_for_selector(".foldyn[data-ready='1']")
-        return tab
-
-    yield open_page
-    for context in contexts:
-        context.close()
-
-
-PAGE = "document.querySelector('.foldyn').page"
-
-
-@pytest.mark.parametrize("plain", [False, True], ids=["webgl", "canvas"])
+@pytest.mark.parametrize("painter", PAINTERS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_opens_alone_and_draws(opened, kind, plain):
-    tab = opened(kind, plain=plain)
-    painter = tab.get_attribute(".foldyn", "data-painter")
-    assert painter == "canvas" if plain else painter in ("webgl", "canvas")
+def test_opens_alone_and_draws(opened, kind, painter):
+    tab = opened(kind, painter=painter)
+    drawn_by = tab.get_attribute(".foldyn", "data-painter")
+    assert drawn_by == "canvas" if painter == "plain" else drawn_by in ("webgl", "canvas")
     tab.wait_for_timeout(200)
     assert tab.errors == []
     assert [url for url in tab.asked if not url.startswith(("file:", "data:", "blob:"))] == []
@@ -94,9 +36,9 @@ def test_fits_the_window(opened, kind, width):
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
 
 
-@pytest.mark.parametrize("plain", [False, True], ids=["webgl", "canvas"])
-def test_positions_are_those_of_the_result(opened, plain):
-    tab = opened("motion", plain=plain)
+@pytest.mark.parametrize("painter", PAINTERS)
+def test_positions_are_those_of_the_result(opened, painter):
+    tab = opened("motion", painter=painter)
     result = results("motion")["panel"]
     for sample in (0, 57, 211):
         got = tab.evaluate(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from importlib import import_module
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ from page_samples import page, results
 
 import foldyn as fd
 from foldyn.errors import InputError
+from foldyn.plots.style import CREASE_NAMES, CREASES
 from foldyn.viewer import stage
-from foldyn.viewer.sheet import edge_pieces
+from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.viewer.stage import OF_SIZE
 
 
@@ -40,6 +43,12 @@ def test_positions_are_those_of_the_result(kind):
 
 def case_nodes(cases):
     return next(iter(cases.values())).structure.nodes
+
+
+def test_large_sheets_have_values_of_panels_alone(monkeypatch):
+    monkeypatch.setattr(import_module("foldyn.viewer.stage"), "MOST_LINES", 0)
+    part, _, _ = staged("motion")
+    assert [field["on"] for field in part.about["results"][0]["fields"].values()] == ["panel"]
 
 
 def test_results_of_one_pattern_share_their_sheet_only_if_it_is_the_same():
@@ -71,10 +80,18 @@ def test_a_response_holds_its_real_and_imaginary_parts():
 
 def test_modes_say_what_they_do():
     part, shown, _ = staged("modes")
-    modes = shown["fold"]
     frequencies = [about["frequency"] for about in part.about["results"]]
-    assert np.array_equal(frequencies, modes["frequency"].values)
+    wanted = np.concatenate([modes["frequency"].values for modes in shown.values()])
+    assert np.array_equal(frequencies, wanted)
     assert all(about["what"] for about in part.about["results"])
+
+
+def test_likeness_of_modes_is_their_mac():
+    part, shown, _ = staged("modes")
+    first, second = (modes["shape"].values[:, :6] for modes in shown.values())
+    found = np.array(part.about["mac"])
+    assert np.abs(found[:4, 4:] - fd.mac(first, second)).max() < 1e-3
+    assert np.array_equal(np.diag(found), np.ones(8))
 
 
 def test_pages_name_all_their_arrays_and_let_nothing_in(tmp_path):
@@ -91,12 +108,43 @@ def test_pages_name_all_their_arrays_and_let_nothing_in(tmp_path):
 
 
 def test_other_datasets_are_refused():
-    with pytest.raises(InputError, match="no motion, path, modes or frequency response"):
+    with pytest.raises(InputError, match="no motion, path, folding, modes or frequency response"):
         stage({"a": results("motion")["panel"].isel(time=0)}, {}, "t", [0])
+
+
+def test_kinds_of_edges_are_those_of_the_script_and_of_figures():
+    text = files("foldyn.viewer").joinpath("static/colors.js").read_text("utf-8")
+    rows = re.findall(r'{ name: "(.*?)(?: crease)?", light: "(#\w+)"', text)
+    assert [name for name, _ in rows] == [*(CREASE_NAMES[k] for k in KINDS[:4]), "boundary", "bar"]
+    for letter in "MVF":
+        assert rows[KINDS.index(letter)][1].upper() == CREASES[letter]
 
 
 def test_welds_are_not_drawn():
     square = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
     made = fd.discretize(fd.welded(square, join=False), fd.Sheet(1e9, 0.3, 1e-3, 700.0))
-    pairs, kind, _, _ = edge_pieces(made)
+    pairs, kind, _, _ = edge_pieces(made.pattern, made.nodes, made.edge_nodes)
     assert len(pairs) == len(kind) == len(made.pattern.boundary)
+
+
+def test_a_folding_is_shown_without_a_case():
+    """Its geometry alone: no moments, as there is no sheet."""
+    flat = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["M"])
+    way = fd.fold(flat, 90, steps=4).path
+    part = stage({"folding": way}, {}, "title", [1])
+    (about,) = part.about["results"]
+    assert part.about["kind"] == "folding" and set(about["fields"]) == {"bar_strain", "turn"}
+    u = changing(part.arrays, about["displacement"])
+    true = way["position"].values - flat.vertices
+    assert np.abs(u - true).max() <= OF_SIZE * flat.size
+    np.testing.assert_allclose(decoded(part.arrays, about["load"]), way["share"])
+    turn = changing(part.arrays, about["fields"]["turn"]["values"])
+    np.testing.assert_allclose(turn[:, 0], [0, -22.5, -45, -67.5, -90], atol=0.4)
+
+
+def test_a_folding_may_begin_and_end_closed():
+    flat = fd.Pattern([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)], ["V"])
+    shut = fd.fold(flat, 180, steps=2).pattern
+    way = fd.fold(shut, 90, steps=2).path
+    (about,) = stage({"folding": way}, {}, "title", [1]).about["results"]
+    assert about["fields"]["turn"]["on"] == "crease"

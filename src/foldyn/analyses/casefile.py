@@ -14,7 +14,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.analyses.provenance import provenance
+from foldyn.analyses.provenance import Call, provenance
 from foldyn.analyses.sections import CaseSchema
 from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
@@ -22,7 +22,8 @@ from foldyn.cases.models import MODELS
 from foldyn.errors import InputError, within
 from foldyn.linear import refinement
 from foldyn.patterns import Pattern
-from foldyn.report.album import Album, ByRule
+from foldyn.patterns.picture import picture
+from foldyn.report.album import Album, ByRule, filled
 from foldyn.report.page import write_report
 from foldyn.report.sections import Section
 from foldyn.structures import Sheet
@@ -80,7 +81,7 @@ class Analysis(ABC):
     schema : type
         What such a case file looks like.
     files : tuple of str
-        Figures and animations that its page comes with.
+        Figures, without their suffix, and animations that its page may come with.
     needs_density : str
         Beginning of a message, "a motion needs"; "" where it does without.
     takes : sequence of str
@@ -125,22 +126,26 @@ class Analysis(ABC):
     def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterable[Section]:
         """Sections of the page about results, by mass rule; the album draws their figures."""
 
-    def page(self, case_file: CaseFile, results: ByRule, folder: Path, command: str = "") -> Path:
-        """Draw results, by mass rule, into an existing folder; returns the path of report.html.
+    def page(
+        self, case_file: CaseFile, results: ByRule, folder: Path, call: Call | None = None,
+        figures: str | None = None,
+    ) -> Path:  # fmt: skip
+        """Show results, by mass rule, in an existing folder; returns the path of report.html.
 
-        command : what was typed to compute them, for the page.
+        call : how they were asked for.
+        figures : what figures are written as, "png", "svg" or "pdf"; None: none are drawn.
         """
         cases = {mass: case_file.case(mass) for mass in results}
         shown = case_file.output.nodes.tolist()
         sections = [
             *([stage(results, cases, case_file.heading, shown)] if self.moving else []),
-            *self.sections(case_file, results, Album(folder)),
-            *provenance(case_file, results, command),
+            *filled(self.sections(case_file, results, Album(folder, figures))),
+            *provenance(case_file, results, call),
         ]
         return write_report(folder / "report.html", case_file.heading, sections)
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
-        """Refuse computations of several mass rules that cannot run together."""
+        """Refuse computations of several mass rules that cannot run, or be drawn, together."""
 
     def compiles(self, computations: Sequence[Compute]) -> bool:
         """Whether kernels have to be compiled first without a bar that says so."""
@@ -208,6 +213,10 @@ class CaseFile:
         """One line: the file, what it asks for, of what."""
         model = self.model.replace("_", " ")
         return f"<CaseFile {self.path}: {self.analysis.kind} of {model}, mass {self.masses}>"
+
+    def _repr_html_(self) -> str | None:
+        """A picture for notebooks."""
+        return picture(self.pattern, repr(self))
 
     @property
     def heading(self) -> str:

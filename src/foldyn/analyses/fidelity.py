@@ -71,7 +71,7 @@ class FidelityAnalysis(Analysis):
     schema = FidelitySchema
     needs_density = "a comparison with the shell needs"
     takes = arguments_of(fidelity)
-    files = ("fidelity.png",)
+    files = ("fidelity",)
     by_mass = False
 
     masses: tuple[str, ...] = ()
@@ -109,7 +109,7 @@ class FidelityAnalysis(Analysis):
         found = Fidelity(result)
         yield Heading("Which model")
         yield Text(found.advice)
-        yield album.figure(
+        yield from album.figure(
             "fidelity",
             "Above: errors of the models' frequencies over the frequency of the shell, 5 % shaded. "
             "Below: likeness of the shapes (MAC); modes below 0.5 are lost, and have no error. "

@@ -192,7 +192,7 @@ class FrfAnalysis(Analysis):
     schema = FrfSchema
     needs_density = "a frequency response needs"
     takes = (*arguments_of(frf), *OPTIONS)
-    files = ("response.png", "nyquist.png")
+    files = ("response", "nyquist")
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:

@@ -15,6 +15,7 @@ from foldyn.cases import BaseMotion, Case
 from foldyn.linear import Peak, peaks_of
 from foldyn.linear.frf import METHODS, PER_FORCE, quantity_of
 from foldyn.report.album import Album, ByRule, by_mass_rule, listed, rules, shown_nodes
+from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 
 MOST_CURVES = 8
@@ -38,11 +39,12 @@ def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator
         _driven(case, drive), "The pattern with its nodes, supports and drive."
     )
     yield Heading("The response")
-    yield album.figure(
+    yield from album.figure(
         "response",
         f"{parts} of the {quantity} of {listed('node', nodes)}{some} along {axis}, "
         f"{rules(results)}: {_meaning(quantity, axis, response)}. Dots mark peaks.",
         lambda: plots.plot_frf(results, nodes, axis, shown),
+        *_coherence(results, nodes, axis),
     )
     peaks = {
         (rule, node): peaks_of(result, node, axis, shown)
@@ -51,7 +53,7 @@ def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator
     }
     if shown is not None and any(np.isfinite(p.damping_ratio) for p in peaks[first, nodes[0]]):
         rule = f" with mass rule {first}" if len(results) > 1 else ""
-        yield album.figure(
+        yield from album.figure(
             "nyquist",
             f"Mobility of node {nodes[0]} along {axis}{rule} around its peaks, in the complex "
             "plane: a mode makes a circle, from which its natural frequency and damping are "
@@ -64,9 +66,27 @@ def frf_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator
     yield Text(_notes(response, case, peaks))
 
 
+def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
+    """Coherence of responses that were estimated, for a page without figures."""
+    curves = [
+        Curve(
+            f"node {node}" if len(results) == 1 else f"node {node}, {rule}",
+            response["frequency"].values,
+            response["coherence"].sel(node=node, axis=axis[-1]).values,
+        )
+        for rule, response in results.items()
+        if "coherence" in response
+        for node in nodes
+    ]
+    if not curves:
+        return []
+    chart = Chart("frequency (Hz)", "coherence", curves)
+    return [Charts([chart], f"Coherence of the motion along {axis} with the drive.")]
+
+
 def driven_direction(response: xarray.Dataset) -> str:
     """Direction in which most of the drive acts."""
-    from foldyn.plots.frf import along_drive
+    from foldyn.plots.readings import along_drive
 
     drive = response["drive"].transpose("node", "axis").values
     return along_drive(response)[int(np.abs(drive).sum(axis=0).argmax())]
@@ -91,7 +111,7 @@ def _meaning(quantity: str, axis: str, response: xarray.Dataset) -> str:
 def _peaks(
     peaks: Mapping[tuple[str, int], tuple[Peak, ...]], quantity: str, axis: str, several: bool
 ) -> Table:
-    from foldyn.plots.frf import unit_of
+    from foldyn.plots.readings import unit_of
 
     header = [*(["mass rule"] if several else []), "node", "peak (Hz)"]
     header += [f"height{unit_of(quantity)}", "3 dB (%)", "textbook (%)"]

@@ -60,7 +60,7 @@ class ModesAnalysis(Analysis):
     schema = ModesSchema
     needs_density = "modes need"
     takes = arguments_of(modes)
-    files = ("modes.png", "mac.png", "modes.gif", "modes.mp4")
+    files = ("modes", "mac", "modes.gif", "modes.mp4")
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -109,10 +109,10 @@ class ModesAnalysis(Analysis):
         rule = f", mass rule {first}" if others else ""
         yield from album.structure(case)
         yield Heading("The modes")
-        yield album.figure(
+        yield from album.figure(
             "modes",
-            f"Mode shapes{rule}, over {_about(modes)} in gray; {_judged(case_file, names)}. A "
-            "mode has no amplitude of its own: each is drawn so that it can be read.",
+            f"Mode shapes{rule}, over {_about(modes)} in gray. A mode has no "
+            "amplitude of its own: each is drawn so that it can be read.",
             lambda: plots.draw_modes(case, modes, shown, names=names),
         )
         if case_file.output.animation:
@@ -124,14 +124,14 @@ class ModesAnalysis(Analysis):
             yield Picture(film, f"The same modes{some} in motion, all at one pace.")
         same = {rule: mac(modes, other, case.mass) for rule, other in others}
         if same:
-            yield album.figure(
+            yield from album.figure(
                 "mac",
                 f"How alike modes with {first} (rows) and with {', '.join(same)} (columns) are: "
                 "modal assurance criterion, weighted by the mass; 1 is the same shape.",
                 lambda: _draw_mac(first, same),
             )
         yield Heading("The numbers")
-        yield _table(modes, names, rule)
+        yield _table(modes, names, f"{rule}, {_judged(case_file, names)}")
         if same:
             yield _compared(results, same)
         yield _run(case_file, results)
@@ -140,7 +140,7 @@ class ModesAnalysis(Analysis):
 
 def shown_modes(modes: xarray.Dataset, shapes: int | tuple[int, ...] | None) -> list[int]:
     """Numbers of the modes that are drawn: those named, or the first that are not rigid."""
-    from foldyn.plots.modes import chosen_modes
+    from foldyn.plots.readings import chosen_modes
 
     if isinstance(shapes, tuple):
         return chosen_modes(modes, shapes)
@@ -192,7 +192,7 @@ def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
     return Table(header, rows, "The same modes with other mass rules, by their shapes")
 
 
-def _table(modes: xarray.Dataset, names: xarray.Dataset, rule: str) -> Table:
+def _table(modes: xarray.Dataset, names: xarray.Dataset, remark: str) -> Table:
     header = ["mode", "frequency (Hz)", "damping (%)", "what it does", "share (%)"]
     header += [f"{'effective mass ' if axis == 'x' else ''}{axis} (%)" for axis in "xyz"]
     free = np.asarray(modes.attrs["free_mass"], dtype=np.float64)
@@ -210,8 +210,8 @@ def _table(modes: xarray.Dataset, names: xarray.Dataset, rule: str) -> Table:
     return Table(
         header,
         rows,
-        f"The modes{rule}. Effective masses: what a motion of the base along the axis excites, of "
-        "the mass that is free to move along it.",
+        f"The modes{remark}. Effective masses: what a motion of the base along the axis excites, "
+        "of the mass that is free to move along it.",
     )
 
 

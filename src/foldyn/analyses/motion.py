@@ -18,7 +18,16 @@ from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, compiled, prepare
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import InputError
-from foldyn.report.album import Album, ByRule, by_mass_rule, rules, shown_nodes, visible_scale
+from foldyn.report.album import (
+    LOADS,
+    Album,
+    ByRule,
+    by_mass_rule,
+    load_charts,
+    rules,
+    shown_nodes,
+    visible_scale,
+)
 from foldyn.report.sections import Heading, Picture, Table, Text, cell
 from foldyn.report.sections import Section as PageSection
 from foldyn.signals.spectrum import MINIMUM_SAMPLES
@@ -91,7 +100,7 @@ class MotionAnalysis(Analysis):
     schema = MotionSchema
     needs_density = "a motion needs"
     takes = arguments_of(prepare)
-    files = ("load.png", "motion.png", "motion.gif", "motion.mp4", "energies.png")
+    files = ("load", "motion", "motion.gif", "motion.mp4", "energies")
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -112,7 +121,7 @@ class MotionAnalysis(Analysis):
         if figures and samples < MINIMUM_SAMPLES:
             raise InputError(
                 f": gives {samples} samples, spectra need {MINIMUM_SAMPLES}: lower it, lengthen "
-                "analysis.duration, or run with --no-figures",
+                "analysis.duration, or run without --figures",
                 "every",
             )
         case = motions[0].case
@@ -156,14 +165,15 @@ class MotionAnalysis(Analysis):
         start, duration = float(trajectory["time"][0]), float(trajectory.attrs["duration"])
         scale, enlarged = visible_scale(case, trajectory)
         yield from album.structure(case)
-        if case.loads or case.imposed_terms or case.base_terms:
-            yield album.figure(
-                "load",
-                "Loads and imposed motions over time.",
-                lambda: plots.plot_load_history(case, duration, start=start),
-            )
         yield Heading("The motion")
-        yield album.figure(
+        if case.loads or case.imposed_terms or case.base_terms:
+            yield from album.figure(
+                "load",
+                LOADS,
+                lambda: plots.plot_load_history(case, duration, start=start),
+                load_charts(case, start, duration),
+            )
+        yield from album.figure(
             "motion",
             f"Displacement of the chosen nodes{some} (left) and its frequency content (right), "
             f"{rules(results)}.",
@@ -177,7 +187,7 @@ class MotionAnalysis(Analysis):
                 plots.animate(case, trajectory, film, scale=scale),
                 f"The motion with mass rule {first}{enlarged}; at rest in gray.",
             )
-        yield album.figure(
+        yield from album.figure(
             "energies",
             f"Energies over time and the error of their balance, mass rule {first}.",
             lambda: plots.plot_energies(trajectory),

@@ -149,8 +149,7 @@ class PathAnalysis(Analysis):
     moving = True
     schema = PathSchema
     files = (
-        *(f"{name}.png" for name in ("reaction", "curve", "energies", "shapes")),
-        "path.gif", "path.mp4",
+        "reaction", "curve", "energies", "shapes", "path.gif", "path.mp4",
     )  # fmt: skip
     needs_density = ""
     takes = arguments_of(trace)

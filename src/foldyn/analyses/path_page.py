@@ -11,6 +11,7 @@ from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
 from foldyn.report.album import Album, ByRule, listed, shown_nodes, visible_scale
+from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
 FRAMES, FPS = 60, 15
@@ -32,31 +33,32 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
     yield from album.structure(case)
     yield Heading("The path")
     if moved is not None:
-        yield album.figure(
+        yield from album.figure(
             "reaction",
             f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
-            f"{moved[1]}, over their displacement. {_multiplied(path)}",
+            f"{moved[1]}, over their displacement.",
             lambda: plots.plot_reaction({"": path}, *moved),
+            _reaction(path, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
-        yield album.figure(
+        yield from album.figure(
             "curve",
             f"Load factor over the displacement of {listed('node', nodes)}{some} along "
-            f"{direction}. {_multiplied(path)}",
+            f"{direction}.",
             lambda: plots.plot_load_displacement({"": path}, nodes, direction),
         )
     if path.sizes["step"] > 1:
         over: tuple[list[int], str] | tuple[None, None] = None, None
         if moved is not None and (np.diff(along(path, *moved)) > 0.0).all():
             over = moved  # they only move forward
-        yield album.figure(
+        yield from album.figure(
             "energies",
             f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
             "done on the structure; below, their shares.",
             lambda: plots.plot_path_energies(path, *over),
         )
     scale, enlarged = visible_scale(case, path)
-    yield album.figure(
+    yield from album.figure(
         "shapes",
         f"The deformed sheet{enlarged}; the undeformed one in gray.",
         lambda: plots.draw_shapes(case, path, case_file.output.shapes or 4, scale),
@@ -69,18 +71,29 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
     yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
     yield _run(case_file, path)
     yield Text(
-        "Stable means that the tangent stiffness of the free nodes has no negative eigenvalue: "
-        "nodes that supports move stay where they are. At every point the out-of-balance force is "
-        "below the tolerance times the forces at play, or rounding. The result carries its own "
-        "case, can be run again from it, and motions can start from its points."
+        f"{_multiplied(path)} Stable means that the tangent stiffness of the free nodes has no "
+        "negative eigenvalue: nodes that supports move stay where they are. At every point the "
+        "out-of-balance force is below the tolerance times the forces at play, or rounding. The "
+        "result carries its own case, can be run again from it, and motions can start from its "
+        "points."
     )
+
+
+def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
+    """The force of moved supports over their displacement, for a page without figures."""
+    curve = Curve(
+        listed("node", nodes), along(path, nodes, direction),
+        plots.total_reaction(path, nodes, direction),
+    )  # fmt: skip
+    chart = Chart(f"displacement along {direction} (m)", "force (N)", [curve])
+    return Charts([chart], f"Total force of the supports that are moved along {direction}.")
 
 
 def _multiplied(path: xarray.Dataset) -> str:
     """What the load factor is."""
     constant = np.atleast_1d(path.attrs.get("constant", [])).astype(int).tolist()
     but = f", except {listed('load', constant)} (in full throughout)" if constant else ""
-    return f"The factor multiplies the loads and displacements shown above{but}."
+    return f"The load factor multiplies all loads and imposed displacements{but}."
 
 
 def _points(

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from foldyn.cases import History
 from foldyn.materials.law import Law
+from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.structures import PanelSheet
@@ -23,35 +28,100 @@ UNITS: Mapping[str, str] = {
     "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
     "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
 }  # fmt: skip
+MOST_LISTED = 24
+"""Numbers of a list that are written one by one, at most."""
 MOST = 200  # characters of a value
 
 
-def provenance(case_file: CaseFile, results: ByRule, command: str = "") -> list[Section]:
-    """Sheet, model and damping in a table, and the case file itself.
+@dataclass(frozen=True)
+class Call:
+    """How results were asked for, and what they cost.
 
-    command : what was typed to compute it.
+    Parameters
+    ----------
+    command : str
+        What was typed; "" in Python.
+    warnings : tuple of str
+        What was said meanwhile.
+    wall, cpu : float
+        Time (s) from the reading of the case file to the last result, and computing time of it.
     """
+
+    command: str = ""
+    warnings: tuple[str, ...] = ()
+    wall: float = 0.0
+    cpu: float = 0.0
+
+
+def provenance(case_file: CaseFile, results: ByRule, call: Call | None = None) -> list[Section]:
+    """All that results were computed from in a table, and the case file itself."""
     first = next(iter(results))
-    case = case_file.case(first)
-    model = _given(case.structure.options) | {"mass": ", ".join(results)}
-    mesh, version = mesh_error(results[first]), results[first].attrs["foldyn_version"]
-    rows = [
-        ["sheet", _listed(_given(case_file.sheet))],
-        ["model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"],
-        *([["mesh", mesh]] if mesh else []),
-        ["damping", damping_text(case)],
-        *([["point masses", _point_masses(case)]] if case.masses else []),
-        ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
-    ]
-    if command:
-        rows.append(["command", command])
-    sections: list[Section] = [
-        Heading("How it was computed"),
-        Table(["part", "as computed"], rows),
-    ]
+    rows = inputs(case_file, case_file.case(first), results)
+    rows += computed(results, call or Call())
+    sections: list[Section] = [Heading("How it was computed"), inputs_table(rows)]
     if case_file.text:
         sections.append(Listing(f"The case file {case_file.path.name}", case_file.text))
     return sections
+
+
+def inputs_table(rows: Iterable[tuple[str, str]]) -> Table:
+    """Parts of a computation with what they were, without those of which nothing is said."""
+    return Table(["part", "as computed"], [[*row] for row in rows if row[1]], sorts=False)
+
+
+def inputs(case_file: CaseFile, case: Case, results: ByRule) -> list[tuple[str, str]]:
+    """Pattern, sheet, model, supports, loads, damping and analysis, each in words."""
+    structure = case.structure
+    model = _given(structure.options) | {"mass": ", ".join(results)}
+    pattern = structure.pattern
+    counts = [
+        (len(pattern.vertices), "vertices"), (len(pattern.faces), "panels"),
+        (len(pattern.creases), "creases"), (len(structure.nodes), "nodes"),
+        *((len(getattr(structure, part, ())), part) for part in ("bars", "folds", "bends")),
+    ]  # fmt: skip
+    counted = ", ".join(f"{count} {what}" for count, what in counts if count)
+    analysis = case_file.analysis
+    return [
+        ("pattern", f"{counted}; size {pattern.size:.6g} m"),
+        ("sheet", _listed(_given(case_file.sheet))),
+        ("model", f"{case_file.model.replace('_', ' ')}; {_listed(model)}"),
+        ("mesh", mesh_error(next(iter(results.values())))),
+        ("supports", _parts(case.supports)),
+        ("loads", _parts(case.loads)),
+        ("damping", damping_text(case)),
+        ("point masses", _point_masses(case) if case.masses else ""),
+        ("analysis", f"{analysis.kind}; {_listed(analysis.arguments)}"),
+    ]
+
+
+def computed(results: ByRule, call: Call) -> Iterator[tuple[str, str]]:
+    """When and by what results were computed, at what cost, and what was said of them."""
+    own = sum(float(result.attrs.get("wall_seconds", 0.0)) for result in results.values())
+    yield from cost_rows(next(iter(results.values())).attrs["foldyn_version"], call, own)
+
+
+def cost_rows(version: str, call: Call, own: float = 0.0) -> Iterator[tuple[str, str]]:
+    """When and by what something was computed, at what cost, and what was said of it.
+
+    own : time (s) in solvers.
+    """
+    yield "computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"
+    yield "command", call.command
+    cost = f"{own:.3g} s in the solver" if own else ""
+    if call.wall:
+        whole = f"{call.wall:.3g} s with reading and saving, {call.cpu:.3g} s of processor time"
+        cost = f"{cost}; {whole}" if cost else whole
+    yield "cost", cost
+    yield "warnings", "; ".join(call.warnings) or "none"
+
+
+def _parts(parts: Iterable[Any]) -> str:
+    """Supports or loads in words, each with its kind."""
+    return ". ".join(
+        f"{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', type(part).__name__).capitalize()}: "
+        f"{_listed(_given(part))}"
+        for part in parts
+    )
 
 
 def damping_text(case: Case) -> str:
@@ -93,7 +163,7 @@ def _listed(values: Mapping[str, Any]) -> str:
     return "; ".join(
         f"{name.replace('_', ' ')} {_written(value)} {UNITS.get(name, '')}".rstrip()
         for name, value in values.items()
-        if value is not None and value != ()
+        if value is not None and not (isinstance(value, tuple) and not value)
     )
 
 
@@ -102,6 +172,14 @@ def _written(value: Any) -> str:
         given = _given(value) if is_dataclass(value) else {}
         given.pop("name", None)
         return f"{value.name} ({_listed(given)})" if given else value.name
+    if isinstance(value, History):
+        return history_name(value)
+    if isinstance(value, np.ndarray | list | tuple) and np.size(value) > MOST_LISTED:
+        return f"{np.size(value)} values"
+    if isinstance(value, list) and value and all(map(is_dataclass, value)):
+        return _parts(value)
+    if is_dataclass(value):
+        return f"({_listed(_given(value))})"
     if isinstance(value, Mapping):
         return ", ".join(f"{word} {number:.6g}" for word, number in value.items())
     if isinstance(value, tuple) and all(isinstance(part, PanelSheet) for part in value):

@@ -21,10 +21,9 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
-from foldyn.formats import read_pattern
-from foldyn.formats.facets import HINGE, WELD
 from foldyn.input_files import from_toml, read_text
 from foldyn.patterns import GENERATORS, Pattern, thicken, welded
+from foldyn.patterns.facets import HINGE, WELD
 from foldyn.structures import Sheet, sheet_from
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
@@ -236,15 +235,24 @@ def _pattern(table: Mapping[str, Any], folder: Path) -> Pattern:
         with within("pattern"):
             return _facets(call_from(GENERATORS[table["kind"]], arguments), table)
     if "file" in table:
+        from foldyn.formats import read_pattern  # with all its libraries
+
         with within(f'pattern.file = "{table["file"]}": '):
             return read_pattern(folder / table["file"], *(table.get(key) for key in READING))
     with within("pattern: "):
         pattern = Pattern(
             table["vertices"], table["faces"], table.get("assignments"),
-            fold_angles=np.radians(table["fold_angles"]) if "fold_angles" in table else None,
+            fold_angles=_radians(table.get("fold_angles")),
             families=table.get("families"),
         )  # fmt: skip
         return _facets(pattern, table)
+
+
+def _radians(angles: Any) -> Any:
+    """Angles (degrees) of a list or a table in radians; None for none."""
+    if isinstance(angles, Mapping):
+        return {word: math.radians(angle) for word, angle in angles.items()}
+    return None if angles is None else np.radians(angles)
 
 
 def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:

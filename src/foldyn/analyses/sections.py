@@ -32,9 +32,9 @@ from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import support_from
 from foldyn.errors import Faults, InputError, within
-from foldyn.formats.facets import FACETS as KINDS_OF_FACETS
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 from foldyn.patterns import GENERATORS
+from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
 from foldyn.plots import ANIMATIONS
 from foldyn.structures import PRESETS
 from foldyn.structures.creases import per_crease
@@ -148,16 +148,16 @@ def _inline(value: Mapping[str, Any]) -> None:
         if not isinstance(face, list) or any(type(vertex) is not int for vertex in face):
             raise InputError(f".faces[{i}] = {show(face)}: must be a list of vertex numbers")
     letters = value.get("assignments", [])
-    if not isinstance(letters, list) or any(not isinstance(letter, str) for letter in letters):
+    if not _all(letters, str):
         raise InputError(
             f'.assignments = {show(letters)}: must be a list of letters "M", "V", "F", "U", one '
-            "per crease"
+            'per crease, or a table by family, as { zigzag = "M" }'
         )
     angles = value.get("fold_angles", [])
-    if not isinstance(angles, list) or any(type(angle) not in (int, float) for angle in angles):
+    if not _all(angles, int, float):
         raise InputError(
             f".fold_angles = {show(angles)}: must be a list of angles (degrees, valleys positive, "
-            "nan for none), one per crease"
+            "nan for none), one per crease, or a table of sizes by family, as { zigzag = 90 }"
         )
     families = value.get("families", {})
     if not isinstance(families, Mapping) or not all(isinstance(f, list) for f in families.values()):
@@ -165,6 +165,14 @@ def _inline(value: Mapping[str, Any]) -> None:
             f".families = {show(families)}: must be a table of lists of vertex pairs, as in "
             "{ zigzag = [[0, 1], [1, 2]] }"
         )
+
+
+def _all(given: Any, *types: type) -> bool:
+    """Whether all entries of a list or a table are of some types."""
+    if not isinstance(given, list | Mapping):
+        return False
+    entries = given.values() if isinstance(given, Mapping) else given
+    return all(type(entry) in types for entry in entries)
 
 
 def _masses(value: Any, info: ValidationInfo) -> list[str]:

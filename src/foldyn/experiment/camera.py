@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, optional
 from foldyn.values import brief, choice, number
 
 _TERMS = 6  # of the polynomial in r^2 that inverts the distortion
@@ -34,14 +34,8 @@ def opencv() -> Any:
     InputError
         It is not installed.
     """
-    try:
-        import cv2  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        raise InputError(
-            "camera tracking needs OpenCV, which is not installed: "
-            "pip install opencv-python-headless (or foldyn[experiment])"
-        ) from None
-    return cv2
+    install = "opencv-python-headless (or foldyn[experiment])"
+    return optional("cv2", "camera tracking needs OpenCV", install)
 
 
 def axes_of_view(up: str = "-x", facing: str = "z") -> NDArray[np.float64]:

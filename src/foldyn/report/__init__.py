@@ -1,6 +1,18 @@
 """Reports: one self-contained HTML page of text, tables and pictures."""
 
+from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Listing, Picture, Section, Table, Text
 
-__all__ = ["Heading", "Listing", "Picture", "Section", "Table", "Text", "write_report"]
+__all__ = [
+    "Chart",
+    "Charts",
+    "Curve",
+    "Heading",
+    "Listing",
+    "Picture",
+    "Section",
+    "Table",
+    "Text",
+    "write_report",
+]

@@ -11,6 +11,9 @@ import xarray
 
 from foldyn import plots
 from foldyn.cases import Case
+from foldyn.plots.law_curves import LawFrame, law_frames
+from foldyn.plots.load_curves import load_curves
+from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
 from foldyn.shells import Shell
 from foldyn.writing import whole
@@ -18,22 +21,39 @@ from foldyn.writing import whole
 ByRule = Mapping[str, xarray.Dataset]
 """Results by mass rule."""
 DPI = 150
+LOADS = "Loads and imposed motions over time."
+CURVE_STEP, CURVE_POINTS = 4, 801
+"""Points of curves in charts: every so manieth of a law, and so many of a load."""
 MOST_NODES = 12
 """Nodes that one figure shows at most."""
 
 
 class Album:
-    """Figures of a page, each also a file of its own in a folder."""
+    """Figures of a page, each also a file of its own in a folder.
 
-    def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
+    Parameters
+    ----------
+    folder : path
+    form : {"png", "svg", "pdf"} or None
+        What figures are written as; None: none are drawn. A page shows those in PNG.
+    """
 
-    def figure(self, name: str, caption: str, draw: Callable[[], Any]) -> Picture:
-        """Draw a figure, write it as NAME.png, and return it for the page."""
-        path = self.folder / f"{name}.png"
+    def __init__(self, folder: str | Path, form: str | None = "png") -> None:
+        self.folder, self.form = Path(folder), form
+
+    def figure(
+        self, name: str, caption: str, draw: Callable[[], Any], *otherwise: Section
+    ) -> list[Section]:
+        """Draw a figure and write it as a file, if figures are asked for.
+
+        Returns it for the page, or else what stands there instead.
+        """
+        if self.form is None:
+            return list(otherwise)
+        path = self.folder / f"{name}.{self.form}"
         with whole(path) as part:
             draw().savefig(part, dpi=DPI)
-        return Picture(path, caption)
+        return [Picture(path, caption)] if self.form == "png" else list(otherwise)
 
     def structure(
         self, case: Case, caption: str = "The pattern with its nodes, supports and loads."
@@ -41,7 +61,7 @@ class Album:
         """Draw the structure and its laws."""
         sections: list[Section] = [
             Heading("The structure"),
-            self.figure("structure", caption, lambda: plots.draw_structure(case)),
+            *self.figure("structure", caption, lambda: plots.draw_structure(case)),
         ]
         of_shell = case.structure.bar_law is None
         laws = (
@@ -51,10 +71,47 @@ class Album:
             "of a bar against its stretch."
         )
         if len(case.structure.folds) or not of_shell:
-            sections.append(self.figure("laws", laws, lambda: plots.plot_laws(case.structure)))
+            drawn = self.figure(
+                "laws", laws, lambda: plots.plot_laws(case.structure), law_charts(case, laws)
+            )
+            sections += drawn
         if of_shell:
             sections.append(Text(described_shell(case.structure)))
         return sections
+
+
+def law_charts(case: Case, caption: str) -> Charts:
+    """Constitutive curves of a case, for a page without figures."""
+    return Charts([_law_chart(frame) for frame in law_frames(case.structure)], caption)
+
+
+def _law_chart(frame: LawFrame) -> Chart:
+    curves = [
+        Curve(curve.label, curve.x[::CURVE_STEP], curve.y[::CURVE_STEP]) for curve in frame.curves
+    ]
+    rest = [Curve("at rest", *np.transpose([curve.rest for curve in frame.curves]), dots=True)]
+    title, note = frame.title, frame.note
+    return Chart(frame.xlabel, frame.ylabel, [*curves, *rest], title, note, frame.reach)
+
+
+def load_charts(case: Case, start: float, duration: float) -> Charts:
+    """Loads and imposed motions of a case over time (s), for a page without figures."""
+    time = np.linspace(start, start + duration, CURVE_POINTS)
+    charts = [
+        Chart("time (s)", label, [Curve(one.label, time, one.values(time)) for one in curves])
+        for label, curves in load_curves(case)
+    ]
+    return Charts(charts, LOADS)
+
+
+def filled(sections: Iterable[Section]) -> list[Section]:
+    """The sections without headings that have nothing below them."""
+    listed = list(sections)
+    return [
+        section
+        for section, after in zip(listed, [*listed[1:], Heading("")], strict=True)
+        if not (isinstance(section, Heading) and isinstance(after, Heading))
+    ]
 
 
 def described_shell(shell: Shell) -> str:

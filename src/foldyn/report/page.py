@@ -8,11 +8,12 @@ from os import PathLike
 from pathlib import Path
 
 from foldyn.errors import InputError
-from foldyn.report.sections import Heading, Section
+from foldyn.report.charts import Charts
+from foldyn.report.sections import Heading, Section, Table
 from foldyn.viewer import Stage, scripts
 from foldyn.writing import write_text
 
-_CSS = """
+CSS = """
 :root { color-scheme: light dark; --page: #fff; --text: #1a1a1a; --quiet: #444; --rule: #d8d8d8;
   --faint: #e2e2e2; --link: #0072b2; --code: #f6f6f6; }
 :root.dark { color-scheme: dark; --page: #15181c; --text: #e8e8e8; --quiet: #b8bec4;
@@ -35,10 +36,16 @@ figcaption, caption { color: var(--quiet); font-size: 0.92rem; text-align: left;
 figcaption { margin-top: 0.4rem; max-width: 46rem; }
 caption { padding-bottom: 0.4rem; max-width: min(46rem, 100vw - 2rem); }
 .table { overflow-x: auto; margin: 1.25rem min(0px, 50% - 50vw + 1rem) 1.25rem 0; }
+.kept { margin-right: 0; }
 table { border-collapse: collapse; font-size: 0.92rem; }
 th, td { padding: 0.3rem 0.6rem; text-align: left; vertical-align: top; }
 th:first-child, td:first-child { padding-left: 0.2rem; }
 th { border-bottom: 2px solid var(--text); vertical-align: bottom; text-wrap: balance; }
+th button { all: unset; cursor: pointer; }
+th button:hover { text-decoration: underline; }
+th button:focus-visible { outline: 3px solid #56b4e9; outline-offset: 1px; }
+th[aria-sort="ascending"] button::after { content: " ▲"; }
+th[aria-sort="descending"] button::after { content: " ▼"; }
 td { border-bottom: 1px solid var(--faint); }
 .number { text-align: right; font-variant-numeric: tabular-nums; }
 td.number { white-space: nowrap; }
@@ -46,6 +53,30 @@ summary { cursor: pointer; color: var(--link); }
 pre { overflow-x: auto; padding: 0.8rem 1rem; background: var(--code); font-size: 0.85rem;
   line-height: 1.4; }
 .unseen { visibility: hidden; user-select: none; }
+.stacked table, .stacked caption, .stacked thead, .stacked tbody { display: block; }
+.stacked thead tr { display: flex; flex-wrap: wrap; gap: 0.3rem; font-size: 0.85rem; }
+.stacked thead tr::before { content: "Sort by"; }
+.stacked:not(.sorts) thead { display: none; }
+.stacked th { padding: 0 0.4rem; border: 1px solid var(--rule); border-radius: 5px;
+  font-weight: normal; }
+.stacked tbody tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--rule); }
+.stacked td { display: flex; justify-content: space-between; gap: 1rem; border: 0;
+  padding: 0.1rem 0.2rem; text-align: right; }
+.stacked td:empty, .stacked .unseen { display: none; }
+.stacked td::before { content: attr(data-title); color: var(--quiet); text-align: left; }
+.plots { display: grid; gap: 0.5rem 1.5rem;
+  grid-template-columns: repeat(auto-fit, minmax(min(100%, 18rem), 1fr)); }
+.plots > div { min-width: 0; }
+.plots h3 { margin: 0.5rem 0 0.2rem; font-size: 1rem; }
+.plots p { font-size: 0.85rem; margin: 0.2rem 0; }
+.plot { --ink: var(--text); --grid: var(--faint); }
+.plot .keys { display: flex; flex-wrap: wrap; gap: 0.1rem 0.9rem; margin: 0; }
+.plot .keys button { display: inline-flex; align-items: center; gap: 0.35rem; min-height: 1.6rem;
+  padding: 0 0.15rem; font: inherit; font-size: 0.82rem; color: inherit; text-align: left;
+  background: none; border: 0; cursor: pointer; }
+.plot .keys button[aria-pressed="false"] { text-decoration: line-through; }
+.plot .keys button[aria-pressed="false"] svg { opacity: 0.25; }
+.plot .keys svg { flex: none; }
 .foldyn { width: min(84rem, 100vw - 2rem); margin-left: max(50% - 42rem, 50% - 50vw + 1rem); }
 @media (max-width: 40rem) {
   body { padding: 1rem 0.8rem 3rem; }
@@ -71,9 +102,9 @@ def write_report(
         File to write, in an existing directory.
     title : str
         Title of the page.
-    sections : iterable of Heading, Text, Table, Listing, Picture or Stage
+    sections : iterable of Heading, Text, Table, Listing, Picture, Charts or Stage
         In the order of the page. With two or more headings of level 2 the page begins with a list
-        of them.
+        of them, or with its Stages if they come first.
 
     Returns
     -------
@@ -88,7 +119,13 @@ def write_report(
     path = Path(path)
     if not path.parent.is_dir():
         raise InputError(f"path: there is no directory {path.parent}; make it first")
-    body, contents, stages = [], [], 0
+    write_text(path, report_html(title, sections))
+    return path
+
+
+def report_html(title: str, sections: Iterable[Section | Stage]) -> str:
+    """Text of the page of a report; see `write_report`."""
+    sections, body, contents, stages = list(sections), [], [], 0
     for number, section in enumerate(sections):
         if isinstance(section, Heading) and section.level == 2:
             contents.append((f"part-{len(contents) + 1}", section.text))
@@ -101,34 +138,38 @@ def write_report(
         else:
             raise InputError(
                 f"sections[{number}]: {type(section).__name__}; use Heading, Text, Table, Listing, "
-                "Picture or Stage"
+                "Picture, Charts or Stage"
             )
     listed = ""
     if len(contents) > 1:
         items = "\n".join(f'<li><a href="#{a}">{escape(text)}</a></li>' for a, text in contents)
-        listed = f'<nav aria-label="Contents"><ul>\n{items}\n</ul></nav>\n'
-    head, end = _scripts(stages > 0)
-    content = "\n".join(body)
-    page = (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"{head}<title>{escape(title)}</title>\n</head>\n<body>\n<main>\n"
-        f"<h1>{escape(title)}</h1>\n{listed}{content}\n</main>\n{end}</body>\n</html>\n"
-    )
-    write_text(path, page)
-    return path
+        listed = f'<nav aria-label="Contents"><ul>\n{items}\n</ul></nav>'
+    opening = next((k for k, one in enumerate(sections) if not isinstance(one, Stage)), stages)
+    content = "\n".join([*body[:opening], *([listed] if listed else []), *body[opening:]])
+    css, code = CSS, ""
+    if any(isinstance(section, Stage | Charts) for section in sections):
+        css, code = scripts.style() + CSS, scripts.script()
+    elif any(isinstance(section, Table) for section in sections):
+        code = scripts.script_of_tables()
+    return document(title, f"<h1>{escape(title)}</h1>\n{content}", css, code)
 
 
-def _scripts(interactive: bool) -> tuple[str, str]:
-    """Policy and style in the head of a page, and the script at its end.
+def document(title: str, main: str, css: str, code: str, allowed: str = "") -> str:
+    """Text of a page with one style and one script.
 
-    The policy lets the browser take nothing but what is in the page.
+    Its policy lets the browser take nothing but what is in the page.
+
+    allowed : what more the policy allows, as "; connect-src 'self'".
     """
-    css = (scripts.style() if interactive else "") + _CSS
-    code = scripts.script() if interactive else ""
     policy = (
         f"default-src 'none'; style-src {scripts.digest(css)}; "
-        f"script-src {scripts.digest(code)}; img-src data:; media-src data:"
+        f"script-src {scripts.digest(code)}; img-src data:; media-src data:{allowed}"
     )
-    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{css}</style>\n'
-    return head, f"<script>{code}</script>\n" if code else ""
+    end = f"<script>{code}</script>\n" if code else ""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>{css}</style>\n'
+        f"<title>{escape(title)}</title>\n</head>\n<body>\n<main>\n"
+        f"{main}\n</main>\n{end}</body>\n</html>\n"
+    )

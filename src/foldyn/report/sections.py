@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
+from foldyn.report.charts import Charts
 
 _SIGNATURES = (
     (0, b"\x89PNG\r\n\x1a\n", "image/png"),
@@ -75,12 +76,15 @@ class Table:
         Written above the table.
     digits : int
         Significant digits of numbers that are not integers.
+    sorts : bool
+        Whether a click on a title puts the rows in the order of its column.
     """
 
     header: Sequence[str]
     rows: Sequence[Sequence[Any]]
     caption: str = ""
     digits: int = 4
+    sorts: bool = True
 
     def __post_init__(self) -> None:
         """Check that rows fit the header."""
@@ -115,8 +119,8 @@ class Table:
             for cells in zip(*columns, strict=True)
         )
         return (
-            f'<div class="table"><table>{caption}\n<thead><tr>{titles}</tr></thead>\n'
-            f"<tbody>\n{body}\n</tbody></table></div>"
+            f'<div class="table{"" if self.sorts else " kept"}"><table>{caption}\n'
+            f"<thead><tr>{titles}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
 
     def _cell(self, value: Any) -> str:
@@ -206,7 +210,7 @@ class Picture:
         return str(self.source) if is_path else f"an object of type {type(self.source).__name__}"
 
 
-Section = Heading | Text | Table | Listing | Picture
+Section = Heading | Text | Table | Listing | Picture | Charts
 
 
 def _pixels(content: bytes) -> tuple[int, int]:

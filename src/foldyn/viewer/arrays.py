@@ -53,9 +53,9 @@ class Arrays:
         flat = np.nan_to_num(np.asarray(values, float).reshape(len(values), -1))
         about: dict[str, Any] = {"shape": list(np.shape(values))}
         step = 2.0 * max(tolerance, 0.5 / LARGEST) * (float(np.abs(flat).max(initial=0.0)) or 1.0)
-        whole = np.rint(flat / step).astype(np.int16)
         histories, shapes, sizes = factors(flat, 0.5 * step)
         if not len(sizes) or histories.size + shapes.size >= flat.size:
+            whole = np.rint(flat / step).astype(np.int16)
             return about | {"values": self._add(name, whole, 2, step)}
         return about | {
             "histories": self._add(f"{name}.histories", histories, 2),
@@ -63,12 +63,15 @@ class Arrays:
             "sizes": sizes.tolist(),
         }
 
+    def texts(self) -> dict[str, str]:
+        """Their content in letters (base64), by name."""
+        return {name: base64.b64encode(each).decode() for name, each in self.packed.items()}
+
     def html(self, key: str) -> str:
         """All of them as elements of a page that browsers do not show, named key.name."""
         return "\n".join(
-            f'<script type="text/plain" data-array="{key}.{name}">'
-            f"{base64.b64encode(content).decode()}</script>"
-            for name, content in self.packed.items()
+            f'<script type="text/plain" data-array="{key}.{name}">{text}</script>'
+            for name, text in self.texts().items()
         )
 
     def _add(self, name: str, values: NDArray, differences: int = 0, step: float = 1.0) -> str:

@@ -6,10 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases import Case
+from foldyn.cases.loaded import SomeLoads
 from foldyn.mechanics import angles
 from foldyn.structures import Structure
+from foldyn.structures.mesh import double_areas
 
 
 class Field(NamedTuple):
@@ -26,8 +29,8 @@ class Field(NamedTuple):
     signed: bool
 
 
-def fields(case: Case, displacement: NDArray) -> dict[str, Field]:
-    """Fields of displacements (samples, n, 3) by name; shells have none.
+def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
+    """Fields of a motion or path with displacements (samples, n, 3), by name; shells have none.
 
     Speeds are not among them: the page takes them from displacements.
     """
@@ -35,16 +38,33 @@ def fields(case: Case, displacement: NDArray) -> dict[str, Field]:
     if not isinstance(structure, Structure):
         return out
     strain = bar_strain(structure, displacement)
-    out["bar_strain"] = Field("strain of bars", "1", "bar", strain, True)
-    theta = fold_angles(structure, displacement)
-    turn = np.degrees(theta - structure.fold_rest)
+    out["bar_strain"] = _strain_field(strain)
+    folds = hinge_angles(structure, structure.folds, displacement)
+    turn = np.degrees(folds - structure.fold_rest)
     out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
     if structure.edge_plates is None:  # whose folds turn less than the panels beside them
-        moment = structure.fold_stiffness * structure.fold_law.moment(
-            theta, np.broadcast_to(structure.fold_rest, theta.shape)
-        )
+        angles = np.hstack([folds, hinge_angles(structure, structure.bends, displacement)])
+        rest = rest_angles(case, result, len(displacement))
+        own = slice(len(structure.folds))
+        law = structure.fold_law
+        moment = structure.fold_stiffness * law.moment(angles[:, own], rest[:, own])
         out["fold_moment"] = Field("moment of creases", "N m", "crease", moment, True)
+        density = energy_density(structure, strain, angles, rest)
+        out["energy"] = Field("strain energy per area", "J/m²", "panel", density, False)
     return out
+
+
+def folding_fields(case: Case, displacement: NDArray, fold_angle: NDArray) -> dict[str, Field]:
+    """Fields of a folding by name, which has fold angles (samples, nc), rad, and no sheet."""
+    angle = np.degrees(fold_angle)
+    return {
+        "bar_strain": _strain_field(bar_strain(case.structure, displacement)),
+        "turn": Field("fold angle of creases, valleys positive", "°", "crease", angle, True),
+    }
+
+
+def _strain_field(strain: NDArray) -> Field:
+    return Field("strain of bars", "1", "bar", strain, True)
 
 
 def bar_strain(structure: Structure, displacement: NDArray) -> NDArray:
@@ -54,12 +74,65 @@ def bar_strain(structure: Structure, displacement: NDArray) -> NDArray:
     return np.linalg.norm(apart, axis=2) / structure.bar_length - 1.0
 
 
-def fold_angles(structure: Structure, displacement: NDArray) -> NDArray:
-    """Dihedrals (samples, nf) of the folds, rad."""
-    rows = structure.folds.astype(np.uint32)
+def hinge_angles(structure: Structure, hinges: NDArray, displacement: NDArray) -> NDArray:
+    """Dihedrals (samples, k) of hinges (k, 4), rad."""
+    rows = hinges.astype(np.uint32)
     return np.array([angles(structure.nodes + u, rows) for u in displacement]).reshape(
         len(displacement), len(rows)
     )
+
+
+def rest_angles(case: Case, result: Any, samples: int) -> NDArray:
+    """Rest angles (samples, k) of folds and bends, rad, as loads turn them."""
+    rest = np.hstack([case.structure.fold_rest, case.structure.bend_rest])
+    turned = np.tile(rest, (samples, 1))
+    if "time" in result.sizes:
+        for change, history in case.rest_terms:
+            turned += np.outer(history(result["time"].values), change[: len(rest)])
+        return turned
+    constant = set(np.atleast_1d(result.attrs.get("constant", [])).astype(int).tolist())
+    for k in range(len(case.loads)):
+        factor = np.ones(samples) if k in constant else result["load_factor"].values
+        for change, _ in SomeLoads(case, [k]).rest_terms:
+            turned += np.outer(factor, change[: len(rest)])
+    return turned
+
+
+def energy_density(
+    structure: Structure, strain: NDArray, angles: NDArray, rest: NDArray
+) -> NDArray:
+    """Strain energy over the area of each panel (samples, m), J/m2.
+
+    That of a bar or hinge goes in equal parts to the triangles beside it; clamped edges and springs
+    are left out.
+
+    strain, angles, rest : of bars (samples, nb), and of folds and bends (samples, k), rad.
+    """
+    stiffness = structure.sheet.youngs_modulus * structure.bar_area * structure.bar_length
+    parts, first = [stiffness * structure.bar_law.energy(1.0 + strain)], 0
+    for kind in structure.hinge_kinds:
+        own = slice(first, first + len(kind.nodes))
+        parts.append(kind.stiffness * kind.energy(angles[:, own], rest[:, own]))
+        first = own.stop
+    pairs = np.vstack([structure.bars, structure.folds[:, :2], structure.bends[:, :2]])
+    beside = shares(pairs, structure.triangles, structure.triangle_panel)
+    triangle = 0.5 * np.linalg.norm(double_areas(structure.nodes, structure.triangles), axis=1)
+    return np.hstack(parts) @ beside / np.bincount(structure.triangle_panel, triangle)
+
+
+def shares(pairs: NDArray, triangles: NDArray, panel: NDArray) -> sparse.csr_array:
+    """Parts (k, m) of what lies along pairs of nodes (k, 2) that belong to each panel."""
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    count = int(triangles.max(initial=0)) + 1
+    of_side, of_pair = (np.sort(rows, axis=1) @ [count, 1] for rows in (sides, pairs))
+    key, place = np.unique(of_pair, return_inverse=True)
+    at = np.minimum(np.searchsorted(key, of_side), len(key) - 1)
+    found = key[at] == of_side
+    shape = (len(key), int(panel.max(initial=0)) + 1)
+    ones = np.ones(int(found.sum()))
+    beside = sparse.csr_array((ones, (at[found], np.repeat(panel, 3)[found])), shape=shape)
+    total = np.maximum(beside.sum(axis=1), 1.0)
+    return (sparse.diags_array(1.0 / total) @ beside).tocsr()[place]
 
 
 def energies(case: Case, result: Any) -> dict[str, NDArray]:

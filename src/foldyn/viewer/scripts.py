@@ -5,36 +5,69 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 
 MODULES = (
-    "data", "numbers", "colors", "camera", "gl", "painter", "charts", "result", "view",
-    "curves", "analyses", "page",
+    "data", "numbers", "colors", "camera", "gl", "painter", "annotations", "vector", "charts",
+    "curves", "result", "view", "analysis", "motion", "path", "folding", "modes", "response",
+    "shape", "analyses", "legend", "files", "page", "plots", "tables",
 )  # fmt: skip
 """In an order in which each uses only those before it."""
-_IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)
-_EXPORT = re.compile(r"^export ", re.MULTILINE)
+_IMPORT = re.compile(r"^import (\{[^;]*\}) from \"\./(\w+)\.js\";\n", re.MULTILINE)
+_EXPORT = re.compile(r"^export ((?:async )?(?:class|function|const) (\w+))", re.MULTILINE)
 
 
 def _text(name: str) -> str:
     return files("foldyn.viewer").joinpath(name).read_text(encoding="utf-8")
 
 
+def _module(name: str) -> str:
+    """A module as a function that is called at once, with names of its own."""
+    text = _text(f"static/{name}.js")
+    names = ", ".join(found[1] for found in _EXPORT.findall(text))
+    body = _EXPORT.sub(r"\1", _IMPORT.sub(r"const \1 = modules.\2;\n", text))
+    return f"modules.{name} = (() => {{\n{body}return {{ {names} }};\n}})();"
+
+
+def _joined(names: Iterable[str], begin: str) -> str:
+    """Modules as one text, and what begins."""
+    own = "\n".join(['"use strict";', "const modules = {};", *map(_module, names)])
+    return f"(() => {{\n{own}\n{begin}\n}})();"
+
+
+@cache
+def script_of_tables() -> str:
+    """Text of the script for a document whose tables alone are interactive."""
+    return _joined(["tables"], "modules.tables.openTables();")
+
+
 @cache
 def script() -> str:
     """Text of the script, which draws all interactive parts of the document that holds it."""
-    modules = [_EXPORT.sub("", _IMPORT.sub("", _text(f"static/{name}.js"))) for name in MODULES]
-    charts = _text("third_party/uplot/uPlot.iife.min.js")
-    notice = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence: github.com/leeoniya/uPlot */"
-    own = "\n".join(modules)
-    return f'{notice}\n{charts}\n(() => {{\n"use strict";\n{own}\nopenPages();\n}})();'
+    begin = "modules.page.openPages();\nmodules.plots.openPlots();\nmodules.tables.openTables();"
+    return _with_charts(MODULES, begin)
 
 
 @cache
-def style() -> str:
-    """Text of the style."""
-    return _text("third_party/uplot/uPlot.min.css") + "\n" + _text("static/page.css")
+def script_of_live() -> str:
+    """Text of the script of a page whose results are computed as its reader wishes."""
+    return _with_charts((*MODULES, "live"), "modules.live.openLive();")
+
+
+def _with_charts(names: Iterable[str], begin: str) -> str:
+    """Modules behind the chart library."""
+    charts = _text("third_party/uplot/uPlot.iife.min.js")
+    notice = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence: github.com/leeoniya/uPlot */"
+    return f"{notice}\n{charts}\n{_joined(names, begin)}"
+
+
+@cache
+def style(*more: str) -> str:
+    """Text of the style, and of more styles by name."""
+    own = [_text(f"static/{name}.css") for name in ("page", *more)]
+    return "\n".join([_text("third_party/uplot/uPlot.min.css"), *own])
 
 
 def digest(text: str) -> str:

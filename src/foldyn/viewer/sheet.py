@@ -1,4 +1,4 @@
-"""A structure and what acts on it, as a page draws them."""
+"""A sheet and what acts on it, as a page draws them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.patterns import Pattern
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.mesh import Mesh, n4b5
 from foldyn.viewer.arrays import Arrays
 
 KINDS = "MVFUB"
@@ -23,35 +25,47 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
     begin and end (k, 2), m; "bars" (b, 2) of bars and hinges; "held" and "loads", see below.
     """
     structure = case.structure
-    pairs, kind, edge, along = edge_pieces(structure)
-    out: dict[str, Any] = {
-        "nodes": arrays.exact(f"{key}.nodes", structure.nodes, "f4"),
-        "triangles": arrays.exact(f"{key}.triangles", structure.triangles, "u4"),
-        "panel": arrays.exact(f"{key}.panel", structure.triangle_panel, "u4"),
-        "edges": arrays.exact(f"{key}.edges", pairs, "u4"),
-        "kind": arrays.exact(f"{key}.kind", kind, "u1"),
-        "crease": arrays.exact(f"{key}.crease", edge, "u4"),
-        "along": arrays.exact(f"{key}.along", along, "f4"),
-        "vertices": len(structure.pattern.vertices),
-        "creases": structure.pattern.creases.tolist(),
-        "held": held(case),
-        "loads": load_arrows(case),
-    }
+    out = _surface(arrays, key, structure.pattern, structure, structure.edge_nodes)
+    out |= {"held": held(case), "loads": load_arrows(case)}
     if structure.bar_law is not None:
         out["bars"] = arrays.exact(f"{key}.bars", structure.bars, "u4")
     return out
 
 
-def edge_pieces(structure: Discretized) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def bare_sheet(arrays: Arrays, key: str, pattern: Pattern) -> dict[str, Any]:
+    """The same of a pattern, whose nodes are its vertices."""
+    return _surface(arrays, key, pattern, n4b5(pattern), pattern.lines) | {"held": [], "loads": []}
+
+
+def _surface(
+    arrays: Arrays, key: str, pattern: Pattern, mesh: Discretized | Mesh, edge_nodes: NDArray
+) -> dict[str, Any]:
+    """The triangles of a sheet and its edges."""
+    pairs, kind, edge, along = edge_pieces(pattern, mesh.nodes, edge_nodes)
+    return {
+        "nodes": arrays.exact(f"{key}.nodes", mesh.nodes, "f4"),
+        "triangles": arrays.exact(f"{key}.triangles", mesh.triangles, "u4"),
+        "panel": arrays.exact(f"{key}.panel", mesh.triangle_panel, "u4"),
+        "edges": arrays.exact(f"{key}.edges", pairs, "u4"),
+        "kind": arrays.exact(f"{key}.kind", kind, "u1"),
+        "crease": arrays.exact(f"{key}.crease", edge, "u4"),
+        "along": arrays.exact(f"{key}.along", along, "f4"),
+        "vertices": len(pattern.vertices),
+        "creases": pattern.creases.tolist(),
+    }
+
+
+def edge_pieces(
+    pattern: Pattern, nodes: NDArray, edge_nodes: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Pieces (k, 2) of the pattern's edges, the kind of each, its edge, and its ends along it.
 
     Welds are left out.
     """
-    pattern = structure.pattern
     letters = [*pattern.assignments, *"B" * len(pattern.boundary)]
-    rows = np.asarray(structure.edge_nodes)[: len(letters)]
+    rows = np.asarray(edge_nodes)[: len(letters)]
     pairs = np.stack([rows[:, :-1], rows[:, 1:]], axis=2)
-    length = np.linalg.norm(np.diff(structure.nodes[pairs], axis=2)[:, :, 0], axis=2)
+    length = np.linalg.norm(np.diff(nodes[pairs], axis=2)[:, :, 0], axis=2)
     end = np.cumsum(length, axis=1)
     edge = np.repeat(np.arange(len(rows)), pairs.shape[1])
     kind = np.array([KINDS.index(letter) for letter in letters])[edge]

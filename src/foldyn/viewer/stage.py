@@ -5,26 +5,32 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.linear import character
+from foldyn.linear import character, mac
 from foldyn.plots.along import displacements, stretches, way
 from foldyn.viewer.arrays import Arrays
-from foldyn.viewer.fields import energies, fields
+from foldyn.viewer.backdrop import Backdrop
+from foldyn.viewer.fields import Field, energies, fields, folding_fields
+from foldyn.viewer.folding import folding_case
 from foldyn.viewer.sheet import sheet
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
 """Errors of the page's displacements over the sheet's size and over the largest of them, of which
 the smaller one is allowed, and of values for colors over the largest."""
-MOST = 20_000_000
+MOST_LINES = 20_000
+"""Bars or creases that a page colors: of larger sheets they are too fine to be seen, and take most
+of its size."""
+MOST = 30_000_000
 """Displacements of a result that are looked at; of longer ones every k-th sample."""
 
 Results = Mapping[str, xr.Dataset]
@@ -45,9 +51,13 @@ class Stage:
     about: Mapping[str, Any]
     arrays: Arrays
 
+    def whole(self) -> dict[str, Any]:
+        """What the page's script reads, with what it must know of the arrays."""
+        return {**self.about, "arrays": self.arrays.about}
+
     def html(self, key: str = "stage") -> str:
         """Write as HTML, with names that begin with a key; the page must have the script."""
-        about = json.dumps({**self.about, "arrays": self.arrays.about}).replace("</", "<\\/")
+        about = json.dumps(self.whole()).replace("</", "<\\/")
         return (
             f'<div class="foldyn" data-foldyn="{key}">'
             "<p>This part of the page needs JavaScript.</p></div>\n"
@@ -56,35 +66,50 @@ class Stage:
         )
 
 
-def stage(results: Results, cases: Mapping[str, Case], title: str, nodes: list[int]) -> Stage:
-    """Show results of one kind, by name: motions, paths, modes or responses.
+def stage(
+    results: Results, cases: Mapping[str, Case], title: str, nodes: list[int],
+    backdrop: Backdrop | None = None,
+) -> Stage:  # fmt: skip
+    """Show results of one kind, by name: motions, paths, foldings, modes or responses.
 
+    cases : of the results but for foldings, which have none.
     nodes : those to begin with; the first is chosen.
+    backdrop : photographs under the sheets.
     """
     arrays, sheets, listed = Arrays(), {}, []
     kind = _kind(next(iter(results.values())))
     node = None if kind == "modes" or not nodes else nodes[0]
     about = {"title": title, "kind": kind, "version": __version__, "node": node}
     keys: dict[int, str] = {}
-    with threadpool_limits(1, user_api="blas"):  # small matrices
+    with _threads().limit(limits=1, user_api="blas"):  # small matrices
         for name, result in results.items():
-            case = cases[name]
+            case = folding_case(result) if kind == "folding" else cases[name]
             key = keys.setdefault(id(case.structure.pattern), f"s{len(keys)}")
             if key not in sheets:
                 sheets[key] = sheet(arrays, key, case)
             own = {"name": name, "sheet": key, "alone": len(results) == 1}
             listed += _LISTED[kind](arrays, f"r{len(listed)}", case, result, own)
-    about |= {"sheets": sheets, "results": listed, **_more(kind, results, nodes)}
+    about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
+    if backdrop:
+        about["backdrop"] = backdrop.about()
     return Stage(about, arrays)
 
 
+@cache
+def _threads() -> ThreadpoolController:
+    """Those of BLAS, whose libraries are found once."""
+    return ThreadpoolController()
+
+
 def _kind(result: xr.Dataset) -> str:
+    if "share" in result.coords:
+        return "folding"
     for name, kind in (("time", "motion"), ("step", "path"), ("mode", "modes")):
         if name in result.sizes:
             return kind
     if "frequency" in result.sizes:
         return "response"
-    raise InputError("result: it is no motion, path, modes or frequency response")
+    raise InputError("result: it is no motion, path, folding, modes or frequency response")
 
 
 def _motion(
@@ -109,20 +134,31 @@ def _path(
     return [own | about | {"load": load, "stable": stable.tolist()}]
 
 
+def _folding(
+    arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
+) -> list[dict[str, Any]]:
+    u = displacements(result, "step")
+    own_fields = folding_fields(case, u, result["fold_angle"].values)
+    about = _changing(arrays, key, case, result, u, way(result), own_fields)
+    return [own | about | {"load": arrays.exact(f"{key}.load", result["share"].values, "f4")}]
+
+
 def _changing(
     arrays: Arrays, key: str, case: Case, result: xr.Dataset,
-    u: NDArray, moments: NDArray,
+    u: NDArray, moments: NDArray, own_fields: Mapping[str, Field] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """What motions and paths have in common."""
+    """What motions, paths and foldings have in common."""
+    error = allowed(case.structure.pattern.size, float(np.abs(u).max(initial=0.0)))
     return {
-        "displacement": arrays.changing(f"{key}.u", u, _allowed(case, u)),
+        "displacement": arrays.changing(f"{key}.u", u, error),
         "moments": arrays.exact(f"{key}.t", moments, "f4"),
         "fields": {
             name: {
                 "label": field.label, "unit": field.unit, "on": field.on, "signed": field.signed,
                 "values": arrays.changing(f"{key}.{name}", field.values, OF_COLORS),
             }
-            for name, field in fields(case, u).items()
+            for name, field in (own_fields or fields(case, result, u)).items()
+            if field.on == "panel" or field.values.shape[1] <= MOST_LINES
         },
         "energies": {
             text: arrays.exact(f"{key}.E{k}", values, "f4")
@@ -131,23 +167,26 @@ def _changing(
     }  # fmt: skip
 
 
-def _allowed(case: Case, u: NDArray) -> float:
-    """Error of displacements over the largest of them."""
-    largest = float(np.abs(u).max(initial=0.0)) or 1.0
-    return min(OF_LARGEST, OF_SIZE * case.structure.pattern.size / largest)
+def allowed(size: float, largest: float) -> float:
+    """Error of displacements over the largest of them, of a sheet of some size (m)."""
+    return min(OF_LARGEST, OF_SIZE * size / (largest or 1.0))
 
 
 def _modes(
     arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    shapes, words = result["shape"].transpose("mode", "node", "axis").values, character(result)
+    shapes, words = (
+        result["shape"].transpose("mode", "node", "axis").values,
+        character(result, case=case),
+    )
     out = []
     for k, frequency in enumerate(result["frequency"].values.tolist()):
         damping = float(result["damping_ratio"][k]) if "damping_ratio" in result else np.nan
         facts = {
             "name": f"{k + 1}" if own["alone"] else f"{own['name']} {k + 1}",
-            "mode": 0,
-            "frequency": frequency,
+            "of": own["name"],
+            "number": k + 1,
+            "frequency": frequency if np.isfinite(frequency) else None,  # none where unstable
             "damping": damping if np.isfinite(damping) else None,
             "what": str(words.name.values[k]),
             "displacement": arrays.changing(f"{key}.{k}", shapes[k : k + 1], OF_LARGEST),
@@ -171,7 +210,7 @@ def _response(
 
 
 _LISTED: Mapping[str, Callable[..., list[dict[str, Any]]]] = {
-    "motion": _motion, "path": _path, "modes": _modes, "response": _response,
+    "motion": _motion, "path": _path, "folding": _folding, "modes": _modes, "response": _response,
 }  # fmt: skip
 
 
@@ -180,10 +219,12 @@ def _measured(result: xr.Dataset) -> str:
     return next(name for name in known if name in result)
 
 
-def _more(kind: str, results: Results, nodes: list[int]) -> dict[str, Any]:
-    """The axis to begin with, and the unit of a response."""
+def _more(
+    kind: str, results: Results, cases: Mapping[str, Case], nodes: list[int]
+) -> dict[str, Any]:
+    """The axis to begin with, the unit of a response, and how alike modes are."""
     if kind == "modes":
-        return {"axis": 0}
+        return {"axis": 0, "mac": _likeness(results, cases)}
     name = _measured(next(iter(results.values()))) if kind == "response" else "displacement"
     moved = [
         np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
@@ -192,3 +233,16 @@ def _more(kind: str, results: Results, nodes: list[int]) -> dict[str, Any]:
     largest = np.max([each.reshape(-1, 3).max(axis=0) for each in moved], axis=0)
     unit = next(iter(results.values()))[name].attrs.get("units", "")
     return {"axis": int(largest.argmax()), "unit": unit}
+
+
+def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | None]] | None:
+    """MAC of all modes with all others, at the vertices; None where patterns differ."""
+    counts = {len(case.structure.pattern.vertices) for case in cases.values()}
+    if len(counts) > 1:
+        return None
+    (count,) = counts
+    every = np.concatenate(
+        [r["shape"].transpose("mode", "node", "axis").values[:, :count] for r in results.values()]
+    )
+    rows = mac(every, every).round(3).tolist()
+    return [[value if np.isfinite(value) else None for value in row] for row in rows]

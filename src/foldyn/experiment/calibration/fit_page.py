@@ -1,55 +1,128 @@
-"""What `foldyn fit` leaves for people to look at: figures, measured beside model, and a page."""
+"""The page of `foldyn fit`: the fitted model in motion, measured beside model, the parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
+import xarray as xr
 
-from foldyn.cases import Case
+from foldyn.analyses import CaseFile
+from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases.directions import AXES
-from foldyn.experiment.calibration.fit_problem import PredictedRun
 from foldyn.experiment.calibration.fitted import Fit
 from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.plots import style
+from foldyn.experiment.calibration.shown import MOST, dense, plane
+from foldyn.report.album import Album
+from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.page import write_report
-from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
-from foldyn.writing import whole
-
-WIDTH = 9.0  # inches
-MOST = 8
-"""Nodes, and shapes, that a figure shows at most."""
-POINTS = 25
-"""Points of the curve that is drawn through measured forces."""
+from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
+from foldyn.viewer import Stage, stage
 
 
-def write_fit(fit: Fit, folder: str | Path, title: str = "", note: str = "") -> Path:
-    """Draw a fit into a folder that exists, a note on every figure; returns the page's path."""
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run of the fitted model, for some measurements."""
+
+    members: tuple[int, ...]
+    case_file: CaseFile
+    result: xr.Dataset
+    name: str
+
+
+def write_fit(
+    fit: Fit, folder: str | Path, title: str = "", note: str = "", call: Call | None = None,
+    figures: str | None = None,
+) -> Path:  # fmt: skip
+    """Write the page of a fit into a folder that exists; returns its path.
+
+    Parameters
+    ----------
+    fit : Fit
+    folder : path
+    title : str
+    note : str
+        Written on every figure.
+    call : Call, optional
+        How it was asked for.
+    figures : {"png", "svg", "pdf"}, optional
+        What figures are written as; none are drawn by default.
+    """
     folder = Path(folder)
-    sections: list[Section] = [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
+    album, runs = Album(folder, figures), _runs(fit)
+    title = title or f"Fit of {fit.problem.path.stem}"
+    sections: list[Section | Stage] = [*_stages(runs, title)]
+    sections += [Heading("Parameters"), _parameters(fit), Text(_quality(fit))]
     if len(fit.estimates) > 1:
         caption = (
             "Correlation of the parameters: where it is near 1 or -1, the data hardly tell two of "
             "them apart, and their intervals are long in one direction."
         )
-        sections.append(_saved(plot_correlation(fit), folder / "correlation.png", caption, note))
+        table = _correlation(fit, caption)
+        sections += album.figure("correlation", caption, lambda: _drawn(fit, None, note), table)
     if not all(one.determined for one in fit.estimates):
         sections.append(Text(_blind(fit)))
     sections += [Heading("Measured and model"), _scores(fit)]
     for i, one in enumerate(fit.problem.measurements):
-        figure = _figure(fit, i, one)
-        if figure is not None:
-            sections.append(_saved(figure, folder / f"data-{i}.png", _caption(one), note))
-    sections += [Heading("The search"), _searches(fit)]
-    return write_report(
-        folder / "report.html", title or f"Fit of {fit.problem.path.stem}", sections
-    )
+        run = next(run for run in runs if i in run.members)
+        charts = _charts(fit, i, one, run)
+        if charts:
+            shown = Charts(charts, _caption(one))
+            draw = partial(_drawn, fit, (one, run), note)
+            sections += album.figure(f"data-{i}", _caption(one), draw, shown)
+    sections += [Heading("The search"), _searches(fit), *_provenance(fit, runs, call or Call())]
+    return write_report(folder / "report.html", title, sections)
+
+
+def _runs(fit: Fit) -> list[_Run]:
+    """All that the fitted model was computed for."""
+    values, runs = [*fit.values.values()], []
+    for run in fit.problem.runs:
+        members = [fit.problem.measurements[i] for i in run.members]
+        forces = [dense(one) for one in members if isinstance(one, ForceDisplacement)]
+        result = fit.problem.result(run, values, [*members, *forces])
+        names = ", ".join(one.name for one in members)
+        runs.append(_Run(run.members, fit.problem.case_file(run, values), result, names))
+    return runs
+
+
+def _stages(runs: Sequence[_Run], title: str) -> Iterator[Stage]:
+    """The fitted model, its paths in step and its motions in step."""
+    for kind in dict.fromkeys(run.case_file.analysis.kind for run in runs):
+        own = {run.name: run for run in runs if run.case_file.analysis.kind == kind}
+        nodes = next(iter(own.values())).case_file.output.nodes.tolist()
+        results = {name: run.result for name, run in own.items()}
+        cases = {name: run.case_file.case() for name, run in own.items()}
+        yield stage(results, cases, title, nodes)
+
+
+def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:
+    """How it was computed, each run at the fitted values."""
+    sections: list[Section] = [Heading("How it was computed")]
+    for run in runs:
+        if len(runs) > 1:
+            sections.append(Heading(run.name, level=3))
+        case = run.case_file.case()
+        sections.append(
+            inputs_table(inputs(run.case_file, case, {run.case_file.masses[0]: run.result}))
+        )
+    results = {run.name: run.result for run in runs}
+    sections.append(inputs_table(computed(results, call)))
+    for path in dict.fromkeys([fit.problem.path, *(run.case_file.path for run in runs)]):
+        sections.append(Listing(f"The case file {path.name}", path.read_text("utf-8")))
+    return sections
+
+
+def _correlation(fit: Fit, caption: str) -> Table:
+    keys = [key.rsplit(".", 1)[-1] for key in fit.values]
+    rows = [[key, *map(cell, row)] for key, row in zip(keys, fit.correlation, strict=True)]
+    return Table(["", *keys], rows, caption, digits=3, sorts=False)
 
 
 def _parameters(fit: Fit) -> Table:
@@ -119,201 +192,68 @@ def _caption(one: Measurement) -> str:
     return f"{text} Held out: the fit did not use it." if one.held_out else text
 
 
-def _figure(fit: Fit, number: int, one: Measurement) -> Figure | None:
-    """Figure of one measurement; None where there is nothing to draw."""
-    run = next(run for run in fit.problem.runs if number in run.members)
-    values = [*fit.values.values()]
-    case = fit.problem.case_file(run, values).case()
+def _charts(fit: Fit, number: int, one: Measurement, run: _Run) -> list[Chart]:
+    """What was measured beside the fitted model; empty where there is nothing to show."""
+    case, result = run.case_file.case(), run.result
     if isinstance(one, ForceDisplacement):
-        return plot_forces(one, _curve(fit, run, one, case))
-    if isinstance(one, Shapes) and len(one.axes) < 2:
-        return None
-    result = fit.problem.result(run, values)
+        curve = dense(one)
+        model = Curve("model", curve.displacement, curve.predicted(result, case))
+        seen = Curve(one.label, one.displacement, one.force, dots=True)
+        return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
     if isinstance(one, Shapes):
-        return plot_shapes(one, case, one.shapes(result, case))
+        return _shape_charts(one, run) if len(one.axes) > 1 else []
     if isinstance(one, TimeHistory):
-        return plot_histories(one, case, one.curves(result, case))
-    if isinstance(one, Spectrum):
-        return plot_spectra(one, case, one.spectra(result, case))
-    return None
+        curves, seen = one.curves(result, case), one.values - one.trend(one.values)
+        curves, along = curves - one.trend(curves), one.time
+        xlabel, ylabel = "time (s)", f"{one.axis} displacement (m)"
+    elif isinstance(one, Spectrum):
+        curves, seen, along = one.spectra(result, case), one.values, one.frequency
+        xlabel, ylabel = "frequency (Hz)", f"{one.axis} amplitude (m)"
+    else:
+        return []
+    return [
+        Chart(
+            xlabel,
+            ylabel,
+            [Curve("model", along, curves[:, k]), Curve(one.label, along, seen[:, k], dots=True)],
+            f"node {node}",
+        )
+        for k, node in enumerate(one.where(case)[:MOST].tolist())
+    ]
 
 
-def _saved(figure: Figure, file: Path, caption: str, note: str) -> Picture:
-    style.title_above(figure, note)
-    with whole(file) as part:
-        style.finish(figure).savefig(part)
-    return Picture(file, caption)
-
-
-def _curve(
-    fit: Fit, run: PredictedRun, one: ForceDisplacement, case: Case
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacements and forces of the model from 0 to beyond the measured ones."""
-    ends = min(0.0, one.displacement.min()), max(0.0, one.displacement.max())
-    along = np.union1d(np.linspace(*ends, POINTS), one.displacement)
-    dense = one.at(along)
-    result = fit.problem.result(run, [*fit.values.values()], [dense])
-    return along, dense.predicted(result, case)
-
-
-def plot_forces(
-    one: ForceDisplacement, curve: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> Figure:
-    """Draw measured forces over displacements, on the curve of the fitted model.
-
-    Parameters
-    ----------
-    one : ForceDisplacement
-    curve : (ndarray, ndarray)
-        Displacements (m) and forces (N) of the model.
-    """
-    figure = style.new_figure(6.0, 3.8)
-    axes = figure.subplots()
-    title = f"{one.name}, held out" if one.held_out else ""
-    style.frame(axes, f"{one.axis} displacement (mm)", f"{one.axis} force (N)", title)
-    axes.plot(1e3 * curve[0], curve[1], color=style.BLUE, linewidth=1.5, label="model")
-    axes.errorbar(
-        1e3 * one.displacement, one.force, yerr=one.sigma, fmt="o", markersize=5,
-        color=style.VERMILLION, capsize=3, linestyle="none", label=one.label,
-    )  # fmt: skip
-    axes.set_ylim(bottom=min(0.0, *axes.get_ylim()))
-    axes.legend(fontsize=style.TICK, frameon=False)
-    return style.finish(figure)
-
-
-def plot_shapes(one: Shapes, case: Case, model: NDArray[np.float64]) -> Figure:
-    """Draw measured points and those of the model, a frame for each load factor.
-
-    The plane is that of the two measured axes along which the nodes lie farthest apart; lines are
-    bars of the structure between measured nodes.
-
-    Parameters
-    ----------
-    one : Shapes
-        Of at least two axes.
-    case : Case
-        Of the fitted model.
-    model : ndarray, shape (s, m, a)
-        As `Shapes.shapes` gives it.
-    """
-    nodes = one.where(case)
-    across, up = _plane(one, case)
-    rest = case.structure.nodes[nodes]
+def _shape_charts(one: Shapes, run: _Run) -> list[Chart]:
+    """Points that were measured beside those of the model, a chart for each load factor."""
+    case = run.case_file.case()
+    model, (across, up) = one.shapes(run.result, case), plane(one, case)
     letters = [AXES.index(axis) for axis in one.axes]
-    origin = rest[:, letters] if one.quantity == "displacement" else 0.0
+    rest = case.structure.nodes[one.where(case)][:, letters]
+    origin = rest if one.quantity == "displacement" else 0.0
     steps = np.linspace(0, len(one.load_factor) - 1, min(MOST, len(one.load_factor))).astype(int)
-    span = [np.ptp((model + origin)[..., k]) for k in (across, up)]
-    shape = min(max(span[1] / span[0], 0.3), 1.6) if span[0] > 0.0 else 1.6
-    columns = min(len(steps), 4)
-    figure, frames = _frames(len(steps), columns, WIDTH / columns * shape + 0.6, 0.5, sharey=True)
-    place = {int(node): k for k, node in enumerate(nodes)}
-    bars = [(place[a], place[b]) for a, b in case.structure.bars.tolist()
-            if a in place and b in place]  # fmt: skip
-    for index, (frame, step) in enumerate(zip(frames, steps, strict=True)):
-        left = f"{one.axes[up]} (mm)" if index % columns == 0 else ""
-        title = f"load factor {one.load_factor[step]:.3g}"
-        style.frame(frame, f"{one.axes[across]} (mm)", left, title)
-        there, seen = 1e3 * (model[step] + origin), 1e3 * (one.values[step] + origin)
-        for a, b in bars:
-            ends = there[[a, b]]
-            frame.plot(ends[:, across], ends[:, up], color=style.SKY, linewidth=0.8, zorder=1)
-        frame.plot(there[:, across], there[:, up], ".", color=style.BLUE, label="model")
-        frame.plot(
-            seen[:, across], seen[:, up], "o", markersize=6, mfc="none", color=style.VERMILLION,
-            label=one.label,
-        )  # fmt: skip
-        frame.set_aspect("equal")
-    if one.axes[up] == "x" and not frames[0].yaxis_inverted():
-        frames[0].invert_yaxis()  # pressed along x: as it stands in a test
-    handles, _ = frames[0].get_legend_handles_labels()
-    style.legend_below(figure, handles[-2:], columns=2)
+    return [
+        Chart(
+            f"{one.axes[across]} (m)",
+            f"{one.axes[up]} (m)",
+            [
+                Curve(name, points[:, across], points[:, up], dots=True)
+                for name, points in (
+                    ("model", model[step] + origin), (one.label, one.values[step] + origin)
+                )
+            ],
+            f"load factor {one.load_factor[step]:.3g}",
+        )
+        for step in steps.tolist()
+    ]  # fmt: skip
+
+
+def _drawn(fit: Fit, shown: tuple[Measurement, _Run] | None, note: str) -> Any:
+    """Figure of a measurement, or of the correlation."""
+    from foldyn.experiment.calibration import fit_figures
+    from foldyn.plots import style
+
+    if shown is None:
+        figure = fit_figures.plot_correlation(fit)
+    else:
+        figure = fit_figures.plot_measured(shown[0], shown[1].result, shown[1].case_file.case())
+    style.title_above(figure, note)
     return style.finish(figure)
-
-
-def plot_histories(one: TimeHistory, case: Case, model: NDArray[np.float64]) -> Figure:
-    """Draw measured histories, those of the model and the differences, without trend.
-
-    Parameters
-    ----------
-    one : TimeHistory
-    case : Case
-    model : ndarray, shape (t, m)
-        As `TimeHistory.curves` gives it.
-    """
-    measured, model = one.values - one.trend(one.values), model - one.trend(model)
-    labels = "time (s)", f"{one.axis} displacement (mm)"
-    return _beside(one, one.where(case), one.time, measured, model, labels, model - measured)
-
-
-def plot_spectra(one: Spectrum, case: Case, model: NDArray[np.float64]) -> Figure:
-    """Draw measured amplitude spectra beside those of the model; arguments as `plot_histories`."""
-    labels = "frequency (Hz)", f"{one.axis} amplitude (mm)"
-    return _beside(one, one.where(case), one.frequency, one.values, model, labels)
-
-
-def plot_correlation(fit: Fit) -> Figure:
-    """Draw the correlation of the parameters of a fit."""
-    keys = [key.rsplit(".", 1)[-1] for key in fit.values]
-    size = 1.2 + 0.6 * len(keys)
-    figure = style.new_figure(size + 1.2, size)
-    axes = figure.subplots()
-    others = np.where(np.eye(len(keys)) > 0.0, 0.0, fit.correlation)
-    axes.imshow(others, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    for (i, j), value in np.ndenumerate(others):
-        text = "1" if i == j else "?" if np.isnan(value) else f"{value:.3f}"
-        color = "white" if abs(value) > 0.6 else style.BLACK
-        axes.text(j, i, text, ha="center", va="center", fontsize=style.LABEL, color=color)
-    axes.set_xticks(range(len(keys)), keys, fontsize=style.TICK, rotation=20, ha="right")
-    axes.set_yticks(range(len(keys)), keys, fontsize=style.TICK)
-    axes.tick_params(length=0)
-    return style.finish(figure)
-
-
-def _beside(
-    one: TimeHistory | Spectrum,
-    nodes: NDArray[np.int64],
-    along: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    model: NDArray[np.float64],
-    labels: Sequence[str],
-    misfit: NDArray[np.float64] | None = None,
-) -> Figure:
-    """Curves of nodes, a frame each: measured, of the model, and the misfit."""
-    shown = nodes[:MOST]
-    columns = min(len(shown), 2)
-    figure, frames = _frames(len(shown), columns, 2.9 if len(shown) <= columns else 2.2, 0.8)
-    lines = []
-    for k, (frame, node) in enumerate(zip(frames, shown, strict=True)):
-        below = labels[0] if k >= len(shown) - columns else ""
-        title = f"node {node}" + (", held out" if one.held_out else "")
-        style.frame(frame, below, labels[1] if k % columns == 0 else "", title)
-        mark = {"marker": ".", "markersize": 3.0, "linestyle": "none"}
-        lines = frame.plot(along, 1e3 * measured[:, k], color=style.VERMILLION, **mark)
-        lines[0].set_label(one.label)
-        lines += frame.plot(along, 1e3 * model[:, k], color=style.BLUE, lw=1.2, label="model")
-        if misfit is not None:
-            label = f"model minus {one.label}"
-            lines += frame.plot(along, 1e3 * misfit[:, k], color=style.GRAY, lw=0.8, label=label)
-        frame.locator_params(axis="y", nbins=6)
-    style.legend_below(figure, lines, columns=3)
-    return style.finish(figure)
-
-
-def _frames(
-    count: int, columns: int, height: float, rest: float, sharey: bool = False
-) -> tuple[Figure, list[Axes]]:
-    """A figure of so many frames; each row has a height (inches), legend and title the rest."""
-    rows = -(-count // columns)
-    figure = style.new_figure(WIDTH, rows * height + rest)
-    frames = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=sharey).ravel()
-    for frame in frames[count:]:
-        frame.set_visible(False)
-    return figure, list(frames[:count])
-
-
-def _plane(one: Shapes, case: Case) -> tuple[int, int]:
-    """Indices in `axes` of the directions drawn across and upwards."""
-    rest = case.structure.nodes[one.where(case)]
-    spans = [np.ptp(rest[:, AXES.index(axis)]) for axis in one.axes]
-    first, second = sorted(np.argsort(spans)[-2:].tolist())
-    return (second, first) if one.axes[first] == "x" else (first, second)

@@ -2,12 +2,14 @@
 
 const RADIANS = Math.PI / 180;
 const MARGIN = 1.12;
+const DEEP = 0.25; // of the depth of clip space, for the size of the sheet
 
 export class Camera {
   constructor([elevation, azimuth] = [28, -60]) {
     this.home = { elevation, azimuth };
     this.center = [0, 0, 0];
     this.half = [1, 1, 1];
+    this.photograph = null; // or { size, matrix }: the camera of a photograph, see backdrop.py
     this.reset();
   }
 
@@ -17,10 +19,24 @@ export class Camera {
 
   // Unit vectors to the right, up and towards the viewer.
   get basis() {
+    if (this.photograph) return this.standing();
     const e = this.elevation * RADIANS;
     const a = this.azimuth * RADIANS;
     const toward = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
     const right = [-Math.sin(a), Math.cos(a), 0];
+    return [right, cross(toward, right), toward];
+  }
+
+  // Direction to the lamp, which stands with the viewer.
+  get light() {
+    const [right, up, toward] = this.basis;
+    return [0, 1, 2].map((k) => -0.35 * right[k] + 0.62 * up[k] + 0.7 * toward[k]);
+  }
+
+  standing() {
+    const { rows, forward } = this.seen();
+    const toward = forward.map((value) => -value);
+    const right = unit(cross(rows[1], forward));
     return [right, cross(toward, right), toward];
   }
 
@@ -36,6 +52,20 @@ export class Camera {
     this.half = this.half.map((value) => Math.max(value, least));
   }
 
+  // Pixels for a meter at the center of a view.
+  perMeter(view) {
+    if (!this.photograph) return view.height / 2 / this.extent(view.width / view.height);
+    const [right] = this.basis;
+    const along = right.reduce((sum, value, k) => sum + value * this.matrix(view)[k], 0);
+    return (along * view.width) / 2;
+  }
+
+  // Whether a box lies in the frame and fills much of it.
+  holds(low, high) {
+    const inside = this.center.every((c, k) => c - low[k] <= 1.05 * this.half[k] && high[k] - c <= 1.05 * this.half[k]);
+    return inside && Math.hypot(...low.map((value, k) => high[k] - value)) > 0.7 * this.size;
+  }
+
   // Half the height (m) that a view of width / height = aspect shows.
   extent(aspect) {
     const [right, up] = this.basis;
@@ -43,24 +73,73 @@ export class Camera {
     return (MARGIN * Math.max(reach(up), reach(right) / aspect)) / this.zoom;
   }
 
-  // From a position (m) to pixels of a view { x, y, width, height }, y down, and its depth (m).
-  projector({ x, y, width, height }) {
+  // Rows (4 x 4) from a position relative to the center (m, 1) to clip coordinates times their last:
+  // x to the right, y up, and depth.
+  matrix(view) {
+    return this.photograph ? this.matched(view) : this.orthographic(view);
+  }
+
+  orthographic({ width, height }) {
     const [r, u, t] = this.basis;
-    const scale = height / 2 / this.extent(width / height);
+    const half = this.extent(width / height);
+    const row = (d, factor, shift) => [...d.map((value) => factor * value), -factor * shift];
+    return [
+      ...row(r, height / width / half, this.pan[0]), ...row(u, 1 / half, this.pan[1]),
+      ...row(t, -DEEP / this.size, 0), 0, 0, 0, 1,
+    ];
+  }
+
+  // As in the photograph, whose pixels have their centers at whole numbers.
+  matched({ width, height }) {
+    const { rows, forward } = this.seen();
+    const { factor, left, top } = this.framed({ width, height });
+    const mix = (row, by, shift) => row.map((value, k) => by * value + shift * rows[2][k]);
+    return [
+      ...mix(rows[0], (2 * factor) / width, (2 * left + factor) / width - 1),
+      ...mix(rows[1], (-2 * factor) / height, 1 - (2 * top + factor) / height),
+      ...forward.map((value) => (DEEP / this.size) * value), 0, ...rows[2],
+    ];
+  }
+
+  // Rows from positions relative to the center to pixels of the photograph, and its direction.
+  seen() {
+    const { matrix } = this.photograph;
+    const at = matrix.map((row) => row[3] + row.slice(0, 3).reduce((sum, value, k) => sum + value * this.center[k], 0));
+    const rows = matrix.map((row, k) => [...row.slice(0, 3), at[k]].map((value) => value / at[2]));
+    const far = rows[2].slice(0, 3);
+    const forward = unit(Math.hypot(...far) * this.size > 1e-9 ? far : cross(rows[0], rows[1]));
+    return { rows, forward };
+  }
+
+  // Where the photograph lies in a view: pixels of the view for one of its own, and its corner's place.
+  framed({ width, height }) {
+    const [across, down] = this.photograph.size;
+    const factor = Math.min(width / across, height / down) * this.zoom;
+    const left = (width - factor * across) / 2 - (this.pan[0] * height) / this.size;
+    const top = (height - factor * down) / 2 + (this.pan[1] * height) / this.size;
+    return { factor, left, top };
+  }
+
+  // From a position (m) to pixels of a view { x, y, width, height }, y down, and its nearness (m).
+  projector(view) {
+    const m = this.matrix(view);
+    const { x, y, width, height } = view;
     const [cx, cy, cz] = this.center;
-    const [px, py] = this.pan;
+    const deep = -this.size / DEEP;
     return (a, b, c, out) => {
       const X = a - cx;
       const Y = b - cy;
       const Z = c - cz;
-      out[0] = x + width / 2 + scale * (X * r[0] + Y * r[1] + Z * r[2] - px);
-      out[1] = y + height / 2 - scale * (X * u[0] + Y * u[1] + Z * u[2] - py);
-      out[2] = X * t[0] + Y * t[1] + Z * t[2];
+      const w = 1 / (m[12] * X + m[13] * Y + m[14] * Z + m[15]);
+      out[0] = x + (width / 2) * (1 + w * (m[0] * X + m[1] * Y + m[2] * Z + m[3]));
+      out[1] = y + (height / 2) * (1 - w * (m[4] * X + m[5] * Y + m[6] * Z + m[7]));
+      out[2] = deep * w * (m[8] * X + m[9] * Y + m[10] * Z + m[11]);
       return out;
     };
   }
 
   turn(azimuth, elevation) {
+    if (this.photograph) return; // it was taken from one side
     this.azimuth += azimuth;
     this.elevation = Math.min(90, Math.max(-90, this.elevation + elevation));
   }
@@ -71,10 +150,12 @@ export class Camera {
 
   // Move the picture by pixels of a view of some height.
   shift(dx, dy, view) {
-    const scale = (2 * this.extent(view.width / view.height)) / view.height;
+    const scale = this.photograph ? this.size / view.height : 1 / this.perMeter(view);
     this.pan = [this.pan[0] - dx * scale, this.pan[1] + dy * scale];
   }
 }
+
+const unit = (d) => d.map((value) => value / Math.hypot(...d));
 
 export function cross(a, b) {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -107,7 +188,7 @@ export function steer(canvas, camera, { view, changed, tapped }) {
       if (apart) camera.magnify(gap / apart);
       apart = gap;
       camera.shift(dx / 2, dy / 2, view(...now));
-    } else if (event.shiftKey || event.buttons & 6) camera.shift(dx, dy, view(...now));
+    } else if (event.shiftKey || event.buttons & 6 || camera.photograph) camera.shift(dx, dy, view(...now));
     else camera.turn(-0.4 * dx, 0.4 * dy);
     changed();
   });

@@ -4,11 +4,14 @@ import { number } from "./numbers.js";
 
 const css = (element, name) => getComputedStyle(element).getPropertyValue(name).trim();
 
+const power = (value) => 10 ** Math.floor(Math.log10(value));
+
 export class Chart {
   // curves: { name, color, dash, x, y, stable? }; options: `seek` is told the place that a reader
-  // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic.
-  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, range = null }) {
-    Object.assign(this, { host, curves, free });
+  // points at, `free` says that curves may turn back, `log` that the vertical axis is logarithmic,
+  // and `decades` how many of it are shown at most.
+  constructor(host, { label, xlabel, ylabel, curves, seek, free = false, log = false, decades = null }) {
+    Object.assign(this, { host, curves, free, xlabel, ylabel });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
     const axis = (text, size) => ({
@@ -32,8 +35,8 @@ export class Chart {
       cursor: { show: !free, drag: { x: false, y: false }, points: { size: 6 } },
       legend: { show: false },
       scales: {
-        x: { time: false, ...(range ? { range: () => range } : {}) },
-        y: log ? { distr: 3 } : {},
+        x: { time: false },
+        y: log ? { distr: 3, ...(decades && { range: (_, low, high) => [power(Math.max(low, high * 10 ** -decades)), high * 1.5] }) } : {},
       },
       axes: [axis(xlabel, 30), axis(ylabel, 54)],
       series: [free ? {} : { label: xlabel }, ...series],
@@ -91,9 +94,15 @@ export class Chart {
     return null;
   }
 
-  // Where the moment is: a value along the curves, and the curves' values there.
-  show(x, values = []) {
-    this.now = { x, values };
+  // Curves that are not switched off.
+  get shown() {
+    return this.curves.filter((_, k) => this.plot.series[k + 1].show);
+  }
+
+  // Where the moment is: a value along the curves, and a point (x, y) of each of them.
+  show(x, points = []) {
+    if (x === undefined) return;
+    this.now = { x, points };
     this.plot.redraw(false, false);
   }
 
@@ -104,18 +113,18 @@ export class Chart {
     ctx.setLineDash([]);
     ctx.lineWidth = devicePixelRatio;
     ctx.strokeStyle = css(this.host, "--ink");
-    const across = this.plot.valToPos(this.now.x, "x", true);
     if (!this.free) {
+      const across = this.plot.valToPos(this.now.x, "x", true);
       ctx.beginPath();
       ctx.moveTo(across, bbox.top);
       ctx.lineTo(across, bbox.top + bbox.height);
       ctx.stroke();
     }
-    this.now.values.forEach((value, k) => {
-      if (!Number.isFinite(value)) return;
+    this.now.points.forEach(([x, y], k) => {
+      if (!Number.isFinite(y) || !this.plot.series[k + 1].show) return;
       ctx.fillStyle = this.curves[k].color;
       ctx.beginPath();
-      ctx.arc(across, this.plot.valToPos(value, "y", true), 4.5 * devicePixelRatio, 0, 7);
+      ctx.arc(this.plot.valToPos(x, "x", true), this.plot.valToPos(y, "y", true), 4.5 * devicePixelRatio, 0, 7);
       ctx.fill();
     });
     ctx.restore();
@@ -139,15 +148,24 @@ function aligned(curves) {
   return uPlot.join(curves.map(({ x, y }) => [x, y]), curves.map(() => [2]));
 }
 
-// A row of names with their lines.
-export function keys(curves) {
+// The names of a chart's curves with their lines: buttons that switch them off and on. `hidden` has
+// the keys of those that are off, `number` is the chart's own.
+export function keys({ plot, curves }, hidden, number) {
   const row = document.createElement("p");
   row.className = "keys";
-  for (const { name, color, dash } of curves) {
-    const item = document.createElement("span");
-    item.append(line(color, dash), name);
-    row.append(item);
-  }
+  curves.forEach(({ name, color, dash }, k) => {
+    const key = Object.assign(document.createElement("button"), { type: "button" });
+    const own = (key.dataset.key = `${number} ${name}`);
+    const set = (show) => {
+      key.setAttribute("aria-pressed", show);
+      hidden[show ? "delete" : "add"](own);
+      plot.setSeries(k + 1, { show });
+    };
+    key.append(line(color, dash), name);
+    key.addEventListener("click", () => set(hidden.has(own)));
+    set(!hidden.has(own));
+    row.append(key);
+  });
   return row;
 }
 

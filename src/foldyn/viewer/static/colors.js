@@ -1,6 +1,6 @@
 // Colors of creases, curves and values; the same as in figures (foldyn.plots.style).
 
-export const KINDS = [
+export const KINDS = [ // in the order of sheet.KINDS; bars are the page's own
   { name: "mountain crease", light: "#d55e00", dark: "#f0803c", width: 2.4, dash: [] },
   { name: "valley crease", light: "#0072b2", dark: "#4fb0e8", width: 2.4, dash: [7, 3.5] },
   { name: "flat crease", light: "#767676", dark: "#9a9a9a", width: 1.8, dash: [2, 2.5] },
@@ -29,7 +29,7 @@ export const LOOKS = {
   },
 };
 
-const STOPS = {
+export const STOPS = {
   sequential: ["#fdf6e3", "#f6dca0", "#f2b95f", "#e58c3c", "#cc5d38", "#a3363f", "#6f1d44", "#3a0f3a"],
   diverging: ["#053f73", "#2a78b5", "#7fb5db", "#cfe3f0", "#f7f4ee", "#f7cfae", "#e8945a", "#c4501a", "#7d2a05"],
 };

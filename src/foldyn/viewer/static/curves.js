@@ -3,8 +3,17 @@
 // Value of a curve over the samples of a result at a moment.
 export function at(result, values, moment) {
   const [k, part] = result.place(moment);
-  return values[k] + part * (values[Math.min(k + 1, values.length - 1)] - values[k]);
+  return between(values, k + part);
 }
+
+// Value at a place between samples, such as 3.5.
+export function between(values, place) {
+  const k = Math.min(Math.floor(place), values.length - 1);
+  return values[k] + (place - k) * (values[Math.min(k + 1, values.length - 1)] - values[k]);
+}
+
+// The largest size of values.
+export const greatest = (values) => values.reduce((top, value) => Math.max(top, Math.abs(value)), 0);
 
 export function evenly(moments) {
   const dt = (moments.at(-1) - moments[0]) / (moments.length - 1);
@@ -13,7 +22,7 @@ export function evenly(moments) {
 
 // Where a spectrum has fallen to a hundredth of its largest for good.
 export function lastOfInterest({ x, y }) {
-  const top = y.reduce((a, b) => Math.max(a, b), 0);
+  const top = greatest(y);
   let k = y.length - 1;
   while (k > 8 && y[k] < 0.01 * top) k--;
   return 1.15 * x[k];

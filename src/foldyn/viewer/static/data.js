@@ -13,8 +13,11 @@ export function bytesOf(base64) {
 }
 
 export async function inflated(bytes) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
+  const stream = new DecompressionStream("deflate-raw");
+  const writer = stream.writable.getWriter();
+  const done = writer.write(bytes).then(() => writer.close());
+  const [content] = await Promise.all([new Response(stream.readable).arrayBuffer(), done]);
+  return new Uint8Array(content);
 }
 
 // Values of an array, row by row, from its inflated bytes.
@@ -131,14 +134,30 @@ class Product extends Changing {
     Object.assign(this, { histories, shapes, sizes });
   }
 
+  between(k, part, out) {
+    const next = Math.min(k + 1, this.samples - 1);
+    const { histories, sizes } = this;
+    const count = sizes.length;
+    out.fill(0, 0, this.width);
+    for (let r = 0; r < count; r++) {
+      const weight = (1 - part) * histories[k * count + r] + part * histories[next * count + r];
+      this.add(r, sizes[r] * weight, out);
+    }
+    return out;
+  }
+
   row(k, factor, out, add) {
-    const { histories, shapes, sizes, width } = this;
+    const { histories, sizes, width } = this;
     if (!add) out.fill(0, 0, width);
     for (let r = 0; r < sizes.length; r++) {
-      const f = factor * sizes[r] * histories[k * sizes.length + r];
-      if (f === 0) continue;
-      for (let j = 0, at = r * width; j < width; j++, at++) out[j] += f * shapes[at];
+      this.add(r, factor * sizes[r] * histories[k * sizes.length + r], out);
     }
+  }
+
+  add(r, factor, out) {
+    if (factor === 0) return;
+    const { shapes, width } = this;
+    for (let j = 0, at = r * width; j < width; j++, at++) out[j] += factor * shapes[at];
   }
 
   history(j) {

@@ -7,32 +7,28 @@ const ROW = 1024; // texels
 const COMMON = `#version 300 es
 precision highp float; precision highp int; precision highp sampler2D;
 uniform sampler2D nodes, levels;
-uniform vec3 right, up, toward, center;
-uniform vec3 scale;  // clip units per meter to the right, up and in depth
-uniform vec2 pan;
+uniform vec3 center;
+uniform mat4 projection;  // of positions relative to the center
 vec4 node(uint k) { return texelFetch(nodes, ivec2(k % ${ROW}u, k / ${ROW}u), 0); }
 float levelOf(uint k) { return texelFetch(levels, ivec2(k % ${ROW}u, k / ${ROW}u), 0).r; }
-vec4 seen(vec3 p) {
-  p -= center;
-  vec3 s = vec3(dot(p, right) - pan.x, dot(p, up) - pan.y, -dot(p, toward));
-  return vec4(s * scale, 1.0);
-}`;
+vec4 seen(vec3 p) { return projection * vec4(p - center, 1.0); }`;
 
 const PANEL_VERTEX = `${COMMON}
 layout(location = 0) in uint corner;
 layout(location = 1) in uint panel;
 uniform int on;  // 0 paper, 1 levels of nodes, 2 of panels
-out vec3 place; out float level;
+out vec3 place; out float level; flat out float whole;
 void main() {
   vec4 p = node(corner);
   place = p.xyz;
-  level = on == 1 ? p.w : on == 2 ? levelOf(panel) : 0.0;
+  level = p.w;
+  whole = on == 2 ? levelOf(panel) : 0.0;  // of the triangles whose last corner this is
   gl_Position = seen(p.xyz);
 }`;
 
 const PANEL_FRAGMENT = `#version 300 es
 precision highp float; precision highp int;
-in vec3 place; in float level; out vec4 color;
+in vec3 place; in float level; flat in float whole; out vec4 color;
 uniform int on; uniform vec3 front, back, light, toward; uniform float alpha;
 uniform sampler2D colormap;
 void main() {
@@ -40,36 +36,38 @@ void main() {
   float bright = 0.62 + 0.32 * abs(dot(normal, light)) + 0.1 * abs(dot(normal, toward));
   vec3 base = gl_FrontFacing ? front : back;
   if (on > 0) {
-    base = texture(colormap, vec2(clamp(level, 0.0, 1.0) * 0.996 + 0.002, 0.5)).rgb;
+    float own = on == 2 ? whole : level;
+    base = texture(colormap, vec2(clamp(own, 0.0, 1.0) * 0.996 + 0.002, 0.5)).rgb;
     bright = 0.4 + 0.6 * bright;
   }
   color = vec4(base * bright, alpha);
 }`;
 
 const LINE_VERTEX = `${COMMON}
-layout(location = 0) in uvec2 ends;
+layout(location = 0) in uvec2 ends;  // the same at the four corners of a line
 layout(location = 1) in uint kind;
 layout(location = 2) in vec2 along;
 layout(location = 3) in uint element;
 uniform vec2 pixels;  // half the view
-uniform float widths[6]; uniform bool told; uniform float nearer;
+uniform float widths[6], fine; uniform bool told; uniform float nearer;
 flat out uint k; flat out float level, width; out float s, across;
 void main() {
-  float t = float(gl_VertexID & 1), side = float(gl_VertexID >> 1) * 2.0 - 1.0;
+  float t = float(gl_VertexID & 1), side = float(gl_VertexID >> 1 & 1) * 2.0 - 1.0;
   vec4 a = seen(node(ends.x).xyz), b = seen(node(ends.y).xyz);
-  vec2 d = (b.xy - a.xy) * pixels;
+  vec2 d = (b.xy / b.w - a.xy / a.w) * pixels;
   float l = length(d);
   d = l > 1e-4 ? d / l : vec2(1.0, 0.0);
   k = kind;
   level = told && kind != ${BOUNDARY}u ? levelOf(element) : -1.0;
   width = widths[kind];
-  if (level >= 0.0) width = max(width, 1.5 + 4.0 * abs(level - 0.5) * width);
+  if (level >= 0.0) width = max(width, (1.5 + 4.0 * abs(level - 0.5) * width) * fine);
   float reach = 0.5 * width + 0.7;
   across = side * reach;
   s = mix(along.x, along.y, t);
   gl_Position = mix(a, b, t);
-  gl_Position.xy += (vec2(-d.y, d.x) * across + d * (2.0 * t - 1.0) * 0.3 * width) / pixels;
-  gl_Position.z -= nearer;
+  vec2 aside = vec2(-d.y, d.x) * across + d * (2.0 * t - 1.0) * 0.3 * width;
+  gl_Position.xy += aside / pixels * gl_Position.w;
+  gl_Position.z -= nearer * gl_Position.w;
 }`;
 
 const LINE_FRAGMENT = `#version 300 es
@@ -89,6 +87,37 @@ void main() {
   color = vec4(tone, alpha * cover);
 }`;
 
+const HALVES = [0, 1, 2, 2, 1, 3]; // corners of the two triangles of a line
+
+// Rows of some size, each four times.
+function fourfold(array, size) {
+  const out = new array.constructor(4 * array.length);
+  for (let k = 0; k < out.length; k++) out[k] = array[size * Math.floor(k / (4 * size)) + (k % size)];
+  return out;
+}
+
+// Triangles whose last corner says which panel they belong to: a node of this panel alone, or one
+// more that lies where a node does. Corners are as few as can be: software transforms each of them.
+function cornered({ triangles, panel, count }) {
+  const owner = new Int32Array(count).fill(-1);
+  triangles.forEach((node, k) => {
+    const own = panel[Math.floor(k / 3)];
+    owner[node] = owner[node] === -1 || owner[node] === own ? own : -2;
+  });
+  const corner = Array.from(owner, (_, k) => k);
+  const panels = Array.from(owner, (own) => Math.max(own, 0));
+  const out = new Uint32Array(triangles.length);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const own = [0, 1, 2].find((k) => owner[triangles[t + k]] >= 0);
+    for (let k = 0; k < 3; k++) out[t + k] = triangles[t + ((k + (own ?? 2) + 1) % 3)];
+    if (own !== undefined) continue;
+    corner.push(out[t + 2]);
+    panels.push(panel[t / 3]);
+    out[t + 2] = corner.length - 1;
+  }
+  return { corner: Uint32Array.from(corner), panel: Uint32Array.from(panels), triangles: out };
+}
+
 const unit = (hex) => rgb(hex).map((value) => value / 255);
 const solid = ({ dash }) => {
   const total = dash.reduce((a, b) => a + b, 0);
@@ -96,11 +125,17 @@ const solid = ({ dash }) => {
 };
 const DRAWN = KINDS.map(solid); // part of a dashed line that is drawn
 
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 export class GLPainter {
-  constructor(canvas) {
+  // Without a graphics processor the canvas painter is several times as fast, unless `anyhow`.
+  constructor(canvas, anyhow) {
     const gl = canvas.getContext("webgl2", { antialias: true });
     if (!gl) throw new Error("the browser has no WebGL2");
+    const told = gl.getExtension("WEBGL_debug_renderer_info");
+    if (!anyhow && SOFTWARE.test(gl.getParameter(told?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER))) {
+      throw new Error("WebGL2 is drawn by software");
+    }
     this.gl = gl;
     this.canvas = canvas;
     this.panels = this.program(PANEL_VERTEX, PANEL_FRAGMENT);
@@ -155,16 +190,18 @@ export class GLPainter {
   sheet(sheet) {
     const { gl } = this;
     const buffers = [];
-    const filled = (location, array, size, divisor) => {
+    const stored = (target, array) => {
       const buffer = gl.createBuffer();
       buffers.push(buffer);
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.bufferData(gl.ARRAY_BUFFER, array, gl.STATIC_DRAW);
+      gl.bindBuffer(target, buffer);
+      gl.bufferData(target, array, gl.STATIC_DRAW);
+    };
+    const filled = (location, array, size) => {
+      stored(gl.ARRAY_BUFFER, array);
       gl.enableVertexAttribArray(location);
       if (array instanceof Float32Array) {
         gl.vertexAttribPointer(location, size, gl.FLOAT, false, 0, 0);
       } else gl.vertexAttribIPointer(location, size, gl.UNSIGNED_INT, 0, 0);
-      gl.vertexAttribDivisor(location, divisor);
     };
     const arrays = (fill) => {
       const vao = gl.createVertexArray();
@@ -172,26 +209,31 @@ export class GLPainter {
       fill();
       return vao;
     };
+    // four corners each: instances of a few corners are slow in software
     const lines = (ends, kind, along, element) => ({
       vao: arrays(() => {
-        filled(0, ends, 2, 1);
-        filled(1, kind, 1, 1);
-        filled(2, along, 2, 1);
-        filled(3, element, 1, 1);
+        filled(0, fourfold(ends, 2), 2);
+        filled(1, fourfold(kind, 1), 1);
+        filled(2, fourfold(along, 2), 2);
+        filled(3, fourfold(element, 1), 1);
+        const corners = Uint32Array.from({ length: 3 * ends.length }, (_, k) => 4 * Math.floor(k / 6) + HALVES[k % 6]);
+        stored(gl.ELEMENT_ARRAY_BUFFER, corners);
       }),
       count: ends.length / 2,
     });
-    const panel = Uint32Array.from(sheet.triangles, (_, k) => sheet.panel[Math.floor(k / 3)]);
+    const { corner, panel, triangles } = cornered(sheet);
     const made = {
       panels: {
         vao: arrays(() => {
-          filled(0, sheet.triangles, 1, 0);
-          filled(1, panel, 1, 0);
+          filled(0, corner, 1);
+          filled(1, panel, 1);
+          stored(gl.ELEMENT_ARRAY_BUFFER, triangles);
         }),
-        count: sheet.triangles.length,
+        count: triangles.length,
       },
       edges: lines(sheet.edges, Uint32Array.from(sheet.kind), sheet.along, sheet.crease),
     };
+    made.inner = sheet.inner;
     if (sheet.bars) {
       const count = sheet.bars.length / 2;
       const numbers = Uint32Array.from({ length: count }, (_, k) => k);
@@ -208,12 +250,13 @@ export class GLPainter {
     return made;
   }
 
-  begin(background) {
+  begin() {
     const { gl, canvas } = this;
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(...unit(background), 1);
+    gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
@@ -227,17 +270,12 @@ export class GLPainter {
     if (shown && shown.on !== "node") this.fill("levels", this.rowed(shown.levels), 1);
     const height = view.height * dpr;
     gl.viewport(view.x * dpr, this.canvas.height - view.y * dpr - height, view.width * dpr, height);
-    const [right, up, toward] = camera.basis;
-    const half = camera.extent(view.width / view.height);
-    const light = [0, 1, 2].map((k) => -0.35 * right[k] + 0.62 * up[k] + 0.7 * toward[k]);
+    const [, , toward] = camera.basis;
+    const projection = camera.matrix(view);
     const use = ({ program, at }) => {
       gl.useProgram(program);
-      gl.uniform3fv(at.right, right);
-      gl.uniform3fv(at.up, up);
-      gl.uniform3fv(at.toward, toward);
       gl.uniform3fv(at.center, camera.center);
-      gl.uniform3f(at.scale, view.height / view.width / half, 1 / half, 0.25 / camera.size);
-      gl.uniform2fv(at.pan, camera.pan);
+      gl.uniformMatrix4fv(at.projection, true, projection);
       const map = this.maps[look.map ?? "sequential"];
       const textures = [["nodes", this.scratch.nodes], ["levels", this.scratch.levels], ["colormap", map]];
       textures.forEach(([name, texture], k) => {
@@ -250,17 +288,24 @@ export class GLPainter {
 
     let at = use(this.panels);
     gl.uniform1i(at.on, shown ? { node: 1, panel: 2 }[shown.on] ?? 0 : 0);
-    gl.uniform3fv(at.light, light);
+    gl.uniform3fv(at.light, camera.light);
+    gl.uniform3fv(at.toward, toward);
     gl.uniform3fv(at.front, unit(look.front));
     gl.uniform3fv(at.back, unit(look.back));
     gl.uniform1f(at.alpha, look.alpha);
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1.5, 2);
-    if (look.alpha < 1) gl.enable(gl.BLEND);
-    else gl.disable(gl.BLEND);
-    gl.depthMask(look.alpha >= 1);
     gl.bindVertexArray(made.panels.vao);
-    gl.drawArrays(gl.TRIANGLES, 0, made.panels.count);
+    const panels = () => gl.drawElements(gl.TRIANGLES, made.panels.count, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.BLEND);
+    if (look.alpha < 1) { // of see-through sheets only what is in front, each sheet for itself
+      gl.clear(gl.DEPTH_BUFFER_BIT);
+      gl.colorMask(false, false, false, false);
+      panels();
+      gl.colorMask(true, true, true, true);
+      gl.enable(gl.BLEND);
+    }
+    panels();
     gl.disable(gl.POLYGON_OFFSET_FILL);
 
     at = use(this.lines);
@@ -270,22 +315,26 @@ export class GLPainter {
     gl.uniform1fv(at.widths, look.kinds.map((kind) => kind.width));
     gl.uniform3fv(at.colors, look.kinds.flatMap((kind) => unit(kind.color)));
     gl.uniform1fv(at.drawn, DRAWN);
+    gl.uniform1f(at.fine, look.fine);
     gl.uniform1f(at.period, look.period);
     gl.uniform1f(at.nearer, 1e-4);
-    const lines = (part, told) => {
+    const lines = (part, told, first, end, opacity) => {
+      if (opacity === 0 || first === end) return;
       gl.bindVertexArray(part.vao);
       gl.uniform1i(at.told, told ? 1 : 0);
-      for (const [visible, alpha] of look.ghost ? [[true, 1]] : [[false, HIDDEN], [true, 1]]) {
+      for (const [visible, alpha] of look.faint ? [[false, HIDDEN], [true, 1]] : [[true, 1]]) {
         if (visible) gl.enable(gl.DEPTH_TEST);
         else gl.disable(gl.DEPTH_TEST); // what is hidden shines through, faintly
-        gl.uniform1f(at.alpha, alpha * look.lines);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
+        gl.uniform1f(at.alpha, alpha * opacity);
+        gl.drawElements(gl.TRIANGLES, 6 * (end - first), gl.UNSIGNED_INT, 24 * first);
       }
       gl.enable(gl.DEPTH_TEST);
     };
-    if (made.bars && shown?.on === "bar") lines(made.bars, true);
-    lines(made.edges, shown?.on === "crease");
+    if (made.bars && shown?.on === "bar") lines(made.bars, true, 0, made.bars.count, 1);
+    lines(made.edges, shown?.on === "crease", 0, made.inner, look.lines);
+    lines(made.edges, false, made.inner, made.edges.count, 1);
     gl.depthMask(true);
+    if (look.ghost) gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.bindVertexArray(null);
   }
 
@@ -293,9 +342,11 @@ export class GLPainter {
   placed(positions, levels) {
     const count = positions.length / 3;
     const out = this.room("nodes", 4 * ROW * Math.ceil(count / ROW));
-    for (let k = 0; k < count; k++) {
-      out.set(positions.subarray(3 * k, 3 * k + 3), 4 * k);
-      out[4 * k + 3] = levels ? levels[k] : 0;
+    for (let k = 0, from = 0, to = 0; k < count; k++, from += 3, to += 4) {
+      out[to] = positions[from];
+      out[to + 1] = positions[from + 1];
+      out[to + 2] = positions[from + 2];
+      out[to + 3] = levels ? levels[k] : 0;
     }
     return out;
   }

@@ -1,14 +1,19 @@
 // The interactive part of a page: what is shown, what plays, and what its reader chooses.
-import { CURVES, DASHES, KINDS, gradient } from "./colors.js";
-import { line } from "./charts.js";
-import { Store } from "./data.js";
 import { ANALYSES } from "./analyses.js";
-import { number, readable, titled } from "./numbers.js";
+import { CURVES, DASHES, LOOKS } from "./colors.js";
+import { Store } from "./data.js";
+import { savePicture, saveTable, saveVector } from "./files.js";
+import { Legend } from "./legend.js";
+import { number } from "./numbers.js";
 import { Result, loadedSheet } from "./result.js";
+import { Shape } from "./shape.js";
 import { View } from "./view.js";
+
+const SHOWN = { ...ANALYSES, shape: Shape };
 
 const MARKUP = `
 <div class="stage">
+  <canvas class="under"></canvas>
   <canvas class="sheet"></canvas>
   <canvas class="over" tabindex="0" role="img"></canvas>
   <p class="hint" aria-hidden="true"></p>
@@ -31,12 +36,14 @@ const MARKUP = `
   </select></label>
   <label><input class="ghost" type="checkbox" checked> rest shape</label>
   <label><input class="marks" type="checkbox" checked> supports and loads</label>
+  <label class="photographed"><input class="photograph" type="checkbox" checked> photograph</label>
   <fieldset class="which"><legend>Results</legend></fieldset>
   <span class="buttons">
     <button type="button" class="home">Reset view</button>
     <button type="button" class="theme">Dark</button>
-    <button type="button" class="save-picture">Picture (PNG)</button>
-    <button type="button" class="save-curves">Curves (CSV)</button>
+    <button type="button" class="save-picture" title="picture of the sheet as shown">PNG</button>
+    <button type="button" class="save-vector" title="picture of the sheet as vectors">SVG</button>
+    <button type="button" class="save-curves" title="the curves of the charts">CSV</button>
   </span>
 </div>
 <p class="status" role="status"></p>`;
@@ -45,7 +52,7 @@ export class Page {
   constructor(root, about, find) {
     Object.assign(this, { root, about, store: new Store(about.arrays, find) });
     root.innerHTML = MARKUP;
-    this.plain = about.plain || new URLSearchParams(location.search).has("plain");
+    this.asked = new URLSearchParams(location.search);
     this.analysis = new ANALYSES[about.kind](this);
     this.node = about.node ?? null;
     this.crease = null;
@@ -65,15 +72,51 @@ export class Page {
     return this.root.querySelector(`.${name}`);
   }
 
-  async start() {
+  async load() {
     const { about, store } = this;
     const sheets = {};
     for (const [key, sheet] of Object.entries(about.sheets)) sheets[key] = await loadedSheet(sheet, store);
-    this.results = await Promise.all(
+    const results = await Promise.all(
       about.results.map((each) => Result.load(each, sheets[each.sheet], store)),
     );
+    this.pictures = await Promise.all((about.backdrop?.pictures ?? []).map(loadedPicture));
+    this.camera.photograph = about.backdrop ?? null;
     const most = this.analysis.most;
-    this.results.forEach((result, index) => Object.assign(result, { index, chosen: index < most }));
+    results.forEach((result, index) => {
+      const before = this.results?.[index];
+      Object.assign(result, { index, chosen: before ? before.chosen : index < most });
+    });
+    this.results = results;
+  }
+
+  // Show other results of the same kind in place of these: view, moment and choices stay.
+  async replace(about, find) {
+    Object.assign(this, { about, store: new Store(about.arrays, find) });
+    await this.load();
+    const { moment, analysis: { speed } } = this;
+    this.analysis = new ANALYSES[about.kind](this);
+    this.analysis.prepare();
+    const [low, high] = this.analysis.range;
+    this.moment = Math.min(high, Math.max(low, moment));
+    this.analysis.speed = speed;
+    const { vertices, creases } = this.results[0].sheet;
+    if (this.node >= vertices) this.node = null;
+    if (this.crease >= creases.length) this.crease = null;
+    const box = this.analysis.box(this.results);
+    if (!this.camera.holds(...box)) this.camera.fit(...box);
+    this.view.forget();
+    this.waiting = true; // one picture is enough
+    this.list();
+    this.restyle();
+    this.recolor();
+    this.charts();
+    this.waiting = false;
+    if (this.playing) this.redraw();
+    else this.say();
+  }
+
+  async start() {
+    await this.load();
     this.analysis.prepare();
     this.moment ??= this.analysis.range[0];
     this.camera.fit(...this.analysis.box(this.results));
@@ -81,14 +124,21 @@ export class Page {
     this.restyle();
     this.recolor();
     this.ready = true;
-    new ResizeObserver(() => this.resize()).observe(this.root);
+    new ResizeObserver(() => this.ready && this.resize()).observe(this.root);
     this.resize();
     this.charts();
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.say();
-    if (!still) this.play(true);
+    if (!still && this.analysis.moves) this.play(true);
     this.root.dataset.ready = "1";
     this.root.dataset.painter = this.view.kind;
+  }
+
+  // Give back what a page holds that is shown no more.
+  close() {
+    this.play(false);
+    this.ready = false;
+    this.view.close();
   }
 
   get shown() {
@@ -102,6 +152,12 @@ export class Page {
 
   caption(result) {
     return this.analysis.caption(result);
+  }
+
+  // The last photograph that is not after the moment, or else the first.
+  photograph() {
+    const before = this.pictures.filter(({ moment }) => moment <= this.moment);
+    return (before.at(-1) ?? this.pictures[0]).image;
   }
 
   // ---------------------------------------------------------------- controls
@@ -119,14 +175,11 @@ export class Page {
     this.$("scaled").textContent = number(this.scale, 2);
     this.$("layouts").hidden = this.results.length < 2 || !this.analysis.overlays;
     this.$("which").hidden = this.results.length < 2 || !this.analysis.curves;
-    this.$("direction").hidden = this.$("save-curves").hidden = !this.analysis.histories;
-    this.$("ghost").checked = this.ghost = this.results[0].sheet.edges.length < 20000;
-    for (const result of this.results) {
-      const label = document.createElement("label");
-      result.key = document.createElement("i");
-      label.append(this.check(result), result.key, this.caption(result));
-      this.$("which").append(label);
-    }
+    this.$("direction").hidden = this.$("save-curves").hidden = !this.analysis.curves;
+    this.$("play").hidden = !this.analysis.moves;
+    for (const name of ["field", "ghost", "scale"]) this.$(name).parentElement.hidden = !this.analysis.moves;
+    this.$("ghost").checked = this.ghost = !this.about.backdrop && this.results[0].sheet.edges.length < 20000;
+    this.list();
     on("toggle", "click", () => this.play());
     on("scrub", "input", () => this.seek(this.analysis.at(this.$("scrub").value / 1000)));
     on("speed", "change", () => (this.analysis.speed = Number(this.$("speed").value)));
@@ -148,6 +201,13 @@ export class Page {
       this.axis = Number(this.$("axis").value);
       this.charts();
     });
+    this.$("photographed").hidden = !this.about.backdrop;
+    this.$("hint").hidden = Boolean(this.about.backdrop);
+    on("photograph", "change", () => {
+      this.camera.photograph = this.$("photograph").checked ? this.about.backdrop : null;
+      this.$("hint").hidden = this.$("photograph").checked;
+      this.$("home").click();
+    });
     for (const name of ["ghost", "marks"]) {
       on(name, "change", () => {
         this[name] = this.$(name).checked;
@@ -164,13 +224,29 @@ export class Page {
       this.recolor();
       this.charts();
     });
-    on("save-picture", "click", () => this.savePicture());
-    on("save-curves", "click", () => this.saveTable());
+    const saved = { "save-picture": savePicture, "save-vector": saveVector, "save-curves": saveTable };
+    for (const [name, save] of Object.entries(saved)) {
+      on(name, "click", () => {
+        this.draw(); // a picture that is not shown may be gone
+        save(this);
+      });
+    }
     this.root.addEventListener("keydown", (event) => this.key(event));
     const coarse = matchMedia("(pointer: coarse)").matches;
     this.$("hint").textContent = coarse
       ? "drag to turn, pinch to zoom, tap a node or crease"
       : "drag to turn, click and scroll to zoom, click a node or crease";
+  }
+
+  // The results with boxes to choose among them.
+  list() {
+    const labels = this.results.map((result) => {
+      const label = document.createElement("label");
+      result.key = document.createElement("i");
+      label.append(this.check(result), result.key, this.caption(result));
+      return label;
+    });
+    this.$("which").replaceChildren(this.$("which").firstElementChild, ...labels);
   }
 
   // A box to show a result or not.
@@ -184,6 +260,14 @@ export class Page {
     return check;
   }
 
+  // Show those of the results that suit.
+  choose(suits) {
+    for (const result of this.results) result.chosen = suits(result);
+    this.recolor();
+    this.charts();
+    if (!this.playing) this.say();
+  }
+
   key(event) {
     const { target } = event;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -194,6 +278,7 @@ export class Page {
       ArrowRight: () => this.nudge(step), ArrowLeft: () => this.nudge(-step),
       Home: () => this.nudge(-1), End: () => this.nudge(1),
       n: () => this.pickNode(((this.node ?? -1) + 1) % this.results[0].sheet.vertices),
+      c: () => this.pickCrease(((this.crease ?? -1) + 1) % (this.results[0].sheet.creases.length || 1)),
       r: () => this.$("home").click(),
     }[event.key];
     if (!act || act() === true) return;
@@ -208,6 +293,7 @@ export class Page {
   }
 
   pickCrease(crease) {
+    if (!this.results.every(({ fields }) => fields.turn)) return;
     Object.assign(this, { crease, node: null });
     this.charts();
     if (!this.playing) this.say();
@@ -219,40 +305,12 @@ export class Page {
     const field = this.shown.map((result) => result.fields[key]).find(Boolean);
     this.map = field?.signed ? "diverging" : "sequential";
     const own = { displacement: { label: "displacement", unit: "m" }, speed: { label: "speed", unit: "m/s" } };
-    const about = own[key] ?? field;
-    this.legend(about);
+    this.legend = new Legend({
+      about: own[key] ?? field, top: this.top, map: this.map, theme: this.theme, ink: LOOKS[this.theme].ink,
+      kinds: [...new Set(this.results.flatMap(({ sheet }) => [...new Set(sheet.kind)]))].sort(),
+    });
+    this.legend.show(this.$("legend"));
     this.redraw();
-  }
-
-  legend(about) {
-    const host = this.$("legend");
-    host.replaceChildren();
-    if (about) {
-      const [factor, unit] = readable(this.top, about.unit);
-      const low = about.signed ? -this.top : 0;
-      const ramp = document.createElement("div");
-      ramp.className = "ramp";
-      const bar = document.createElement("i");
-      bar.style.background = gradient(this.map);
-      const title = document.createElement("b");
-      title.textContent = titled(about.label, unit);
-      const ticks = [low, (low + this.top) / 2, this.top].map((value) => {
-        const tick = document.createElement("span");
-        tick.textContent = number(value * factor);
-        return tick;
-      });
-      ramp.append(title, bar, ...ticks);
-      host.append(ramp);
-    }
-    const row = document.createElement("p");
-    row.className = "keys";
-    const kinds = new Set(this.results.flatMap((result) => [...new Set(result.sheet.kind)]));
-    for (const kind of [...kinds].sort()) {
-      const item = document.createElement("span");
-      item.append(line(KINDS[kind][this.theme], KINDS[kind].dash), KINDS[kind].name);
-      row.append(item);
-    }
-    host.append(row);
   }
 
   restyle() {
@@ -272,8 +330,10 @@ export class Page {
     if (!this.ready) return;
     (this.plots ?? []).forEach((plot) => plot.remove());
     const host = this.$("charts");
+    const { key } = host.contains(document.activeElement) ? document.activeElement.dataset : {};
     host.replaceChildren();
-    this.plots = this.analysis.charts(host) ?? [];
+    this.plots = this.analysis.charts(host);
+    if (key) host.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus();
     this.redraw();
   }
 
@@ -307,7 +367,7 @@ export class Page {
     requestAnimationFrame((now) => {
       this.waiting = false;
       if (this.playing) {
-        this.analysis.advance(Math.min(0.1, (now - this.last) / 1000));
+        this.analysis.advance(Math.min(0.1, Math.max(0, (now - this.last) / 1000))); // frames may begin before
         this.last = now;
       }
       this.draw();
@@ -342,7 +402,7 @@ export class Page {
     const words = this.analysis.words();
     this.$("status").textContent = words;
     const label = `${this.about.title}: three-dimensional view. ${words} Arrow keys turn it, plus and `
-      + "minus zoom, n goes to the next node.";
+      + "minus zoom, n goes to the next node, c to the next crease.";
     this.view.over.setAttribute("aria-label", label);
   }
 
@@ -351,28 +411,12 @@ export class Page {
     this.plots?.forEach((plot) => plot.resize());
     this.draw();
   }
-
-  // ---------------------------------------------------------------- files
-  savePicture() {
-    this.draw();
-    const { canvas, over } = this.view;
-    const both = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
-    const context = both.getContext("2d");
-    context.drawImage(canvas, 0, 0);
-    context.drawImage(over, 0, 0);
-    both.toBlob((blob) => download(blob, "foldyn.png"));
-  }
-
-  saveTable() {
-    const rows = this.analysis.table().map((row) => row.join(","));
-    download(new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }), "foldyn.csv");
-  }
 }
 
-function download(blob, name) {
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+async function loadedPicture([moment, address]) {
+  const image = Object.assign(new Image(), { src: address });
+  await image.decode();
+  return { moment, image };
 }
 
 // Start all interactive parts of the document.

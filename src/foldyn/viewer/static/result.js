@@ -1,5 +1,7 @@
 // Results as the page shows them: where the nodes of a sheet are at a moment, and what colors it.
 
+import { BOUNDARY } from "./colors.js";
+
 const SHEET_ARRAYS = ["nodes", "triangles", "panel", "edges", "kind", "crease", "along", "bars"];
 
 export async function loadedSheet(about, store) {
@@ -11,6 +13,9 @@ export async function loadedSheet(about, store) {
   sheet.count = sheet.nodes.length / 3;
   sheet.box = [0, 1, 2].map((d) => extremes(sheet.nodes, d));
   sheet.size = Math.hypot(...sheet.box.map(([low, high]) => high - low)) || 1;
+  sheet.edge = meanLength(sheet);
+  sheet.inner = sheet.kind.indexOf(BOUNDARY); // the boundary comes last
+  if (sheet.inner < 0) sheet.inner = sheet.kind.length;
   return sheet;
 }
 
@@ -129,6 +134,17 @@ export class Result {
   history(node, axis, imaginary = false) {
     return this.displacement.history((imaginary ? 3 * this.sheet.count : 0) + 3 * node + axis);
   }
+}
+
+// Mean length of the pattern's edges, each of one piece or more.
+function meanLength({ along, crease }) {
+  let total = 0;
+  let count = 0;
+  for (let k = 0; k < crease.length; k++) {
+    total += along[2 * k + 1] - along[2 * k];
+    if (along[2 * k] === 0) count++;
+  }
+  return total / count || 1;
 }
 
 // Least and greatest coordinate along an axis.

@@ -1,13 +1,17 @@
 // The sheets in three dimensions, side by side or overlaid, and what is written over them.
+import { annotate } from "./annotations.js";
 import { Camera, steer } from "./camera.js";
 import { CURVES, KINDS, LOOKS } from "./colors.js";
 import { GLPainter } from "./gl.js";
-import { number, readable } from "./numbers.js";
 import { CanvasPainter } from "./painter.js";
 
 const NEAR = 28; // pixels around a node in which it is taken
 const DASH = 10.5; // pixels, of a dash and its gap
-const MOST_WORDS = 60; // supports and arrows in all views, beyond which they are left out
+const PLAIN = 26; // pixels of an edge, below which lines are finer
+const FAINT = 10; // below which they grow faint,
+const GONE = 4; // and below which they are not drawn, unless they show values
+const MANY = 40000; // ends of edges, beyond which what is hidden does not shine through
+const SEE_THROUGH = 0.3; // opacity of panels over a photograph
 
 export class View {
   // page: gives `results` shown, their `levels`, `node`, `look`; is told `pick(node)` and `redraw()`
@@ -16,9 +20,10 @@ export class View {
     this.canvas = stage.querySelector(".sheet");
     this.over = stage.querySelector(".over");
     this.context = this.over.getContext("2d");
+    this.under = stage.querySelector(".under").getContext("2d");
     try {
-      if (page.plain) throw new Error("asked to do without");
-      this.painter = new GLPainter(this.canvas);
+      if (page.asked.has("plain")) throw new Error("asked to do without");
+      this.painter = new GLPainter(this.canvas, page.asked.has("webgl"));
       this.canvas.addEventListener("webglcontextlost", () => this.withoutGL());
     } catch {
       this.withoutGL();
@@ -45,11 +50,15 @@ export class View {
     if (this.page.ready) this.resize();
   }
 
+  get size() {
+    return { width: this.stage.clientWidth, height: this.stage.clientHeight };
+  }
+
   // Rectangles of the stage, each with the results drawn in it.
   views() {
-    const { page, stage } = this;
-    const shown = page.shown;
-    const [width, height] = [stage.clientWidth, stage.clientHeight];
+    const { page } = this;
+    const { shown } = page;
+    const { width, height } = this.size;
     if (page.layout === "over" || shown.length < 2) {
       return [{ x: 0, y: 0, width, height, results: shown }];
     }
@@ -69,9 +78,9 @@ export class View {
 
   resize() {
     this.dpr = Math.min(2, devicePixelRatio || 1);
-    for (const canvas of [this.canvas, this.over]) {
-      canvas.width = Math.round(this.stage.clientWidth * this.dpr);
-      canvas.height = Math.round(this.stage.clientHeight * this.dpr);
+    for (const canvas of [this.under.canvas, this.canvas, this.over]) {
+      canvas.width = Math.round(this.size.width * this.dpr);
+      canvas.height = Math.round(this.size.height * this.dpr);
     }
   }
 
@@ -80,177 +89,78 @@ export class View {
     return this.made.get(sheet);
   }
 
-  draw() {
-    const { page, painter, camera, dpr } = this;
-    const tones = LOOKS[page.theme];
-    painter.begin(tones.background, dpr);
-    const kinds = KINDS.map((kind) => ({ width: kind.width, color: kind[page.theme] }));
-    const thin = kinds.map((kind) => ({ width: 1, color: tones.ghost }));
-    const { context } = this;
-    context.setTransform(dpr, 0, 0, dpr, 0, 0);
-    context.clearRect(0, 0, this.over.width, this.over.height);
-    const views = this.views();
-    for (const view of views) {
-      const overlaid = view.results.length > 1;
-      const look = {
-        dpr, front: tones.front, back: tones.back, alpha: 1, lines: 1, kinds, ghost: false,
-        map: page.map,
-        period: (DASH * camera.extent(view.width / view.height)) / (view.height / 2),
-      };
-      const ghost = { ...look, front: tones.ghost, back: tones.ghost, alpha: 0.28, kinds: thin, ghost: true };
-      if (page.ghost) {
-        const { sheet } = view.results[0];
-        painter.draw(this.buffers(sheet), sheet.nodes, null, view, camera, ghost);
-      }
-      for (const result of view.results) {
-        const own = CURVES[page.theme][result.index % 8];
-        const tinted = overlaid
-          ? { ...look, front: own, back: own, alpha: 0.45, kinds: kinds.map((kind) => ({ ...kind, color: own })) }
-          : look;
-        const levels = overlaid ? null : result.shown;
-        painter.draw(this.buffers(result.sheet), result.positions, levels, view, camera, tinted);
-      }
-      this.annotate(view, tones, views.length);
-    }
+  // Give back what was made for sheets that are shown no more.
+  forget() {
+    for (const made of this.made.values()) made.free();
+    this.made.clear();
   }
 
-  annotate(view, tones, count) {
-    const { context, camera, page } = this;
-    const project = camera.projector(view);
-    const place = (result, node) => {
-      const [x, y, z] = result.positions.subarray(3 * node, 3 * node + 3);
-      return project(x, y, z, [0, 0, 0]);
+  close() {
+    this.forget();
+    this.painter.gl?.getExtension("WEBGL_lose_context")?.loseContext(); // browsers have few of them
+  }
+
+  draw() {
+    const { page, painter, camera, dpr, context } = this;
+    this.stage.style.background = LOOKS[page.theme].background;
+    painter.begin(dpr);
+    for (const each of [context, this.under]) {
+      each.setTransform(dpr, 0, 0, dpr, 0, 0);
+      each.clearRect(0, 0, this.size.width, this.size.height);
+    }
+    const views = this.views();
+    for (const view of views) {
+      this.photograph(this.under, view);
+      for (const { sheet, positions, shown, look } of this.layers(view)) {
+        painter.draw(this.buffers(sheet), positions, shown, view, camera, look);
+      }
+    }
+    annotate(context, page, views, this.size, LOOKS[page.theme]);
+  }
+
+  // Sheets that a view draws, the rest shape first: { sheet, positions, shown, look }.
+  layers(view) {
+    const { page, camera, dpr } = this;
+    const tones = LOOKS[page.theme];
+    const [{ sheet, shown }] = view.results;
+    const perMeter = camera.perMeter(view);
+    const edge = perMeter * sheet.edge;
+    const fine = Math.min(1, Math.max(0.25, edge / PLAIN));
+    const lines = shown?.on === "bar" || shown?.on === "crease" ? 1 : Math.min(1, Math.max(0, (edge - GONE) / (FAINT - GONE)));
+    const kinds = KINDS.map((kind) => ({ width: fine * kind.width, color: kind[page.theme] }));
+    const look = {
+      dpr, front: tones.front, back: tones.back, alpha: camera.photograph ? SEE_THROUGH : 1, lines, kinds, fine,
+      ghost: false, faint: sheet.edges.length < MANY, map: page.map, period: DASH / perMeter,
     };
+    const own = (result) => {
+      const color = CURVES[page.theme][result.index % 8];
+      return { ...look, front: color, back: color, alpha: 0.45, kinds: kinds.map((kind) => ({ ...kind, color })) };
+    };
+    const overlaid = view.results.length > 1;
+    const layers = view.results.map((result) => ({
+      sheet: result.sheet, positions: result.positions, shown: overlaid ? null : result.shown,
+      look: overlaid ? own(result) : look,
+    }));
+    if (page.ghost) {
+      const thin = kinds.map(() => ({ width: fine, color: tones.ghost }));
+      const ghost = { ...look, front: tones.ghost, back: tones.ghost, alpha: 0.28, kinds: thin, ghost: true, faint: false };
+      layers.unshift({ sheet, positions: sheet.nodes, shown: null, look: ghost });
+    }
+    return layers;
+  }
+
+  // The photograph of the moment, if the camera stands where it was taken.
+  photograph(context, view) {
+    const { camera, page } = this;
+    if (!camera.photograph) return;
+    const { factor, left, top } = camera.framed(view);
+    const [width, height] = camera.photograph.size;
     context.save();
     context.beginPath();
     context.rect(view.x, view.y, view.width, view.height);
     context.clip();
-    context.font = "12px system-ui, sans-serif";
-    const [first] = view.results;
-    if (page.marks && first.sheet.held.length * count <= MOST_WORDS) {
-      for (const [node] of first.sheet.held) this.support(place(first, node), tones.support);
-    }
-    if (page.marks && first.sheet.loads.length * count <= MOST_WORDS) {
-      for (const [node, force] of first.sheet.loads) this.arrow(place(first, node), force, tones.load);
-    }
-    if (page.node !== null) {
-      for (const result of view.results) {
-        const [x, y] = place(result, page.node);
-        context.beginPath();
-        context.arc(x, y, 5.5, 0, 7);
-        context.fillStyle = page.color(result);
-        context.fill();
-        context.lineWidth = 1.5;
-        context.strokeStyle = tones.ink;
-        context.stroke();
-      }
-      const [x, y] = place(first, page.node);
-      this.words(`node ${page.node}`, x + 10, y - 9, tones, "left");
-    }
-    if (page.crease !== null) this.highlight(first, project, tones);
-    if (count > 1 || view.results.length > 1) {
-      const name = view.results.map((result) => page.caption(result)).join(", ");
-      this.words(name, view.x + view.width / 2, view.y + 18, tones, "center");
-    }
-    if (view.x === 0 && view.y === 0) this.triad(view, tones);
-    if (view.y === 0 && view.x + view.width >= this.stage.clientWidth - 1) this.ruler(view, tones);
+    context.drawImage(page.photograph(), view.x + left, view.y + top, factor * width, factor * height);
     context.restore();
-  }
-
-  support([x, y], color) {
-    const { context } = this;
-    context.beginPath();
-    context.moveTo(x, y + 1);
-    context.lineTo(x - 5.5, y + 11);
-    context.lineTo(x + 5.5, y + 11);
-    context.closePath();
-    context.fillStyle = color;
-    context.fill();
-  }
-
-  arrow([x, y], force, color) {
-    const { context, camera } = this;
-    const [right, up] = camera.basis;
-    const dot = (d) => force.reduce((sum, value, k) => sum + value * d[k], 0);
-    const [dx, dy] = [34 * dot(right), -34 * dot(up)];
-    const length = Math.hypot(dx, dy);
-    if (length < 3) return;
-    const [ux, uy] = [dx / length, dy / length];
-    context.strokeStyle = context.fillStyle = color;
-    context.lineWidth = 2;
-    context.beginPath();
-    context.moveTo(x, y);
-    context.lineTo(x + dx - 6 * ux, y + dy - 6 * uy);
-    context.stroke();
-    context.beginPath();
-    context.moveTo(x + dx, y + dy);
-    context.lineTo(x + dx - 9 * ux - 4 * uy, y + dy - 9 * uy + 4 * ux);
-    context.lineTo(x + dx - 9 * ux + 4 * uy, y + dy - 9 * uy - 4 * ux);
-    context.fill();
-  }
-
-  highlight(result, project, tones) {
-    const { context, page } = this;
-    const { sheet, positions } = result;
-    context.lineWidth = 6;
-    context.globalAlpha = 0.55;
-    context.strokeStyle = tones.selected;
-    for (let k = 0; k < sheet.crease.length; k++) {
-      if (sheet.crease[k] !== page.crease) continue;
-      const [a, b] = [3 * sheet.edges[2 * k], 3 * sheet.edges[2 * k + 1]];
-      const from = project(positions[a], positions[a + 1], positions[a + 2], [0, 0, 0]);
-      const to = project(positions[b], positions[b + 1], positions[b + 2], [0, 0, 0]);
-      context.beginPath();
-      context.moveTo(from[0], from[1]);
-      context.lineTo(to[0], to[1]);
-      context.stroke();
-    }
-    context.globalAlpha = 1;
-  }
-
-  words(text, x, y, tones, align) {
-    const { context } = this;
-    context.textAlign = align;
-    context.lineWidth = 3;
-    context.strokeStyle = tones.background;
-    context.strokeText(text, x, y);
-    context.fillStyle = tones.ink;
-    context.fillText(text, x, y);
-  }
-
-  triad({ x, y }, tones) {
-    const { context, camera } = this;
-    const [right, up] = camera.basis;
-    const [cx, cy] = [x + 40, y + 46];
-    [["x", "#d55e00"], ["y", "#2f8f6f"], ["z", "#2a78b5"]].forEach(([name, color], k) => {
-      const [dx, dy] = [24 * right[k], -24 * up[k]];
-      context.strokeStyle = color;
-      context.lineWidth = 2;
-      context.beginPath();
-      context.moveTo(cx, cy);
-      context.lineTo(cx + dx, cy + dy);
-      context.stroke();
-      this.words(name, cx + 1.4 * dx, cy + 1.4 * dy + 4, tones, "center");
-    });
-  }
-
-  ruler(view, tones) {
-    const { context, camera } = this;
-    const perMeter = view.height / 2 / camera.extent(view.width / view.height);
-    const wanted = Math.min(110, 0.3 * view.width) / perMeter;
-    const power = 10 ** Math.floor(Math.log10(wanted));
-    const length = [5, 2, 1].find((f) => f * power <= wanted) * power;
-    const [factor, unit] = readable(length, "m");
-    const [right, top] = [view.x + view.width - 16, view.y + 26];
-    context.strokeStyle = tones.ink;
-    context.lineWidth = 1.5;
-    context.beginPath();
-    context.moveTo(right - length * perMeter, top - 5);
-    context.lineTo(right - length * perMeter, top);
-    context.lineTo(right, top);
-    context.lineTo(right, top - 5);
-    context.stroke();
-    this.words(`${number(length * factor)} ${unit}`, right - (length * perMeter) / 2, top - 9, tones, "center");
   }
 
   // The node next to a place of the stage, or else the crease.

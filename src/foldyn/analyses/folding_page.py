@@ -1,0 +1,94 @@
+"""The page of a folding: the way in three dimensions, its states, and how good they are."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from foldyn import plots
+from foldyn.plots.along import evenly
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Picture, Section, Table, Text
+from foldyn.results.contents import pattern_of
+from foldyn.statics import Folding
+from foldyn.viewer import stage
+
+MOST_ROWS = 12
+"""States that the table shows at most."""
+
+
+def write_folding_page(
+    path: str | PathLike[str], folding: Folding, title: str, command: str = ""
+) -> Path:
+    """Write the page of a folding.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, in an existing directory.
+    folding : Folding
+    title : str
+    command : str
+        What was typed to compute it.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+    """
+    way = folding.path
+    farthest = np.linalg.norm(way["displacement"].values[-1], axis=1).argmax()
+    sections = [
+        stage({"folding": way}, {}, title, [int(farthest)]),
+        Heading("How it folds"),
+        *(Text(f"{line[:1].upper()}{line[1:]}.") for line in folding.report().splitlines()),
+        _states(folding),
+        _numbers(folding),
+        Heading("How it was computed"),
+        _computed(folding, command),
+    ]
+    return write_report(path, title, sections)
+
+
+def _states(folding: Folding) -> Section:
+    return Picture(
+        plots.draw_folding(folding),
+        "States on the way, the first one in gray, with the smallest and largest angle by which "
+        "mountains and valleys are folded.",
+    )
+
+
+def _numbers(folding: Folding) -> Section:
+    """Table of some states."""
+    way = folding.path
+    letters = np.array(pattern_of(way).assignments)
+    turned = np.degrees(way["fold_angle"].values)
+    kinds = {"mountains": letters == "M", "valleys": letters == "V"}
+    columns = {f"{name} (degrees)": turned[:, is_one].mean(axis=1) for name, is_one in kinds.items()
+               if is_one.any()}  # fmt: skip
+    columns["strain"] = way["strain"].values
+    columns["bend (degrees)"] = np.degrees(way["bend"].values)
+    header = ["state", "share of the way", *columns]
+    rows = [
+        [k, float(way["share"][k]), *(float(column[k]) for column in columns.values())]
+        for k in evenly(way, MOST_ROWS)
+    ]
+    return Table(
+        header, rows,
+        "States: mean angles of the creases, valleys positive; the largest strain, and the largest "
+        "turn within a panel",
+    )  # fmt: skip
+
+
+def _computed(folding: Folding, command: str) -> Section:
+    version = folding.path.attrs["foldyn_version"]
+    rows = [
+        ["starts from", f"the {folding.started_from} state" if folding.started_from == "folded"
+         else "the pattern as it is"],
+        ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
+        *([["command", command]] if command else []),
+    ]  # fmt: skip
+    return Table(["part", "as computed"], rows)

@@ -1,0 +1,235 @@
+"""The page of `foldyn track`: the tracked sheet in motion, its nodes over time, the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from foldyn import __version__
+from foldyn.analyses.provenance import Call, cost_rows, inputs_table
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.plots.along import AXES, way
+from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
+from foldyn.shells import shell
+from foldyn.viewer import Backdrop, Stage, projection, stage
+
+MOST = 3
+"""Nodes that charts show."""
+ROOM = 4_000_000
+"""Bytes that the pictures of a page may take."""
+SEEN = 0.9
+"""Of the frames of the node that was measured most: who was measured in fewer is not shown."""
+FILLED = (
+    "Dots are what was measured. The sheet in three dimensions is filled where nothing was: a node "
+    "that was lost for some frames moves evenly between them, one that was never seen moves as its "
+    "neighbors do on average, and nothing is known along the line of sight, {axis}."
+)
+
+
+@dataclass(frozen=True)
+class Footage:
+    """What tracks were found in.
+
+    Parameters
+    ----------
+    files : sequence of str
+    pictures : mapping of int to bytes
+        What the camera saw (JPEG or PNG), by the number of the frame or photograph.
+    figures : sequence of Picture
+        Figures of the model over it.
+    case : Case, optional
+        The model that was recognized.
+    settings : mapping of str to str
+        Scale, region and others, in words.
+    """
+
+    files: Sequence[str]
+    pictures: Mapping[int, bytes] = field(default_factory=dict)
+    figures: Sequence[Picture] = ()
+    case: Case | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_tracks_page(
+    tracks: xr.Dataset, path: Path, footage: Footage, call: Call | None = None
+) -> Path:
+    """Write the page of tracks; returns its path, that of the file with the suffix .html."""
+    sections: list[Section | Stage] = []
+    title = f"Tracks of {', '.join(Path(name).name for name in footage.files)}"
+    if footage.case is not None and "displacement" in tracks:
+        nodes = most_moved(tracks)
+        shown = _stage(tracks, footage.case, nodes, title, footage.pictures)
+        sections += [shown, Heading("What was measured")]
+        sections += [Charts(_charts(tracks, nodes)), Text(FILLED.format(axis=_hidden(tracks)))]
+        sections.append(_nodes(tracks))
+    sections += [Heading("What the camera saw"), *footage.figures] if footage.figures else []
+    rows = [("seen", ", ".join(map(str, footage.files))), *footage.settings.items()]
+    sections += [Heading("How it was computed"), inputs_table([*rows, *_found(tracks)])]
+    sections.append(inputs_table(cost_rows(__version__, call or Call())))
+    return write_report(path.with_suffix(".html"), title, sections)
+
+
+def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
+    """Pictures of a film evenly over it, as many as a page has room for, by their numbers.
+
+    encoded : gives the file of a frame by its number.
+    """
+    first = encoded(0)
+    kept = min(count, max(2, ROOM // max(len(first), 1)))
+    numbers = np.unique(np.linspace(0, count - 1, kept).round().astype(int)).tolist()
+    return {number: encoded(number) for number in numbers}
+
+
+def most_moved(tracks: xr.Dataset) -> list[int]:
+    """Nodes that move most among those that were measured most of the time."""
+    moved = tracks["displacement"].values
+    known = np.isfinite(moved)
+    high = np.where(known, moved, -np.inf).max(axis=0)
+    low = np.where(known, moved, np.inf).min(axis=0)
+    span = np.where(np.isfinite(high - low), high - low, 0.0).max(axis=1)
+    span[tracks["tracked"].values < SEEN * tracks["tracked"].values.max()] = -1.0
+    return sorted(int(node) for node in np.argsort(-span)[:MOST])
+
+
+def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
+    """Displacements (m) of all nodes at all samples, without gaps, shape (samples, n, 3).
+
+    Between samples by straight lines, between nodes by the mean of neighbors, 0 along the line of
+    sight.
+    """
+    moved = np.array(tracks["displacement"].transpose(..., "node", "axis").values)
+    samples = np.arange(len(moved))
+    seen = np.asarray(np.isfinite(moved).any(axis=(0, 2)))
+    out = np.zeros(moved.shape)
+    for node in np.flatnonzero(seen):
+        for axis in range(3):
+            known = np.isfinite(moved[:, node, axis])
+            if known.any():
+                out[:, node, axis] = np.interp(samples, samples[known], moved[known, node, axis])
+    if seen.all() or not seen.any():
+        return out
+    i, j = tracks["edges"].values.T
+    ones, shape = np.ones(len(i)), (len(seen), len(seen))
+    near = sparse.coo_array((ones, (i, j)), shape=shape).tocsr()
+    near = near + near.T
+    far = sparse.diags_array(near.sum(axis=1) + 1e-9) - near  # nodes without neighbors stay
+    lost = np.flatnonzero(~seen)
+    flat = out.transpose(1, 0, 2).reshape(len(seen), -1)
+    pull = near[lost] @ flat
+    flat[lost] = splu(far[lost][:, lost].tocsc()).solve(pull)
+    return flat.reshape(len(seen), len(moved), 3).transpose(1, 0, 2)
+
+
+def _stage(
+    tracks: xr.Dataset, case: Case, nodes: list[int], title: str, pictures: Mapping[int, bytes]
+) -> Stage:
+    """The sheet of the pattern's vertices as it was tracked, a path where there are photographs.
+
+    The camera is the one that sees the model where it was recognized.
+    """
+    pattern, sheet = case.structure.pattern, case.structure.sheet
+    vertices = Case(shell(pattern, sheet, divisions=1))
+    along, coords = "time", {"node": tracks["node"], "axis": list(AXES)}
+    data: dict[str, Any] = {}
+    if "photo" in tracks.dims:
+        along, count = "step", tracks.sizes["photo"]
+        load = tracks["load"].values if "load" in tracks.coords else np.arange(count)
+        data["negative_eigenvalues"] = along, np.full(count, -1)
+        coords["load_factor"] = along, load / (np.abs(load).max() or 1.0)
+    else:
+        coords["time"] = tracks["time"].values
+    displacement = filled(tracks)
+    data["displacement"] = (along, "node", "axis"), displacement, {"units": "m"}
+    result = xr.Dataset(data, coords)
+    moments = result["time"].values if along == "time" else way(result)
+    places = tracks["rest_position"].values + displacement
+    seen, at = tracks["projected_px"].values, int(tracks.attrs.get("match_frame", 0))
+    whole = places if along == "step" else places[at]
+    backdrop = None
+    with suppress(InputError):  # a flat sheet does not show where the camera stands
+        width, height = (int(size) for size in tracks.attrs["size"])
+        taken = {float(moments[number]): content for number, content in pictures.items()}
+        camera = projection(whole.reshape(-1, 3), seen.reshape(-1, 2))
+        backdrop = Backdrop(taken, (width, height), camera)
+    return stage({"tracked": result}, {"tracked": vertices}, title, nodes, backdrop)
+
+
+def _charts(tracks: xr.Dataset, nodes: list[int]) -> list[Chart]:
+    """Measured displacements of some nodes over time, photograph or load, a chart for each."""
+    along = "photo" if "photo" in tracks.dims else "time"
+    shown = "load" if along == "photo" and "load" in tracks.coords else along
+    label = {"time": "time (s)", "load": "load (N)", "photo": "photograph"}[shown]
+    across = np.asarray(tracks[shown].values, float)
+    moved = tracks["displacement"].transpose(along, "node", "axis")
+    return [
+        Chart(
+            label,
+            "displacement (m)",
+            [
+                Curve(axis, across, moved.sel(node=node, axis=axis).values, dots=True)
+                for axis in AXES
+                if np.isfinite(moved.sel(node=node, axis=axis).values).any()
+            ],
+            f"node {node}",
+        )
+        for node in nodes
+    ]
+
+
+def _hidden(tracks: xr.Dataset) -> str:
+    """Axis along the line of sight."""
+    moved = tracks["displacement"].transpose(..., "node", "axis").values
+    return ", ".join(np.array(AXES)[~np.isfinite(moved).any(axis=(0, 1))])
+
+
+def _nodes(tracks: xr.Dataset) -> Table:
+    """How well each node was seen."""
+    error = tracks["error"].values if "error" in tracks else np.full(tracks.sizes["node"], np.nan)
+    rows = [
+        [node, 100.0 * share, gap, cell(1e3 * off)]
+        for node, share, gap, off in zip(
+            tracks["node"].values.tolist(), tracks["tracked"].values.tolist(),
+            tracks["longest_gap"].values.tolist(), error.tolist(), strict=True,
+        )
+        if share > 0.0
+    ]  # fmt: skip
+    header = ["node", "measured (%)", "longest gap (frames)", "error, rms (mm)"]
+    text = f"The {len(rows)} of {tracks.sizes['node']} nodes that were measured."
+    return Table(header, rows, text, digits=3)
+
+
+def _found(tracks: xr.Dataset) -> list[tuple[str, str]]:
+    """What tracking says of the camera and of how the model was recognized."""
+    a, along = tracks.attrs, "photo" if "photo" in tracks.dims else "time"
+    count, what = tracks.sizes[along], "photographs" if along == "photo" else "frames"
+    width, height = (int(size) for size in a["size"])
+    rows = [("pictures", f"{count} {what} of {width} x {height} pixels")]
+    if along == "time" and count > 1:
+        lasted = float(np.ptp(tracks["time"].values))
+        rows.append(("rate", f"{(count - 1) / lasted:.6g} frames per second over {lasted:.4g} s"))
+    rows.append(("region", f"x, y, width, height {[int(part) for part in a['roi']]} pixels"))
+    if "metres_per_pixel" in a:
+        rows.append(("scale", f"{a['metres_per_pixel']:.5g} m per pixel in the front plane"))
+    if "displacement" in tracks:
+        rms = ", ".join(f"{value:.2g}" for value in np.atleast_1d(a["match_rms_px"]))
+        nodes = ", ".join(f"{value}" for value in np.atleast_1d(a["matched_nodes"]))
+        rows += [
+            (
+                "camera",
+                f"{a['camera_distance']:.4g} m away; up {a['up']}, towards it {a['facing']}",
+            ),
+            ("recognized", f"{nodes} nodes, {rms} pixels rms from the model"),
+        ]
+    return rows
