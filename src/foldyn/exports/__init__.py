@@ -1,0 +1,5 @@
+"""Results in formats of other programs: one module for each, chosen from a registry."""
+
+from foldyn.exports.registry import EXPORTS, Export, export
+
+__all__ = ["EXPORTS", "Export", "export"]

@@ -1,0 +1,173 @@
+"""Abaqus: an input deck of a creased shell, with its frequencies and its statics.
+
+Triangles are ``STRI3``, flat facets of thin shells, or ``S3``. Nodes at one place have equal
+displacements by ``*EQUATION``. Their turn against each other about the crease, as it lies at rest,
+is by another equation the first displacement of a node of its own, which a spring ``SPRING1``
+resists: CalculiX reads this too, whose springs know no rotations. Keywords as in the Abaqus
+Keywords Reference Guide; numbers fit its 20 columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.exports.creased_shell import CreasedShell, creased_shell
+from foldyn.values import choice, whole
+from foldyn.writing import write_text
+
+ELEMENTS = ("STRI3", "S3")
+SHEET = "SHEET"
+
+
+def write(
+    result: Any,
+    path: Path,
+    case: Case,
+    *,
+    divisions: int | None = None,
+    modes: int | None = None,
+    element: str | None = None,
+) -> list[Path]:
+    """Write a deck: a step of frequencies at rest, then one of statics under all loads.
+
+    Parameters
+    ----------
+    result : Any
+        Not needed.
+    path : Path
+    case : Case
+    divisions : int, optional
+        Pieces of every edge, if the case is no shell; 16 by default.
+    modes : int, optional
+        How many frequencies; 6 by default.
+    element : {"STRI3", "S3"}, optional
+        Kind of the triangles; the first is thin as those of Foldyn are.
+    """
+    count = 6 if modes is None else whole("modes", modes, least=1)
+    kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)
+    shell = creased_shell(case, divisions)
+    write_text(path, "\n".join(chain(_deck(shell, count, kind), [""])))
+    return [path]
+
+
+def _deck(shell: CreasedShell, count: int, kind: str) -> Iterator[str]:
+    yield "*HEADING"
+    yield "A creased shell, made by Foldyn"
+    yield "** SI units. Node k + 1 is node k of Foldyn, vertices first; further nodes are those of"
+    yield "** other panels at the same place. Damping and histories play no part."
+    yield f"*NODE, NSET={SHEET}"
+    for number, point in enumerate(shell.nodes.tolist(), 1):
+        yield _line(number, *point)
+    yield from _panels(shell, kind)
+    yield from _ties(shell)
+    yield from _creases(shell)
+    yield from _masses(shell)
+    yield from _supports(shell)
+    yield from ("*STEP", "*FREQUENCY", f"{count}", "*END STEP")
+    if shell.forces:
+        yield from _statics(shell)
+
+
+def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
+    for number, sheet in enumerate(shell.sheets, 1):
+        own = np.flatnonzero(shell.kind == number - 1)
+        if len(own) == 0:
+            continue
+        yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{number}"
+        for element, nodes in zip(
+            (own + 1).tolist(), (shell.triangles[own] + 1).tolist(), strict=True
+        ):
+            yield _line(element, *nodes)
+        yield f"*MATERIAL, NAME=MATERIAL_{number}"
+        yield from ("*ELASTIC", _line(sheet.youngs_modulus, sheet.poissons_ratio))
+        yield from ("*DENSITY", _line(sheet.density))
+        yield f"*SHELL SECTION, ELSET=PANELS_{number}, MATERIAL=MATERIAL_{number}"
+        yield _line(sheet.thickness)
+
+
+def _ties(shell: CreasedShell) -> Iterator[str]:
+    """Equal displacements of nodes at one place, along axes that are not held."""
+    for first, *others in shell.places:
+        for node in others:
+            for axis in np.flatnonzero(~shell.held[node]).tolist():
+                yield "*EQUATION"
+                yield "2"
+                yield _line(node + 1, axis + 1, 1.0, first + 1, axis + 1, -1.0)
+
+
+def _creases(shell: CreasedShell) -> Iterator[str]:
+    """Nodes that stand for turns, their equations, and springs on them."""
+    pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in shell.joints)])
+    node, element = len(shell.nodes), len(shell.triangles)
+    if len(pairs):
+        yield "*NODE, NSET=TURNS"
+        for number, point in enumerate(shell.nodes[pairs[:, 0]].tolist(), node + 1):
+            yield _line(number, *point)
+    for crease, joint in enumerate(shell.joints, 1):
+        turns = node + 1 + np.arange(len(joint.nodes))
+        for turn, (first, second) in zip(turns.tolist(), (joint.nodes + 1).tolist(), strict=True):
+            yield from _turn(turn, first, second, joint.axis)
+        for part, stiffness in enumerate(np.unique(joint.stiffness).tolist(), 1):
+            own = joint.stiffness == stiffness
+            yield f"*ELEMENT, TYPE=SPRING1, ELSET=SPRINGS_{crease}_{part}"
+            for number, turn in enumerate(turns[own].tolist(), element + 1):
+                yield _line(number, turn)
+            yield f"*SPRING, ELSET=SPRINGS_{crease}_{part}"
+            yield from ("1", _line(stiffness))
+            element += int(own.sum())
+        node += len(turns)
+
+
+def _turn(turn: int, first: int, second: int, axis: NDArray) -> Iterator[str]:
+    """The turn of the second node against the first about an axis, four terms a line."""
+    terms = [
+        term
+        for dof, part in enumerate(axis.tolist(), 4)
+        if part != 0.0
+        for term in ((second, dof, -part), (first, dof, part))
+    ]
+    yield "*EQUATION"
+    yield f"{len(terms) + 1}"
+    rows = [(turn, 1, 1.0), *terms]
+    for k in range(0, len(rows), 4):
+        yield _line(*chain.from_iterable(rows[k : k + 4]))
+
+
+def _masses(shell: CreasedShell) -> Iterator[str]:
+    element = len(shell.triangles) + sum(len(joint.nodes) for joint in shell.joints)
+    for number, node in enumerate(np.flatnonzero(shell.masses).tolist(), 1):
+        yield f"*ELEMENT, TYPE=MASS, ELSET=MASS_{number}"
+        yield _line(element + number, node + 1)
+        yield from (f"*MASS, ELSET=MASS_{number}", _line(float(shell.masses[node])))
+
+
+def _supports(shell: CreasedShell) -> Iterator[str]:
+    yield "*BOUNDARY"
+    if shell.joints:
+        yield _line("TURNS", 2, 3)
+    for node, held in enumerate(shell.held.tolist(), 1):
+        yield from (_line(node, axis, axis) for axis in range(1, 4) if held[axis - 1])
+    yield from (_line(node + 1, 4, 6) for node in np.flatnonzero(shell.clamped).tolist())
+
+
+def _statics(shell: CreasedShell) -> Iterator[str]:
+    """All loads in full, in steps that the program chooses; displacements are printed."""
+    yield from ("*STEP, NLGEOM, INC=1000", "*STATIC", _line(0.1, 1.0), "*CLOAD")
+    force = np.sum(shell.forces, axis=0)
+    for node, axis in np.argwhere(force).tolist():
+        yield _line(node + 1, axis + 1, float(force[node, axis]))
+    yield from (f"*NODE PRINT, NSET={SHEET}", "U", "*END STEP")
+
+
+def _line(*values: Any) -> str:
+    """A line of data, in numbers of at most 20 columns."""
+    return ", ".join(
+        f"{value:.12g}" if isinstance(value, float) else str(value) for value in values
+    )

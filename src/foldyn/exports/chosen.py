@@ -1,0 +1,72 @@
+"""What of a result is exported: variables by name, nodes by number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.results.dataset import DOCUMENT
+from foldyn.values import choice, indices, show
+
+ALONG = {
+    "trajectory": "time",
+    "path": "step",
+    "modes": "mode",
+    "frf": "frequency",
+    "fidelity": "mode",
+}
+"""The dimension along which a kind of results runs."""
+TABLES = "tables_"
+"""Beginning of the names of arrays that the text of a case refers to."""
+
+
+def quantities_of(result: xr.Dataset) -> list[str]:
+    """Names of what was computed, and of the rest position; not of what describes the case."""
+    names = map(str, result.data_vars)
+    described = {*DOCUMENT} - {"rest_position"}
+    return [n for n in names if n not in described and not n.startswith(TABLES)]
+
+
+def chosen_fields(known: Iterable[str], fields: str | Sequence[str] | None) -> list[str]:
+    """Names of variables: those that are asked for, or all that are known.
+
+    Raises
+    ------
+    InputError
+        One is not among the known.
+    """
+    known = list(known)
+    if fields is None:
+        return known
+    if not isinstance(fields, str | Sequence):
+        raise InputError(f' = {show(fields)}: give names, as in ["displacement"]', "fields")
+    asked = fields.split(",") if isinstance(fields, str) else fields
+    stripped = (name.strip() if isinstance(name, str) else name for name in asked)
+    return list(dict.fromkeys(choice("fields", name, known) for name in stripped))
+
+
+def chosen_nodes(result: xr.Dataset, nodes: int | str | Sequence[int] | None) -> NDArray[np.int64]:
+    """Numbers of nodes: those that are asked for, or all.
+
+    Raises
+    ------
+    InputError
+        No numbers of nodes of the result.
+    """
+    count = result.sizes["node"]
+    if nodes is None:
+        return np.arange(count)
+    if isinstance(nodes, str):
+        words = nodes.replace(",", " ").split()
+        if not words or not all(word.isdecimal() for word in words):
+            raise InputError(f" = {show(nodes)}: give numbers, as in 0,7,12", "nodes")
+        nodes = [int(word) for word in words]
+    asked = np.array(indices("nodes", nodes, "node", "or leave it out for all"), np.int64)
+    beyond = asked[(asked < 0) | (asked >= count)]
+    if len(beyond):
+        raise InputError(f": node {beyond[0]} is out of range; there are 0 to {count - 1}", "nodes")
+    return asked

@@ -1,0 +1,301 @@
+"""A creased shell as programs of finite elements take it, whichever writes or runs it.
+
+Their shells have rotations at nodes, which a crease cannot share. Each panel therefore has nodes of
+its own; those at one place move together, and turn against each other about the crease with their
+share of its stiffness.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from foldyn.cases import Case
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.linear.shell_of import check_reduced, shell_of
+from foldyn.patterns import Pattern
+from foldyn.shells import Shell
+from foldyn.structures import Sheet
+from foldyn.structures.discretized import Discretized
+from foldyn.values import whole
+
+DIVISIONS = 16  # from which on frequencies of the case studies are right to 1 %
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A crease, where two panels meet.
+
+    Attributes
+    ----------
+    axis : (3,)
+        Unit vector from the lower to the higher vertex.
+    nodes : (m, 2)
+        Pairs of nodes at one place: of the panel that runs along the axis when it is gone around
+        counter-clockwise from the front, and of the other. The dihedral grows with the turn of
+        the second against the first about the axis.
+    stiffness : (m,)
+        Of each pair, N m/rad.
+    """
+
+    axis: NDArray
+    nodes: NDArray
+    stiffness: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class CreasedShell:
+    """Panels with nodes of their own, joined along creases, with supports and loads.
+
+    Attributes
+    ----------
+    nodes : (n, 3)
+        m.
+    triangles, kind : (nt, 3), (nt,)
+        Counter-clockwise from the front, and the sheet of each.
+    sheets : tuple of Sheet
+    joints : tuple of Joint
+    places : tuple of tuples of int
+        Nodes at one place, for all places with several.
+    held : (n, 3)
+        Whether a node is held along each axis.
+    clamped : (n,)
+        Whether it cannot turn either.
+    forces : tuple of (n, 3)
+        N, of one load each.
+    masses : (n,)
+        Point masses, kg.
+    """
+
+    nodes: NDArray
+    triangles: NDArray
+    kind: NDArray
+    sheets: tuple[Sheet, ...]
+    joints: tuple[Joint, ...]
+    places: tuple[tuple[int, ...], ...]
+    held: NDArray
+    clamped: NDArray
+    forces: tuple[NDArray, ...]
+    masses: NDArray
+
+    @property
+    def membrane(self) -> float:
+        """Largest E t of its sheets, N/m."""
+        return max(sheet.youngs_modulus * sheet.thickness for sheet in self.sheets)
+
+    @property
+    def loose(self) -> list[tuple[int, int]]:
+        """Pairs of nodes at one place that no chain of joints connects."""
+        pairs = np.concatenate([np.zeros((0, 2), int), *(joint.nodes for joint in self.joints)])
+        part = _components(pairs, len(self.nodes))
+        found = []
+        for place in self.places:
+            first = {part[place[0]]: place[0]}
+            for node in place[1:]:
+                if part[node] not in first:
+                    first[part[node]] = node
+                    found.append((place[0], node))
+        return found
+
+
+def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
+    """Creased shell of a case; node k stands where node k of the case's shell does.
+
+    Parameters
+    ----------
+    case : Case
+        A shell, or bars and hinges, of whose pattern and sheet a shell is made.
+    divisions : int, optional
+        Pieces of every edge of that; 16 by default.
+
+    Raises
+    ------
+    InputError
+        The case has what other programs would not compute alike.
+
+    Warns
+    -----
+    FoldynWarning
+        Folds that are not linear about rest get the slope that they have there; dashpots and
+        motions of the base are left out.
+    """
+    held = _shell_case(case, divisions)
+    _check(held)
+    shell = held.structure
+    sheets, kind = shell.sheet.kinds(len(shell.pattern.faces))
+    part = _components(shell.pattern.weld_faces, len(shell.pattern.faces))
+    split = _Split(shell, part)
+    clamped = np.zeros(len(split.origin), bool)
+    for edge, row in zip(shell.options.clamped, shell.clamped_nodes, strict=True):
+        clamped[split.of(_panel_at(shell.pattern, edge), row)] = True
+    share = 1.0 / np.bincount(split.origin)[split.origin]
+    return CreasedShell(
+        nodes=shell.nodes[split.origin],
+        triangles=split.triangles,
+        kind=kind[shell.triangle_panel],
+        sheets=tuple(sheets),
+        joints=_joints(shell, split),
+        places=split.places,
+        held=held.fixed[split.origin],
+        clamped=clamped,
+        forces=tuple(force[split.origin] * share[:, None] for force, _ in held.load_terms),
+        masses=held.point_masses[split.origin] * share,
+    )
+
+
+def shares(count: int) -> NDArray:
+    """Shares (count,) of evenly spaced places in a whole: half a share at the ends."""
+    share = np.full(count, 1.0 / (count - 1))
+    share[[0, -1]] *= 0.5
+    return share
+
+
+class _Split:
+    """Nodes of a shell (n,), made anew for each part of panels that run on into each other.
+
+    Nodes keep their number in the first part that has them; further ones follow.
+    """
+
+    def __init__(self, shell: Discretized, part: NDArray) -> None:
+        self._part, count = part, len(shell.nodes)
+        key = part[shell.triangle_panel][:, None] + shell.triangles * (part.max() + 1)
+        found, inverse = np.unique(key, return_inverse=True)
+        node = found // (part.max() + 1)
+        first = np.diff(node, prepend=-1) > 0
+        number = np.where(first, node, count + np.cumsum(~first) - 1)
+        if first.sum() < count:
+            lost = np.setdiff1d(np.arange(count), node)[0]
+            raise InputError(f": vertex {lost} belongs to no panel; leave it out", "pattern")
+        self._number = dict(zip(found.tolist(), number.tolist(), strict=True))
+        self.triangles = number[inverse.reshape(shell.triangles.shape)]
+        self.origin = np.concatenate([np.arange(count), node[~first]])
+        own = np.split(number, np.flatnonzero(first)[1:])
+        self.places = tuple(tuple(nodes.tolist()) for nodes in own if len(nodes) > 1)
+
+    def of(self, panel: int, nodes: NDArray) -> list[int]:
+        """New numbers of nodes of a panel."""
+        keys = self._part[panel] + nodes * (self._part.max() + 1)
+        return [self._number[key] for key in keys.tolist()]
+
+
+def _components(pairs: NDArray, count: int) -> NDArray:
+    """Which part (count,) of a graph with these edges each of its points belongs to."""
+    graph = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), (count, count))
+    return connected_components(graph, directed=False)[1]
+
+
+def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
+    pattern, slope = shell.pattern, fold_slopes(shell)
+    found = []
+    for crease, (low, high) in enumerate(pattern.creases.tolist()):
+        axis = pattern.vertices[high] - pattern.vertices[low]
+        row = shell.edge_nodes[crease]
+        both = [split.of(panel, row) for panel in pattern.crease_faces[crease].tolist()]
+        if both[0] == both[1]:
+            raise InputError(
+                f": crease {crease} divides panels that run on into each other elsewhere, across "
+                "its welds; these cannot have nodes of their own",
+                "pattern",
+            )
+        stiffness = shell.fold_stiffness[crease] * slope[crease] * shares(len(row))
+        found.append(Joint(axis / np.linalg.norm(axis), np.transpose(both), stiffness))
+    return tuple(found)
+
+
+def fold_slopes(structure: Discretized) -> NDArray:
+    """Slope (nf,) of the law of the folds at rest, over their stiffness.
+
+    Raises
+    ------
+    InputError
+        Folds that have no slope at rest, or a moment there.
+
+    Warns
+    -----
+    FoldynWarning
+        Folds that are not linear about rest.
+    """
+    law, rest = structure.fold_law, structure.fold_rest
+    slope, moment = law.slope(rest, rest), law.moment(rest, rest)
+    if not (slope > 0.0).all() or np.abs(moment).max(initial=0.0) > 0.0:
+        raise InputError(
+            f" = {law}: springs stand for folds with a slope and without a moment at rest; take "
+            '"linear" or "enhanced"',
+            "fold_law",
+        )
+    low, high = law.linear_between or (np.nan, np.nan)
+    curved = np.flatnonzero(~((low < rest) & (rest < high)))
+    if len(curved):
+        warnings.warn(
+            f"fold_law = {law}: {len(curved)} of {len(rest)} folds are not linear about rest, and "
+            "become linear springs with their slope there: frequencies are right, statics are not",
+            FoldynWarning,
+            stacklevel=5,
+        )
+    return slope
+
+
+def _panel_at(pattern: Pattern, edge: tuple[int, int]) -> int:
+    """The panel of a boundary edge."""
+    return next(k for k, face in enumerate(pattern.faces) if set(edge) <= set(face))
+
+
+# ------------------------------------------------------------------ what is refused
+def _shell_case(case: Case, divisions: int | None) -> Case:
+    """The case with a shell."""
+    if case.structure.kind == Shell.kind:
+        if divisions is not None:
+            raise InputError(
+                f" = {divisions}: the case is a shell already, with "
+                f"{case.structure.options.divisions} divisions; change them there",
+                "divisions",
+            )
+        return case
+    count = DIVISIONS if divisions is None else whole("divisions", divisions, least=1)
+    check_reduced(case)
+    return shell_of(case, count)
+
+
+def _check(case: Case) -> None:
+    """Refuse what springs, plain supports and constant forces cannot stand for."""
+    structure: Any = case.structure
+    wrong = (
+        (structure.sheet.density is None, "sheet.density", "is missing; give it (kg/m3)"),
+        (structure.pattern.boards is not None, "pattern", "has thick panels; give the thin one"),
+        (structure.options.rigid is not None, "rigid", "panels are rigid; let them bend"),
+        (
+            structure.options.crease_rest is not None,
+            "crease_rest",
+            "folds with another rest angle are under stress; give the pattern as it is at rest",
+        ),
+        (case.imposed.any(), "supports", "move nodes; hold them with Fix, and load them"),
+        (case.constraints, "supports", "hold oblique directions or tie nodes; hold axes"),
+        (case.springs is not None, "supports", "have springs; leave them out"),
+        (case.following_terms, "loads", "follow the sheet or come from temperature; give forces"),
+        (case.rest_terms, "loads", "fold creases; give the folded pattern, and forces"),
+    )
+    for is_wrong, field, text in wrong:
+        if is_wrong:
+            raise InputError(f": {text} (an input deck has no place for this)", field)
+    held = np.all(case.fixed, axis=1)
+    if not all(held[row].all() for row in structure.clamped_nodes):
+        raise InputError(
+            ": a deck has no clamps that move or slide; hold both ends along all axes", "clamped"
+        )
+    left = [
+        name
+        for name, has in (("dashpots", case.dashpots), ("motions of the base", case.base_terms))
+        if has
+    ]
+    if left:
+        warnings.warn(
+            f"{' and '.join(left)} are left out: they change neither frequencies nor statics",
+            FoldynWarning,
+            stacklevel=4,
+        )

@@ -1,0 +1,179 @@
+"""GLB: a sheet that moves, for Blender and browsers.
+
+The nodes' places at rest, and as morph targets how far they are away from them at each key or in
+each mode. Weights that change linearly in time blend one key into the next. There are no normals:
+a viewer then shades every triangle flat, in each shape. Lengths are meters; the z axis, which
+points up with us, becomes the y axis of the format.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn import __version__
+from foldyn.cases import Case
+from foldyn.exports.gltf import LINES, TRIANGLES, Content, linear
+from foldyn.formats.writers import warn_of_boards
+from foldyn.plots.palette import BLACK, CREASE_NAMES, CREASES, PAPER
+from foldyn.results import Shapes, shapes_of
+from foldyn.values import number
+from foldyn.viewer.sheet import KINDS, edge_pieces
+from foldyn.writing import write_bytes
+
+MOST_KEYS = 120
+"""Keys of a motion or a path, unless another number is asked for."""
+PATH_SECONDS, SWING_SECONDS = 8.0, 2.0
+"""How long a path takes, and a mode for one swing, unless told otherwise."""
+SHORTEST, LONGEST = 1e-3, 1e6
+"""Bounds of what may be asked for, s."""
+SWING_KEYS = 32
+UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
+"""Quaternion of the rotation that turns z up into y up."""
+
+
+class Animation(NamedTuple):
+    """Weights (keys, targets) of the morph targets, from 0 to 1, at times (s)."""
+
+    name: str
+    times: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+def write(
+    result: xr.Dataset,
+    path: Path,
+    case: Case,
+    *,
+    every: int | None = None,
+    frames: int | None = None,
+    scale: float = 1.0,
+    seconds: float | None = None,
+) -> list[Path]:
+    """Write the sheet of a result with an animation, or one for each mode.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        A motion, an equilibrium path or modes.
+    path : Path
+    case : Case
+        Of the result.
+    every, frames : int, optional
+        Make a key of every such sample and the last one, or so many keys, spread evenly over the
+        samples; by default all samples, but no more than `MOST_KEYS` keys.
+    scale : float
+        Factor on all displacements.
+    seconds : float, optional
+        How long the animation takes: by default as long as the motion, `PATH_SECONDS` for a path,
+        and `SWING_SECONDS` for one swing of a mode.
+    """
+    warn_of_boards(case.structure.pattern)
+    kind = result.attrs["foldyn_result"]
+    if every is None and frames is None and kind != "modes":
+        frames = MOST_KEYS
+    shapes = shapes_of(result, every, frames, scale)
+    if seconds is not None:
+        seconds = number("seconds", seconds, least=SHORTEST, most=LONGEST, unit="s")
+    if kind == "modes":
+        shapes = _there_and_back(shapes)
+        animations = _swings(shapes.titles, seconds or SWING_SECONDS)
+    else:
+        timed = kind == "trajectory"
+        times = shapes.values - shapes.values[0] if timed else np.arange(float(len(shapes.values)))
+        if times[-1] > 0.0:
+            times *= (seconds or (times[-1] if timed else PATH_SECONDS)) / times[-1]
+        animations = [Animation("motion" if timed else "path", times, np.eye(len(times)))]
+    write_bytes(path, _content(case, shapes, animations).glb())
+    return [path]
+
+
+def _there_and_back(shapes: Shapes) -> Shapes:
+    """Each mode, and the opposite of each: Blender takes no weights below 0."""
+    back = [f"{title}, back" for title in shapes.titles]
+    both = np.concatenate([shapes.displacement, -shapes.displacement])
+    return shapes._replace(titles=shapes.titles + back, displacement=both)
+
+
+def _swings(titles: list[str], seconds: float) -> list[Animation]:
+    """One swing of each mode, whose shapes there come first and those back last."""
+    count = len(titles) // 2
+    phase = np.linspace(0.0, 2.0 * np.pi, SWING_KEYS + 1)
+    there = np.sin(phase)[:, None]
+    weights = np.concatenate([np.maximum(there, 0.0), np.maximum(-there, 0.0)], axis=1)
+    times = seconds * phase / phase[-1]
+    return [
+        Animation(titles[k], times, np.repeat(weights, count, axis=1) * np.tile(own, 2))
+        for k, own in enumerate(np.eye(count))
+    ]
+
+
+def _content(case: Case, shapes: Shapes, animations: list[Animation]) -> Content:
+    """The scene: one mesh of panels and lines."""
+    content, name = Content(), case.structure.pattern.name or "sheet"
+    primitives, materials = _primitives(content, case)
+    shared = {
+        "attributes": {"POSITION": content.positions(shapes.nodes, "nodes")},
+        "targets": [
+            {"POSITION": content.positions(moved, title)}
+            for moved, title in zip(shapes.displacement, shapes.titles, strict=True)
+        ],
+    }
+    content.document |= {
+        "asset": {"version": "2.0", "generator": f"Foldyn {__version__}"},
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": name, "rotation": UPRIGHT}],
+        "meshes": [
+            {
+                "name": name,
+                "primitives": [shared | each for each in primitives],
+                "weights": [0.0] * len(shapes.titles),
+                "extras": {"targetNames": shapes.titles},
+            }
+        ],
+        "materials": materials,
+        "animations": [_animation(content, each) for each in animations],
+    }
+    return content
+
+
+def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Panels, and the lines of each kind, with their materials."""
+    paper = {"baseColorFactor": linear(PAPER), "metallicFactor": 0.0, "roughnessFactor": 0.9}
+    primitives = [
+        {"mode": TRIANGLES, "material": 0, "indices": content.indices(case.structure.triangles)}
+    ]
+    materials: list[dict[str, Any]] = [
+        {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
+    ]
+    structure = case.structure
+    pairs, kind, *_ = edge_pieces(structure.pattern, structure.nodes, structure.edge_nodes)
+    for number_, letter in enumerate(KINDS):
+        if not (kind == number_).any():
+            continue
+        color = {"baseColorFactor": linear(CREASES.get(letter, BLACK)), "metallicFactor": 0.0}
+        lines = content.indices(pairs[kind == number_])
+        primitives.append({"mode": LINES, "material": len(materials), "indices": lines})
+        materials.append(
+            {
+                "name": CREASE_NAMES.get(letter, "boundary"),
+                "pbrMetallicRoughness": color,
+                "extensions": {"KHR_materials_unlit": {}},
+            }
+        )
+    return primitives, materials
+
+
+def _animation(content: Content, animation: Animation) -> dict[str, Any]:
+    times, weights = content.numbers(animation.times), content.numbers(animation.weights)
+    return {
+        "name": animation.name,
+        "samplers": [{"input": times, "output": weights, "interpolation": "LINEAR"}],
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+    }

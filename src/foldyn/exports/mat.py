@@ -1,0 +1,142 @@
+"""MAT, version 5, for MATLAB and Octave: ``run = load("run.mat")`` makes a struct of it.
+
+Arrays keep their dimensions, complex numbers stay complex. All numbers are doubles; those of nodes,
+vertices and supports count from 1. `faces` has a row for each panel, filled up with NaN, as
+``patch("Vertices", run.vertices, "Faces", run.faces)`` takes it. Units and meanings are in the
+structs `units` and `labels`, facts about the run in `attributes`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+from foldyn.exports.chosen import ALONG, chosen_fields, quantities_of
+from foldyn.results.contents import pattern_of
+from foldyn.results.frames import chosen_samples
+from foldyn.writing import whole
+
+MOST = 2**31 - 1
+"""Bytes of a variable of version 5."""
+LONGEST = 63
+"""Letters of a name in MATLAB."""
+KEYWORDS = frozenset({
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function",
+    "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+})  # fmt: skip
+COUNTED = ("node", "support_node")
+"""Variables that number nodes."""
+
+
+def write(
+    result: xr.Dataset,
+    path: Path,
+    case: None,
+    *,
+    fields: str | Sequence[str] | None = None,
+    every: int | None = None,
+    frames: int | None = None,
+) -> list[Path]:
+    """Write a result with its pattern.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+    path : Path
+    case : None
+        Not needed.
+    fields : str or sequence of str, optional
+        Names of the variables of the result; by default all. Coordinates and the pattern are
+        always there.
+    every : int, optional
+        Take every such sample, and the last one.
+    frames : int, optional
+        Take so many samples, spread evenly.
+
+    Raises
+    ------
+    InputError
+        A variable is larger than the 2 GB of the format.
+    """
+    from scipy.io import savemat
+
+    along = ALONG[result.attrs["foldyn_result"]]
+    samples = chosen_samples(result.sizes[along], every, frames)
+    whole_result = every is None and frames is None
+    taken = result if whole_result else result.isel({along: samples})
+    pattern = pattern_of(result)
+    names = [*map(str, result.coords), *chosen_fields(quantities_of(result), fields)]
+    content = {name: _values(taken[name]) for name in names}
+    for name, values in content.items():
+        _check_size(name, values)
+    content |= {
+        "vertices": pattern.vertices,
+        "faces": _faces(pattern.faces),
+        "creases": pattern.creases + 1.0,
+        "assignments": "".join(pattern.assignments),
+        "case_file": str(result["case"].values[()]),
+        "units": _texts(result, names, "units"),
+        "labels": _texts(result, names, "long_name"),
+        "attributes": _named({key: _attribute(value) for key, value in result.attrs.items()}),
+    }
+    with whole(path) as part:
+        savemat(part, _named(content), appendmat=False, long_field_names=True, oned_as="column")
+    return [path]
+
+
+def _values(variable: xr.DataArray) -> NDArray:
+    """Values as MATLAB has them."""
+    values = variable.values
+    if values.dtype.kind in "UOST":
+        return values.astype(object)
+    if values.dtype.kind == "c":
+        return values
+    return values.astype(float) + (variable.name in COUNTED)
+
+
+def _check_size(name: str, values: NDArray) -> None:
+    if values.nbytes > MOST:
+        raise InputError(
+            f": {name} has {values.nbytes / 2**30:.2g} GiB, and a MAT file of version 5 holds "
+            "variables below 2; take fewer samples, as with every = 10, or other fields",
+            "result",
+        )
+
+
+def _faces(faces: Sequence[Sequence[int]]) -> NDArray[np.float64]:
+    """Vertices of each panel, counted from 1 and filled up with nan."""
+    rows = np.full((len(faces), max(map(len, faces))), np.nan)
+    for row, face in zip(rows, faces, strict=True):
+        row[: len(face)] = face
+    return rows + 1.0
+
+
+def _texts(result: xr.Dataset, names: Iterable[str], key: str) -> dict[str, str]:
+    return _named({name: str(result[name].attrs.get(key, "")) for name in names})
+
+
+def _attribute(value: Any) -> Any:
+    return str(value) if isinstance(value, str) else np.asarray(value, float)
+
+
+def _named(content: dict[str, Any]) -> dict[str, Any]:
+    """The same with names that MATLAB takes, each once."""
+    out: dict[str, Any] = {}
+    for name, value in content.items():
+        out[_name(name, out)] = value
+    return out
+
+
+def _name(text: str, taken: Iterable[str]) -> str:
+    """A name for MATLAB: letters, digits and underscores, beginning with a letter, no keyword."""
+    clean = re.sub(r"\W", "_", text, flags=re.ASCII)
+    clean = clean if clean[:1].isalpha() and clean not in KEYWORDS else f"x_{clean}"
+    choices = (clean[:LONGEST], *(f"{clean[: LONGEST - 6]}_{k}" for k in range(2, 9)))
+    return next(name for name in choices if name not in taken)

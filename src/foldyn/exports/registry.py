@@ -1,0 +1,202 @@
+"""Formats of other programs that results are written to, and `export`, which chooses one."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.exports import abaqus, csv_tables, glb, mat, opensees, pattern_states, uff, vtkhdf
+from foldyn.exports.chosen import ALONG
+from foldyn.results import case_of, check_result, load
+from foldyn.values import choice, show, suggest
+
+
+@dataclass(frozen=True)
+class Export:
+    """A format of another program, for results.
+
+    Parameters
+    ----------
+    name : str
+        What it is called: "glb".
+    suffixes : tuple of str
+        Of its files, lower case with the dot.
+    kinds : tuple of str
+        Kinds of results that it holds: "trajectory", "path", "modes", "frf", "fidelity".
+    write : callable
+        ``write(result, path, case, **options)`` makes the file, or several beside it, and returns
+        the paths of all that it made. Its keyword-only arguments are the options of the format.
+    doc : str
+        What it is for, in a few words.
+    needs_case : bool
+        Whether `write` gets the case of the result; otherwise it gets None, so that results that
+        cannot be run again from themselves are exported too.
+    of_cases : bool
+        Whether `write` needs nothing but the case, which may then stand in place of a result.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    kinds: tuple[str, ...]
+    write: Callable[..., list[Path]]
+    doc: str
+    needs_case: bool = True
+    of_cases: bool = False
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Names of its options."""
+        arguments = inspect.signature(self.write).parameters.values()
+        return tuple(each.name for each in arguments if each.kind is each.KEYWORD_ONLY)
+
+
+SHAPES = ("trajectory", "path", "modes")
+"""Kinds of results that go through shapes."""
+
+_EXPORTS = (
+    Export("glb", (".glb",), SHAPES, glb.write, "an animation for Blender and browsers"),
+    Export(
+        "pattern",
+        pattern_states.SUFFIXES,
+        (*SHAPES, "folding"),
+        pattern_states.write,
+        "states as patterns: frames of a FOLD file, a series of OBJ or STL files",
+        needs_case=False,
+    ),
+    Export("vtkhdf", (".vtkhdf",), SHAPES, vtkhdf.write, "all samples and fields, for ParaView"),
+    Export("csv", (".csv",), tuple(ALONG), csv_tables.write, "tidy tables", needs_case=False),
+    Export("mat", (".mat",), tuple(ALONG), mat.write, "MATLAB, Octave", needs_case=False),
+    Export(
+        "uff",
+        (".uff", ".unv"),
+        ("modes", "frf", "trajectory"),
+        uff.write,
+        "universal files, for modal software",
+        needs_case=False,
+    ),
+    Export(
+        "opensees", (".tcl",), tuple(ALONG), opensees.write, "OpenSees: the shell", of_cases=True
+    ),
+    Export("abaqus", (".inp",), tuple(ALONG), abaqus.write, "Abaqus: the shell", of_cases=True),
+)
+
+EXPORTS: dict[str, Export] = {each.name: each for each in _EXPORTS}
+"""The formats by name."""
+BY_SUFFIX: dict[str, Export] = {end: each for each in _EXPORTS for end in each.suffixes}
+
+
+def export(
+    result: xr.Dataset | Case | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    format: str | None = None,
+    **options: Any,
+) -> list[Path]:
+    """Write a result in a format of another program.
+
+    Parameters
+    ----------
+    result : xarray.Dataset, Case or path-like
+        A result, or the file of one; for input decks a case is enough.
+    path : path-like
+        The file to make or to replace; its folder must exist.
+    format : str, optional
+        Name of a format, one of `foldyn.exports.EXPORTS`; by default the path's suffix chooses it.
+    **options
+        Of the format; None stands for its own choice.
+
+    Returns
+    -------
+    list of Path
+        The files that were written: several where the format holds one state each.
+
+    Raises
+    ------
+    InputError
+        Not a result, an unknown format or option, a format that does not hold results of this
+        kind, or a file that cannot be written.
+
+    Examples
+    --------
+    >>> fd.export("run.nc", "run.glb")  # doctest: +SKIP
+    """
+    file = _file(path)
+    chosen = _format_of(file, format)
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in given:
+        if name not in chosen.options:
+            known = ", ".join(chosen.options) or "none"
+            raise InputError(
+                f": not an option of the format {chosen.name}; "
+                f"{suggest(name, chosen.options)}it has {known}",
+                name,
+            )
+    if not isinstance(result, xr.Dataset | Case):
+        source = _path("result", result)
+        if file.exists() and source.exists() and file.samefile(source):
+            raise InputError(f"{file}: is the result itself; name another file")
+        result = load(source)
+    case = _case_for(chosen, result)
+    try:
+        return chosen.write(result, file, case, **given)
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot be written: {error.strerror or error}; check that its folder may be "
+            "written to"
+        ) from error
+
+
+def _case_for(chosen: Export, result: xr.Dataset | Case) -> Case | None:
+    """The case of what is exported, if the format needs it; other kinds are refused."""
+    if isinstance(result, Case):
+        if chosen.of_cases:
+            return result
+        raise InputError(
+            f": is a case, and the format {chosen.name} holds what is computed of one; give a "
+            "result, as fd.simulate returns it",
+            "result",
+        )
+    check_result(result, "result: ")
+    kind = result.attrs["foldyn_result"]
+    if kind not in chosen.kinds:
+        able = [each.name for each in _EXPORTS if kind in each.kinds]
+        raise InputError(
+            f": is of kind {kind!r}, which the format {chosen.name} does not hold; it holds "
+            f"{', '.join(chosen.kinds)}, and {kind!r} goes to {', '.join(able) or 'no format'}",
+            "result",
+        )
+    return case_of(result) if chosen.needs_case else None
+
+
+def _path(name: str, path: Any) -> Path:
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError(f" = {show(path)}: give the path of a file", name) from None
+
+
+def _file(path: Any) -> Path:
+    file = _path("path", path)
+    if file.is_dir():
+        raise InputError(f"{file}: is a folder; name a file in it")
+    if not file.parent.is_dir():
+        raise InputError(f"{file}: the folder {file.parent} does not exist; make it first")
+    return file
+
+
+def _format_of(file: Path, name: str | None) -> Export:
+    """Format of this name, or that of the file's suffix."""
+    if name is not None:
+        return EXPORTS[choice("format", name, EXPORTS)]
+    found = BY_SUFFIX.get(file.suffix.lower())
+    if found is None:
+        has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
+        raise InputError(f"{file}: {has}; results go to {', '.join(sorted(BY_SUFFIX))}")
+    return found

@@ -1,0 +1,190 @@
+"""The numbers of a case file that a reader can change, and how far."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any
+
+from foldyn.analyses.messages import dotted
+from foldyn.analyses.sections import DampingSection, SheetSection
+from foldyn.errors import InputError
+from foldyn.patterns import GENERATORS
+from foldyn.values import choice, number, whole
+
+ANGLES: Mapping[str, tuple[float, float]] = {
+    "dihedral": (1.0, 179.0), "panel_angle": (1.0, 89.0), "second_angle": (1.0, 89.0),
+    "twist": (0.0, 120.0), "arc": (1.0, 360.0),
+}  # fmt: skip
+"""Arguments of patterns in degrees, and how far sliders take them; other ones are lengths (m)."""
+UNITS: Mapping[str, str] = {
+    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m³", "alpha": "1/s", "beta": "s",
+}  # fmt: skip
+SPAN: Mapping[str, float] = {"pattern": 4.0, "sheet": 10.0, "damping": 10.0}
+"""Factor by which a positive number can be changed, either way."""
+UNDAMPED: Mapping[str, float] = {"alpha": 10.0, "beta": 0.01}
+"""Where sliders of damping end that begin at 0."""
+MOST_COUNT, MOST_PARTS = 12, 1000
+"""Where sliders of small whole numbers end, and how many cells, sides or the like a pattern has
+at most in all: it is to be computed anew for each picture."""
+
+
+@dataclass(frozen=True)
+class Control:
+    """A number that can be changed.
+
+    Attributes
+    ----------
+    place : tuple of str and int
+        Where it stands in the case file: ("pattern", "cells", 0).
+    value : float
+        What the file says, or means where it says nothing.
+    low, high : float
+        Ends of its slider; a number that is typed may lie beyond.
+    unit : str
+    counts : bool
+        Whether it is a whole number.
+    relative : bool
+        Whether the slider changes it by factors.
+    """
+
+    place: tuple[str | int, ...]
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+    counts: bool = False
+    relative: bool = False
+
+    @property
+    def name(self) -> str:
+        """The key as messages write it, "pattern.cells[0]"."""
+        return dotted(self.place)
+
+    def described(self) -> dict[str, Any]:
+        """What the page must know of it."""
+        return {
+            "name": self.name, "group": self.place[0], "label": dotted(self.place[1:]),
+            "value": self.value, "low": self.low, "high": self.high, "unit": self.unit,
+            "counts": self.counts, "relative": self.relative,
+        }  # fmt: skip
+
+
+def controls(document: Mapping[str, Any]) -> list[Control]:
+    """Numbers of [pattern], [sheet] and [damping] of a sound case file, in the order of their keys.
+
+    Those that it leaves to their default are among them, others without a value are not.
+    """
+    return [
+        *_of_pattern(document["pattern"]),
+        *_of_sheet(document.get("sheet", {})),
+        *_of_damping(document),
+    ]
+
+
+def changed(
+    document: Mapping[str, Any], known: Sequence[Control], wanted: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The case file with numbers by the names of their controls; others stay.
+
+    Raises
+    ------
+    InputError
+        No such control, no such number, or a pattern that is too large to be computed anew for
+        each picture.
+    """
+    by_name = {control.name: control for control in known}
+    given: dict[str, Any] = deepcopy(dict(document))
+    for name, value in wanted.items():
+        control = by_name[choice("numbers", name, by_name)]
+        exact = whole(name, value, least=1) if control.counts else number(name, value)
+        if exact != control.value:
+            _put(given, control.place, exact, known)
+    counts = [int(wanted.get(one.name, one.value)) for one in known if one.counts]
+    if math.prod(counts) > MOST_PARTS:
+        raise InputError(
+            f": {' x '.join(map(str, counts))} is more than {MOST_PARTS}, too large to be computed "
+            "anew with each change; take less, or save the case file and use foldyn run",
+            "pattern",
+        )
+    return given
+
+
+def _put(
+    document: dict[str, Any], place: tuple[str | int, ...], value: float, known: Sequence[Control]
+) -> None:
+    """Set a number, with its table or list where the file leaves these to their default."""
+    table: Any = document.setdefault(str(place[0]), {})
+    *between, last = place[1:]
+    for key in between:
+        if isinstance(table, dict) and key not in table:
+            table[key] = [one.value for one in known if one.place[:-1] == place[:-1]]
+        table = table[key]
+    table[last] = value
+
+
+def _of_pattern(table: Mapping[str, Any]) -> Iterator[Control]:
+    if "kind" not in table:
+        if isinstance(table.get("scale"), int | float):
+            yield _positive(("pattern", "scale"), table["scale"])
+        return
+    for name, parameter in signature(GENERATORS[table["kind"]]).parameters.items():
+        given = table.get(name, parameter.default)
+        if isinstance(given, list | tuple):
+            places = [(("pattern", name, k), value) for k, value in enumerate(given)]
+        else:
+            places = [(("pattern", name), given)]
+        counts = all(type(value) is int for _, value in places) and _counted(parameter.annotation)
+        for place, value in places:
+            if counts:
+                yield Control(place, value, 1, max(MOST_COUNT, 2 * value), counts=True)
+            elif name in ANGLES and _is_number(value):
+                low, high = ANGLES[name]
+                yield Control(place, value, min(low, value), max(high, value), "°")
+            elif _is_number(value):
+                yield _positive(place, value, "m")
+
+
+def _counted(annotation: Any) -> bool:
+    """Whether an argument of a generator is whole: its annotation is text."""
+    return "int" in str(annotation)
+
+
+def _of_sheet(table: Mapping[str, Any]) -> Iterator[Control]:
+    for name, field in SheetSection.model_fields.items():
+        value = table.get(name, field.default)
+        if not _is_number(value):
+            continue
+        if name == "poissons_ratio":
+            yield Control(("sheet", name), value, min(0.0, value), max(0.49, value))
+        else:
+            yield _positive(("sheet", name), value, UNITS.get(name, ""))
+
+
+def _of_damping(document: Mapping[str, Any]) -> Iterator[Control]:
+    table = document.get("damping", {})
+    if "ratios" in table:
+        for i, pair in enumerate(table["ratios"]):
+            for k, (value, unit) in enumerate(zip(pair, ("Hz", ""), strict=True)):
+                yield _positive(("damping", "ratios", i, k), value, unit)
+        return
+    for name, end in UNDAMPED.items():
+        value = table.get(name, DampingSection.model_fields[name].default)
+        most = SPAN["damping"] * value or end
+        yield Control(("damping", name), value, 0.0, most, UNITS[name])
+
+
+def _positive(place: tuple[str | int, ...], value: float, unit: str = "") -> Control:
+    """Control of a number above 0, which changes by factors; of others, such as 0, by steps."""
+    span = SPAN[str(place[0])]
+    if value > 0.0:
+        return Control(place, value, value / span, value * span, unit, relative=True)
+    reach = span * abs(value) or 1.0
+    return Control(place, value, -reach, reach, unit)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,95 @@
+"""Files in the viewer: a case file with sliders, results of one kind in step, or a pattern."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.formats import read_pattern
+from foldyn.live.case_session import CaseSession
+from foldyn.live.embedded import View, check_results, results_stage
+from foldyn.live.page import live_page
+from foldyn.live.server import Server
+from foldyn.patterns import Pattern
+from foldyn.results import load
+from foldyn.statics import fold
+from foldyn.viewer import Stage, rest_stage
+
+CASE, RESULT = ".toml", ".nc"
+MOST_FOLDED = 300
+"""Panels of a pattern that is folded when it is looked at; larger ones are shown as they are."""
+
+
+def served(paths: Sequence[Path], port: int = 0) -> tuple[Server, str]:
+    """A server of files, not yet running, and the title of its page.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        A case file, a pattern file, or results of one kind.
+    port : int
+        0 takes any that is free.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, files of several kinds, or a port that is taken.
+    """
+    endings = [path.suffix.lower() for path in paths]
+    if len(paths) > 1 and set(endings) != {RESULT}:
+        raise InputError(
+            f": {len(paths)} files that are not all results (.nc); give one case file, one "
+            "pattern, or results",
+            "FILE",
+        )
+    try:
+        if endings[0] == CASE:
+            session = CaseSession(paths[0])
+            page = partial(live_page, session.title, session.about)
+            answers = {"/compute": session.compute, "/case-file": session.case_file}
+            return Server(page, answers, port), session.title
+        shown = _results(paths) if endings[0] == RESULT else _pattern(paths[0])
+        text = shown.html()
+        return Server(lambda key: text, None, port), shown.title
+    except (OSError, OverflowError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f" = {port}: {why}; choose another one, or 0", "--port") from None
+
+
+def _results(paths: Sequence[Path]) -> View:
+    """Results by the names of their files, or of their folders where these are the same."""
+    stems = [path.stem for path in paths]
+    if len(set(stems)) < len(stems):
+        stems = [f"{path.absolute().parent.name}/{path.stem}" for path in paths]
+    if len(set(stems)) < len(stems):
+        raise InputError(": the same file twice; give each once", "FILE")
+    results = {name: load(path) for name, path in zip(stems, paths, strict=True)}
+    title = f"{check_results(results)}: {', '.join(results)}"
+    return View(title, results_stage(results, title))
+
+
+def _pattern(path: Path) -> View:
+    """A pattern on its way to its fold angles, or as it is where it has none or does not fold."""
+    pattern = read_pattern(path)
+    return View(path.stem, folded_stage(pattern, path.stem))
+
+
+def folded_stage(pattern: Pattern, title: str) -> Stage:
+    """Stage of a pattern: on its way to its own fold angles, if that is quick."""
+    wanted = pattern.fold_angles
+    now = np.pi - pattern.dihedrals
+    given = np.isfinite(wanted)
+    moves = given.any() and float(np.abs(wanted - now)[given].max()) > 1e-6
+    if moves and len(pattern.faces) <= MOST_FOLDED:
+        try:
+            with warnings.catch_warnings():  # what does not fold is for `foldyn fold` to say
+                warnings.simplefilter("ignore", FoldynWarning)
+                return results_stage({title: fold(pattern).path}, title)
+        except FoldynError:
+            pass
+    return rest_stage(pattern, title)

@@ -1,0 +1,160 @@
+"""The viewer's server: one page for the browser of this machine, and answers to it alone.
+
+It listens on 127.0.0.1, knows two paths, reads no file that a request names, and answers only what
+names this host and carries the key of this run: pages of other origins, and other users of the
+machine, know neither.
+"""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+from collections.abc import Callable, Mapping
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+HOST = "127.0.0.1"
+MOST_BYTES = 100_000
+"""Size of a request's body: a table of numbers needs a hundredth of it."""
+PATIENCE = 30.0
+"""Seconds after which a connection that says nothing is closed."""
+KEY_HEADER = "X-Foldyn-Key"
+HEADERS: Mapping[str, str] = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+}
+Answer = Callable[[Any], dict[str, Any]]
+
+
+class Server(ThreadingHTTPServer):
+    """A server of one page.
+
+    Parameters
+    ----------
+    page : callable
+        Text of the page, from the key that its requests carry.
+    answers : mapping of callables, optional
+        Tables that answer tables, by the path of the request: {"/compute": ...}. They are called
+        in threads of their own, and raise nothing.
+    port : int
+        0 takes any that is free.
+
+    Raises
+    ------
+    OSError
+        The port is taken.
+
+    Attributes
+    ----------
+    key : str
+        Drawn anew for each server.
+    """
+
+    daemon_threads = True
+
+    def __init__(
+        self,
+        page: Callable[[str], str],
+        answers: Mapping[str, Answer] | None = None,
+        port: int = 0,
+    ) -> None:
+        self.key = secrets.token_urlsafe(16)
+        self.page = page(self.key).encode()
+        self.answers = dict(answers or {})
+        super().__init__((HOST, port), _Handler)
+
+    @property
+    def address(self) -> str:
+        """Where the page is; whoever knows this may see it."""
+        return f"http://{HOST}:{self.server_port}/{self.key}"
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """What a request may call this host: no name that another machine can point here."""
+        return tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of browsers that go before they are answered."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One connection."""
+
+    server: Server
+    protocol_version = "HTTP/1.1"
+    server_version = "foldyn"
+    sys_version = ""
+    timeout = PATIENCE
+    disable_nagle_algorithm = True
+
+    def do_GET(self) -> None:
+        """Give the page."""
+        if self._is_foreign():
+            return
+        if not self._is_key(self.path.partition("?")[0].removeprefix("/")):
+            self._refuse(HTTPStatus.NOT_FOUND, "open the address that foldyn view has printed")
+            return
+        self._send(HTTPStatus.OK, "text/html; charset=utf-8", self.server.page)
+
+    def do_POST(self) -> None:
+        """Answer a table with a table."""
+        if self._is_foreign():
+            return
+        if not self._is_key(self.headers.get(KEY_HEADER, "")):
+            self._refuse(HTTPStatus.FORBIDDEN, "this is not the page of this run: open it anew")
+            return
+        answer = self.server.answers.get(self.path)
+        if answer is None:
+            self._refuse(HTTPStatus.NOT_FOUND, "there is nothing here")
+            return
+        if self.headers.get_content_type() != "application/json":
+            self._refuse(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
+            return
+        length = self.headers.get("Content-Length", "")
+        if not (length.isascii() and length.isdigit()):
+            self._refuse(HTTPStatus.LENGTH_REQUIRED, "say how long the body is")
+            return
+        if len(length) > 9 or int(length) > MOST_BYTES:
+            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"send at most {MOST_BYTES} bytes")
+            return
+        try:
+            wish = json.loads(self.rfile.read(int(length)))
+        except (ValueError, RecursionError):
+            self._refuse(HTTPStatus.BAD_REQUEST, "this is no JSON")
+            return
+        self._send(HTTPStatus.OK, "application/json", json.dumps(answer(wish)).encode())
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Log nothing."""
+
+    def _is_foreign(self) -> bool:
+        """Whether a request names another host or comes from another origin; it is refused then."""
+        origin = self.headers.get("Origin")
+        known = [f"http://{host}" for host in self.server.hosts]
+        if self.headers.get("Host") in self.server.hosts and origin in (None, *known):
+            return False
+        self._refuse(HTTPStatus.FORBIDDEN, f"this server answers only as {self.server.hosts[0]}")
+        return True
+
+    def _is_key(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self.server.key.encode())
+
+    def _refuse(self, status: HTTPStatus, why: str) -> None:
+        self.close_connection = True  # the body may still be on its way
+        self._send(status, "text/plain; charset=utf-8", f"{why}\n".encode())
+
+    def _send(self, status: HTTPStatus, kind: str, content: bytes) -> None:
+        self.send_response(status)
+        for name, value in {**HEADERS, "Content-Type": kind}.items():
+            self.send_header(name, value)
+        self.send_header("Content-Length", str(len(content)))
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(content)

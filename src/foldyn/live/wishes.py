@@ -1,0 +1,149 @@
+"""What the viewer computes of a case file: its own analysis, or a quick one of another kind."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.analyses import CaseFile
+from foldyn.analyses.conversion import converted
+from foldyn.analyses.reading import case_of_document
+from foldyn.dynamics import prepare
+from foldyn.errors import FoldynWarning, InputError
+from foldyn.values import choice
+
+KINDS: Mapping[str, str] = {
+    "modes": "Modes",
+    "frf": "Frequency response",
+    "statics": "Static curve",
+    "dynamics": "Short motion",
+}
+"""What can be computed, by the kind of analysis, as the page calls it."""
+STEPS, PERIODS, FREQUENCIES, COUNT = 10, 10.0, 200, 6
+"""Of analyses that the file does not ask for: steps of a static curve, periods of the first mode
+that a motion lasts, frequencies of a response, modes."""
+SAMPLES, EVERY = 250, 4
+"""Samples of a motion, and steps between them where they are ours: a hundred in a period."""
+MOST_WORK = 1e7
+"""Steps times dofs of a motion with fixed steps: a second or some. Longer ones are cut."""
+
+Document = dict[str, Any]
+
+
+def offered(document: Document) -> dict[str, str]:
+    """What can be computed of a case file: its own kind first."""
+    own = document["analysis"]["kind"]
+    driven = any("force" in load for load in document.get("loads", ())) or "drive" in document
+    imposed = any("displacement" in support for support in document.get("supports", ()))
+    based = any("base" in support for support in document.get("supports", ()))
+    possible = {
+        "modes": True,
+        "frf": driven or based,
+        "statics": bool(document.get("loads")) or (imposed and not based),
+        "dynamics": bool(document.get("loads")) or imposed or based,
+    }
+    kinds = [kind for kind in KINDS if kind == own or possible[kind]]
+    return {kind: KINDS[kind] for kind in sorted(kinds, key=lambda kind: kind != own)}
+
+
+def computed(path: Path, document: Document, kind: str) -> tuple[CaseFile, xr.Dataset]:
+    """The case file as one of a kind, and its result with its first mass rule.
+
+    Raises
+    ------
+    InputError, ComputationError
+        As `CaseFile.run`; the file does not offer this kind.
+    """
+    choice("compute", kind, offered(document))
+    case_file = case_of_document(path, _as_kind(path, document, kind))
+    if kind != "dynamics":
+        return case_file, case_file.run()
+    asked = case_file.analysis.arguments
+    work = prepare(case_file.case(), **asked).plan.steps * case_file.case().body.size
+    if work <= MOST_WORK:
+        return case_file, case_file.run()
+    duration = asked["duration"] * MOST_WORK / work
+    warnings.warn(
+        f"the motion is shown for {duration:.3g} s of {asked['duration']:g} s, so that it is "
+        "computed soon; foldyn run computes the whole",
+        FoldynWarning,
+        stacklevel=2,
+    )
+    return case_file, case_file.run(duration=duration, every=duration / SAMPLES)
+
+
+def _as_kind(path: Path, document: Document, kind: str) -> Document:
+    """The document as one of a kind, quick to compute where the file is of another."""
+    if document["analysis"]["kind"] == kind:
+        return document
+    make = {"modes": _modes, "frf": _response, "statics": _curve, "dynamics": _motion}[kind]
+    with warnings.catch_warnings():  # what has no place there is left out, as `offered` says
+        warnings.simplefilter("ignore", FoldynWarning)
+        return make(path, document)
+
+
+def _modes(path: Path, document: Document) -> Document:
+    return converted(path, document, "modes", "rest")
+
+
+def _response(path: Path, document: Document) -> Document:
+    """As the file drives it, about all of its lowest modes."""
+    lowest = _frequencies(path, document)
+    out = converted(path, document, "frf", "rest")
+    range_ = {"first": 0.3 * lowest[0], "last": 1.2 * lowest[-1], "count": FREQUENCIES}
+    return {**out, "analysis": {"kind": "frf", "frequencies": range_, "method": "modal"}}
+
+
+def _curve(_: Path, document: Document) -> Document:
+    """Under the same loads without their histories, on a base at rest."""
+    timeless = {
+        name: [
+            {key: value for key, value in each.items() if key != "history"}
+            for each in document.get(name, ())
+            if "base" not in each
+        ]
+        for name in ("loads", "supports")
+    }
+    model = dict(document.get("model", {}))
+    if isinstance(model.get("mass"), list):
+        model["mass"] = model["mass"][0]
+    own = {"model": model, "analysis": {"kind": "statics", "steps": STEPS}}
+    return {**_kept(document), **timeless, **own}
+
+
+def _motion(path: Path, document: Document) -> Document:
+    """Under loads and supports as they are: those without a history act from the start."""
+    duration = PERIODS / float(_frequencies(path, document)[0])
+    steps = {"method": "generalized_alpha", "dt": duration / (SAMPLES * EVERY)}
+    shown = _kept(document)
+    return {
+        **shown,
+        "output": {**shown["output"], "every": EVERY},
+        "analysis": {"kind": "dynamics", "duration": duration, **steps},
+    }
+
+
+def _kept(document: Document) -> Document:
+    """What all kinds of analysis share, and the nodes that are shown."""
+    own = {key: value for key, value in document.items() if key not in ("drive", "initial")}
+    nodes = document.get("output", {}).get("nodes")
+    return {**own, "output": {} if nodes is None else {"nodes": nodes}}
+
+
+def _frequencies(path: Path, document: Document) -> NDArray[np.float64]:
+    """The lowest natural frequencies (Hz) above 0."""
+    about = {**_modes(path, document), "analysis": {"kind": "modes", "count": COUNT}}
+    found = case_of_document(path, about).run()
+    values = found["frequency"].values[~found["rigid"].values]
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not len(values):
+        raise InputError(
+            "no mode of the sheet swings, which says how long or how fast it moves; choose modes"
+        )
+    return values
