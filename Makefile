@@ -12,7 +12,7 @@ DEMO_OUT   ?= demo-results
 DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
 OLDEST ?= .venv-oldest
-OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results tests/analyses
+OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
 WORKERS ?= -n auto --maxprocesses 4
 
 .PHONY: help demo test test-oldest lint format docs wheel-check clean setup
@@ -49,12 +49,12 @@ $(STAMP): pyproject.toml requirements.lock | $(BIN)/python
 setup: $(STAMP)  ## make .venv with everything in it
 
 # ------------------------------------------------------------------------------ use
-demo: $(STAMP)  ## run the four shipped case studies; pictures in demo-results/
+demo: $(STAMP)  ## run the four shipped case studies; pages and figures in demo-results/
 	@set -e; for name in $(DEMO_CASES); do \
 	  echo "== $$name"; \
-	  $(BIN)/foldyn run $(CASES)/$$name.toml --out $(DEMO_OUT)/$$name $(DEMO_FLAGS); \
+	  $(BIN)/foldyn run $(CASES)/$$name.toml --out $(DEMO_OUT)/$$name --figures png $(DEMO_FLAGS); \
 	done
-	@echo; echo 'The pictures, and a page with all of each case:'
+	@echo; echo 'The figures, and a page with all of each case:'
 	@find $(DEMO_OUT) -name '*.png' -o -name 'report.html' | sort | sed 's/^/  /'
 
 test: $(STAMP)  ## run the tests

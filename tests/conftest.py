@@ -7,6 +7,7 @@ import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -17,6 +18,10 @@ collect_ignore_glob = ["conftest.py", "*/conftest.py"]
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("JAX_ENABLE_X64", "1")
+
+# an example may take its time on a busy machine
+settings.register_profile("foldyn", deadline=None)
+settings.load_profile("foldyn")
 
 # a job in the background ignores Ctrl-C, and so would every process that tests start
 signal.signal(signal.SIGINT, signal.default_int_handler)

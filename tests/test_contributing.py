@@ -30,6 +30,7 @@ EXISTING = {
     "An integrator": ("leapfrog", "central_difference", r'(?<!")\bcentral_difference\b(?!")'),
     "A law": ("cubic", "linear", r"\bLinearBar\b|\blinear\.(bar_(energy|stress|slope)|CODE)"),
     "A format": ("ply", "stl", r"\bstl\.write\b"),
+    "An export": ("vtp", "vtkhdf", r"\bvtkhdf\.write\b"),
 }
 CASE = """
 [pattern]

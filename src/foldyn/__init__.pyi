@@ -7,8 +7,10 @@ from foldyn import (
     dynamics as dynamics,
     errors as errors,
     experiment as experiment,
+    exports as exports,
     formats as formats,
     linear as linear,
+    live as live,
     materials as materials,
     mechanics as mechanics,
     patterns as patterns,
@@ -59,11 +61,13 @@ from foldyn.dynamics import (
     simulate as simulate,
 )
 from foldyn.experiment import fit as fit
+from foldyn.exports import export as export
 from foldyn.formats import (
     diagnose as diagnose,
     read_pattern as read_pattern,
     write_pattern as write_pattern,
 )
+from foldyn.live import View as View, view as view
 from foldyn.linear import (
     Fidelity as Fidelity,
     fidelity as fidelity,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 MOST_LINES, LONGEST_LINE, LONGEST = 20, 800, 4000
@@ -89,6 +90,29 @@ def within(field: str, file: object = None) -> Iterator[None]:
         yield
     except InputError as error:
         raise error.within(field, file) from None
+
+
+def optional(module: str, need: str, install: str) -> Any:
+    """Return a module of an optional library.
+
+    Parameters
+    ----------
+    module : str
+        Its name to import.
+    need : str
+        What needs it, and what it is called: "camera tracking needs OpenCV".
+    install : str
+        What follows "pip install".
+
+    Raises
+    ------
+    InputError
+        It is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        raise InputError(f"{need}, which is not installed: pip install {install}") from None
 
 
 class Faults:

@@ -318,7 +318,7 @@ def test_a_folder_that_is_read_only(workplace, miura) -> None:
 def test_too_few_samples_for_figures(workplace, edited) -> None:
     workplace.write(edited(("every = 0.01", "every = 0.05")))
     check(
-        workplace.call("run", "case.toml"),
+        workplace.call("run", "case.toml", "--figures", "png"),
         "output.every: gives 3 samples, spectra need 4: lower it, lengthen analysis.duration, or",
     )
     assert workplace.call("run", "case.toml", "--no-figures").status == 0

@@ -101,7 +101,7 @@ def test_a_result_with_its_states(result) -> None:
     count = motion.sizes["time"]
     told = workplace.call("convert", "run.nc", "run.fold")
     assert (told.status, told.new) == (0, ["run.fold"])
-    assert told.out.endswith(f"4 creases, {count} frames\n")
+    assert told.out.startswith("wrote run.fold: ") and told.out.endswith(" kB\n")
     assert len(written("run.fold")["file_frames"]) == count
     workplace.call("convert", "run.nc", "some.fold", "--every", "4")
     assert len(written("some.fold")["file_frames"]) == len({*range(0, count, 4), count - 1})
@@ -114,6 +114,19 @@ def test_a_result_in_one_state(result) -> None:
     assert "file_frames" not in written("a.fold")
 
 
+def test_a_result_as_a_series(result) -> None:
+    told = result[0].call("convert", "run.nc", "run.obj", "--frames", "4")
+    assert told.new == [f"run_000{k}.obj" for k in range(4)]
+    assert told.out.startswith("wrote run_0000.obj to run_0003.obj (4 files): ")
+    told = result[0].call("convert", "run.nc", "run.obj", "--frames", "3")
+    assert told.status == 2 and "run_0003.obj: belongs to a longer series" in told.err
+
+
+def test_a_result_is_known_by_its_content(result) -> None:
+    Path("run.nc").rename("run.result")
+    assert result[0].call("convert", "run.result", "run.glb", "--quiet").new == ["run.glb"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -121,7 +134,17 @@ def test_a_result_in_one_state(result) -> None:
         (["a.fold", "--check"], "--check: only for pattern files"),
         (["a.fold", "--frame", "last"], "--frame = last: give the number of a sample"),
         (["a.fold", "--frame", "99"], "frame = 99: the result has the samples 0 to"),
-        (["a.obj", "--every", "2"], "--every: only where all states are written"),
+        (["a.obj", "--every", "0"], "--every = 0: must be a whole number, at least 1"),
+        (["a.obj", "--every", "2", "--frames", "3"], "--frames: give either every or frames"),
+        (["a.obj", "--frame", "2", "--frames", "3"], "--frame: one sample or several"),
+        (["a.glb", "--frame", "2"], "--frame: not an option of the format glb; did you mean"),
+        (["a.glb", "--seconds", "0"], "--seconds = 0.0: must be at least 0.001 s"),
+        (["a.obj", "--scale", "nan"], "--scale = nan: must be a finite number"),
+        (["a.glb", "--scale", "1e40"], "--scale = 1e+40: must be in size at most 1e+06"),
+        (["run.nc", "--format", "glb"], "run.nc: is the result itself; name another file"),
+        (["a.glb", "--format", "gbl"], "--format = \"gbl\": did you mean 'glb'?"),
+        (["no/a.glb"], "no/a.glb: the folder no does not exist"),
+        (["."], ".: is a folder; name a file in it"),
         (["a.xyz"], "unknown extension"),
     ],
 )

@@ -42,7 +42,9 @@ KIND = FOLD.split("[initial]")[0] + '[analysis]\nkind = "fidelity"\ncount = 2\nd
 
 def test_a_motion_beside_the_shell(workplace) -> None:
     workplace.write(FOLD)
-    done = workplace.call("fidelity", "case.toml", "--count", "3", "--divisions", "3", "6")
+    done = workplace.call(
+        "fidelity", "case.toml", "--count", "3", "--divisions", "3", "6", "--figures", "png"
+    )
     assert done.status == 0
     assert done.err.splitlines() == [
         "foldyn: warning: case.toml: foldyn fidelity leaves out [initial]: small vibrations about "

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import base64
-from html import escape
+import json
+import re
+import subprocess
+import sys
+from html import escape, unescape
 from pathlib import Path
 
 import pytest
 
 import foldyn as fd
+from foldyn.cli import stamp
 from foldyn.cli.main import main
 from foldyn.errors import InputError
 from foldyn.plots.writers import find_ffmpeg
@@ -23,7 +28,7 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
         ("every = 0.01", 'every = 0.02\nnodes = [7]\naxis = "x"\nmax_frequency = 20.0'),
     )
     workplace.write(text)
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     results = ("result-panel.nc", "result-circumcenter.nc")
     files = {f"r/{name}" for name in (*PICTURES, *results, "report.html")}
@@ -38,8 +43,11 @@ def test_figures_of_a_tiny_case(workplace, edited) -> None:
     for told in (
         "youngs modulus 1e+06 Pa; ", "scheme n5b8; mass panel, circumcenter; ",
         "calibration plate", "alpha 0.0628 1/s; beta 0 s; state rest",
+        "<td>Fix: nodes ", "history half sine (duration 0.05)",
+        "9 vertices, 4 panels, 4 creases, 13 nodes", "in the solver; ", "<td>none</td>",
         f"Foldyn {fd.__version__}</td>",
-        "<td>foldyn run case.toml --out r</td>", "<summary>The case file case.toml</summary>",
+        "<td>foldyn run case.toml --out r --figures png</td>",
+        "<summary>The case file case.toml</summary>",
         escape(Path("case.toml").read_text("utf-8")),
     ):  # fmt: skip
         assert told in page, told
@@ -101,9 +109,49 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
         '[[supports]]\nnodes = "xmin"\n'
         '[analysis]\nkind = "dynamics"\nduration = 0.01\n[output]\nevery = 0.001\n'
     )
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     assert len(shown) == album.MOST_NODES
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert f"the first {album.MOST_NODES} of 156" in page
     assert not Path("r/load.png").exists()
+
+
+def test_a_page_without_figures(workplace, edited) -> None:
+    """It has what they show, as charts of the page, and Matplotlib is not loaded for it."""
+    workplace.write(edited(("every = 0.01", "every = 0.02")))
+    code = "import sys; from foldyn.cli.main import main; status = main(sys.argv[1:]); "
+    code += "sys.exit(status or 10 * ('matplotlib' in sys.modules))"
+    assert subprocess.call([sys.executable, "-c", code, "run", "case.toml", "--quiet"]) == 0
+    folder = Path("case-results")
+    assert sorted(path.name for path in folder.iterdir() if path.name != stamp.NAME) == [
+        "report.html", "result.nc",
+    ]  # fmt: skip
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("data-foldyn=") == 1 and "<img " not in page
+    plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]
+    titles = [plot["title"].split(":")[0] for plot in plots]
+    assert titles == ["folds", "bends", "bars", ""]
+    load = plots[-1]["curves"][0]
+    assert max(load["y"]) == pytest.approx(0.01, rel=1e-3)
+    assert "The structure" in page and "The motion" in page
+
+
+@pytest.mark.parametrize("form", ["svg", "pdf"])
+def test_figures_for_a_paper_stand_beside_the_page(workplace, edited, form) -> None:
+    workplace.write(edited(("every = 0.01", "every = 0.02")))
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", form)
+    assert (done.status, done.err) == (0, "")
+    names = [name.replace("png", form) for name in PICTURES]
+    assert set(done.new) == {"r", *(f"r/{name}" for name in (*names, "result.nc", "report.html"))}
+    page = Path("r/report.html").read_text(encoding="utf-8")
+    assert "<img " not in page and "data-plot=" in page
+    assert main(["run", "case.toml", "--out", "r", "--quiet"]) == 0
+    assert not list(Path("r").glob(f"*.{form}"))  # they would show the old motion
+
+
+def test_figures_and_none_are_refused(workplace, edited) -> None:
+    workplace.write(edited())
+    done = workplace.call("run", "case.toml", "--figures", "png", "--no-figures")
+    assert (done.status, done.new) == (2, [])
+    assert "--figures: draws figures; leave out --no-figures" in done.err

@@ -62,7 +62,7 @@ def test_a_fit_file_from_reading_to_report(fold) -> None:
     assert done.status == 0, done.err
     own = [name for name in done.new if not name.startswith("fit-fit/evaluations/")]
     assert own == [
-        "fit-fit", "fit-fit/data-0.png", "fit-fit/evaluations", "fit-fit/fit.json",
+        "fit-fit", "fit-fit/evaluations", "fit-fit/fit.json",
         "fit-fit/fit.nc", "fit-fit/fitted.toml", "fit-fit/report.html",
     ]  # fmt: skip
     told = json.loads((fold.folder / "fit-fit/fit.json").read_text())["parameters"][0]
@@ -72,7 +72,9 @@ def test_a_fit_file_from_reading_to_report(fold) -> None:
     assert fd.read_case("fit-fit/fitted.toml").sheet.length_scale_ratio == told["value"]
     page = (fold.folder / "fit-fit/report.html").read_text()
     assert "sheet.length_scale_ratio" in page
-    assert "data:image/png" in page
+    assert "data-foldyn=" in page and "data-plot=" in page and "<img " not in page
+    for told in ("<td>foldyn fit fit.toml</td>", "The case file case.toml", "<td>supports</td>"):
+        assert told in page
 
 
 def test_the_same_from_the_command_line(fold) -> None:

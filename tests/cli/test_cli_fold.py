@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,14 +31,39 @@ def turned(file: str) -> float:
 def test_a_pattern_is_folded_by_a_fraction(workplace, flap) -> None:
     told = workplace.call("fold", flap, "--to", "50%", "--steps", "3")
     assert (told.status, told.err) == (0, "")
-    assert told.new == ["flap-folded.fold", "flap-folded.gif", "flap-folded.png"]
+    assert told.new == ["flap-folded.fold", "flap-folded.html"]
     assert turned("flap-folded.fold") == pytest.approx(-90.0)
     assert told.out.startswith("1 of 1 mountains and valleys turn their way\nrigidly foldable")
-    assert "no panels cross\nwrote flap-folded.fold\nwrote flap-folded.png, flap-fol" in told.out
+    assert "no panels cross\nwrote flap-folded.fold\nwrote flap-folded.html\n" in told.out
     # the states on the way are frames
     for frame, angle in ((0, -90), (1, 0), (2, -30), (3, -60), (4, -90)):
         state = fd.read_pattern("flap-folded.fold", frame=frame)
         assert 180 - math.degrees(state.dihedrals[0]) == pytest.approx(angle, abs=1e-6)
+
+
+def test_the_page_shows_the_way_and_a_film_only_where_it_is_asked_for(workplace, flap) -> None:
+    told = workplace.call("fold", flap, "--to", "50%", "--steps", "2", "--film", "gif")
+    assert told.new == ["flap-folded.fold", "flap-folded.gif", "flap-folded.html"]
+    page = Path("flap-folded.html").read_text()
+    assert '"kind": "folding"' in page and "Rigidly foldable: panels are plane" in page
+    assert "foldyn fold flap.fold --to 50% --steps 2 --film gif" in page
+    assert Path("flap-folded.gif").read_bytes().startswith(b"GIF")
+
+
+def test_the_way_is_a_result_that_can_be_converted(workplace, flap) -> None:
+    told = workplace.call("fold", flap, "--to", "50%", "--steps", "4", "--out", "way.nc")
+    assert (told.status, told.new) == (0, ["way.html", "way.nc"])
+    way = fd.load("way.nc")
+    np.testing.assert_allclose(
+        np.degrees(way["fold_angle"][:, 0]), [0, -22.5, -45, -67.5, -90], atol=1e-3
+    )
+    told = workplace.call("convert", "way.nc", "way.fold")
+    assert told.out.startswith("wrote way.fold: ")
+    assert len(json.loads(Path("way.fold").read_text())["file_frames"]) == 5
+    assert workplace.call("convert", "way.nc", "half.obj", "--frame", "2").status == 0
+    assert turned("half.obj") == pytest.approx(-45.0, abs=1e-3)
+    shape = fd.read_pattern("way.fold", frame="0.5 of the way")
+    np.testing.assert_array_equal(shape.vertices, way["position"][2])
 
 
 def test_a_pattern_is_folded_by_a_file_of_angles(workplace, flap) -> None:
@@ -47,6 +74,17 @@ def test_a_pattern_is_folded_by_a_file_of_angles(workplace, flap) -> None:
     vertices = fd.read_pattern("b/bent.obj").vertices
     apart = np.linalg.norm(vertices[1] - vertices[3])
     assert apart == pytest.approx(math.sqrt(2.0) * math.cos(math.radians(35.0)))
+
+
+def test_a_file_of_angles_names_families(workplace) -> None:
+    fd.write_pattern("named.fold", FLAP.changed(families={"spine": [(0, 2)]}))
+    workplace.write("spine 35\n", "angles.txt")
+    quick = ("--steps", "2", "--no-figures")
+    assert workplace.call("fold", "named.fold", "--angles", "angles.txt", *quick).status == 0
+    assert turned("named-folded.fold") == pytest.approx(-35.0)
+    workplace.write("spin 35\n", "angles.txt")
+    told = workplace.call("fold", "named.fold", "--angles", "angles.txt", *quick)
+    assert told.status == 2 and "angles.spin: did you mean 'spine'" in told.err
 
 
 def test_a_pattern_is_folded_to_another_frame(workplace, flap) -> None:

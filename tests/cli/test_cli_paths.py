@@ -257,7 +257,7 @@ def test_what_is_refused_leaves_an_earlier_run_as_it_was(workplace, slow) -> Non
 
 def test_figures_of_a_loaded_path(workplace, slow) -> None:
     workplace.write(slow() + '[output]\nnodes = [6, 7]\naxis = "x"\nshapes = [0, -1]\n')
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     files = {*PICTURES, "curve.png", "result.nc", "report.html"}
     assert set(done.new) == {"r", *(f"r/{name}" for name in files)}
@@ -282,7 +282,7 @@ def test_figures_of_moved_supports(workplace, edited) -> None:
     factors = "load_factors = [0, 10, 20, 30, 40, 50]"
     text = edited(MOVED, (factors, 'method = "displacement"\nsteps = 4'), text=TOWER)
     workplace.write(text)
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     pictures = {*PICTURES, "reaction.png"}
     assert set(done.new) == {"r", *(f"r/{n}" for n in (*pictures, "result.nc", "report.html"))}
@@ -295,7 +295,7 @@ def test_figures_of_moved_supports(workplace, edited) -> None:
     assert all(f"{value:.4g}" in page for value in force)
     # nodes that move otherwise get their curve, too, in another folder
     workplace.write(text.replace("[analysis]", "[output]\nnodes = [0, 6]\n[analysis]"))
-    assert "s/curve.png" in workplace.call("run", "case.toml", "--out", "s").new
+    assert "s/curve.png" in workplace.call("run", "case.toml", "--out", "s", "--figures", "png").new
 
 
 def test_figures_of_an_earlier_motion_go(workplace, slow, tmp_path) -> None:
@@ -311,7 +311,7 @@ def test_figures_of_an_earlier_motion_go(workplace, slow, tmp_path) -> None:
 
 def test_a_single_point_is_drawn(workplace, slow) -> None:
     workplace.write(slow(("load_factors = [0, 0.5, 1]", "load_factors = [1]")))
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     assert "1 point to the load factor 1" in done.out
     assert "r/shapes.png" in done.new and "r/path.gif" not in done.new

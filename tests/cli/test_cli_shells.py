@@ -20,7 +20,7 @@ HISTORY = ('history = { kind = "half_sine", duration = 0.05 }\n', "")
 
 def test_a_motion_with_all_figures(workplace, edited) -> None:
     workplace.write(edited(SHELL))
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     assert done.out.startswith("a Miura unit cell: 25 nodes, 32 triangles, 4 folds\n")
     assert "lumped: generalized_alpha, implicit: the rotations of a shell have no mass" in done.out
@@ -36,7 +36,7 @@ def test_a_motion_with_all_figures(workplace, edited) -> None:
 
 def test_a_path_and_its_energies(workplace, edited) -> None:
     workplace.write(edited(SHELL, STATICS, HISTORY))
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert "Strain energies of membrane, bending, folds, stacked" in page

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import csv
+import json
+import re
+from html import unescape
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import foldyn as fd
 from foldyn.cli.main import main
+from foldyn.experiment.tracking.tracks_page import filled
 from foldyn.structures.discretize import PER_NODE
 
 cv2 = pytest.importorskip("cv2")
@@ -66,7 +71,10 @@ def inside(folder, monkeypatch):
 
 
 def test_a_film_becomes_histories(inside, capsys):
-    assert main(["track", "film.mkv", "--model", "case.toml", "--out", "a/run.nc"]) == 0
+    assert (
+        main(["track", "film.mkv", "--model", "case.toml", "--out", "a/run.nc", "--figures", "png"])
+        == 0
+    )
     said = capsys.readouterr().out
     assert "nodes recognized" in said and "wrote a/run.nc" in said
     tracks = fd.experiment.load_tracks("a/run.nc")
@@ -81,6 +89,12 @@ def test_a_film_becomes_histories(inside, capsys):
     assert float(rows[4][column]) == pytest.approx(moved[3], rel=1e-6)
     for name in ("run-overlay.png", "run-history.png"):
         assert (inside / "a" / name).stat().st_size > 10_000
+    page = (inside / "a" / "run.html").read_text("utf-8")
+    assert page.index("data-foldyn=") < page.index("data-plot=") < page.index("<img ")
+    plots = [json.loads(unescape(text)) for text in re.findall(r'data-plot="(.*?)"', page)]
+    assert [curve["name"] for curve in plots[0]["curves"]] == ["x", "y"]  # z: the line of sight
+    for told in ("along the line of sight, z.", "<td>foldyn track film.mkv --model case.toml"):
+        assert told in page
 
 
 def test_photographs_with_loads(inside):
@@ -90,7 +104,28 @@ def test_photographs_with_loads(inside):
     moved = tracks["displacement"].sel(axis="x", node=[6, 8, 11, 13]).values
     assert np.nanmedian(moved[1] - moved[0]) == pytest.approx(0.003, abs=1e-4)
     assert (inside / "photos.csv").read_text("utf-8").startswith("photo,load [N],node")
-    assert not list(inside.glob("photos*.png"))
+    assert not [*inside.glob("photos*.png"), *inside.glob("photos*.html")]
+    assert main([*given, "--out", "shown.nc", "--quiet"]) == 0
+    page = (inside / "shown.html").read_text("utf-8")
+    assert '"kind": "path"' in page and page.count("data:image/jpeg") == 2  # the photographs
+    assert not list(inside.glob("shown*.png"))
+
+
+def test_gaps_of_tracks_are_filled_for_the_picture():
+    """In time by straight lines, over the sheet by neighbors, 0 along the line of sight."""
+    moved = np.full((3, 4, 3), np.nan)
+    moved[:, 0, :2] = [[0.0, 0.0], [np.nan, np.nan], [2.0, 4.0]]
+    moved[:, 3, :2] = 3.0
+    tracks = xr.Dataset(
+        {
+            "displacement": (("time", "node", "axis"), moved),
+            "edges": (("edge", "end"), [[0, 1], [1, 2], [2, 3]]),
+        }
+    )
+    found = filled(tracks)
+    assert found[1, 0].tolist() == [1.0, 2.0, 0.0]
+    np.testing.assert_allclose(found[:, 1, 0], [1.0, 5.0 / 3.0, 7.0 / 3.0], rtol=1e-6)
+    np.testing.assert_allclose(found[:, 2, 0], [2.0, 7.0 / 3.0, 8.0 / 3.0], rtol=1e-6)
 
 
 def test_without_a_model_there_are_pixels(inside):

@@ -116,7 +116,7 @@ def test_a_case_file_about_a_stored_equilibrium(workplace, small) -> None:
 def test_figures_of_modes(workplace, small) -> None:
     text = small(('"circumcenter"', '["circumcenter", "panel"]'))
     workplace.write(text + '[output]\nshapes = [1, 3]\naxis = "y"\n')
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     results = ("result-circumcenter.nc", "result-panel.nc")
     drawn = (*PICTURES, "mac.png", "report.html")
@@ -148,7 +148,7 @@ def test_figures_of_a_response(workplace, small) -> None:
     finer = ("count = 61", "count = 601")
     text = small(('"circumcenter"', '["circumcenter", "panel"]'), finer, text=RESPONSE)
     workplace.write(text + 'quantity = "mobility"\n')
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     results = ("result-circumcenter.nc", "result-panel.nc")
     drawn = ("structure.png", "laws.png", "response.png", "nyquist.png", "report.html")
@@ -181,7 +181,7 @@ def test_figures_of_a_response(workplace, small) -> None:
 def test_a_response_to_a_moving_base(workplace, small) -> None:
     text = small(("nodes = [7]\nforce = [0.01, 0, 0]", 'base = "x"'), text=RESPONSE)
     workplace.write(text)
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
     assert "r/nyquist.png" not in done.new  # circles are those of responses to forces
     page = Path("r/report.html").read_text(encoding="utf-8")
@@ -230,7 +230,7 @@ def test_a_response_in_time(workplace, small) -> None:
         text=RESPONSE,
     )
     workplace.write(text)
-    done = workplace.call("run", "case.toml", "--out", "r")
+    done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert done.status == 0
     result = fd.load("r/result.nc")
     assert result.attrs["averages"] == 2

@@ -42,6 +42,8 @@ def limited(size: int):
 
 
 def test_signals_keep_what_was_computed_and_four_at_once_are_one(tmp_path, edited) -> None:
+    (tmp_path / "case.toml").write_text(edited())
+    fd.read_case(tmp_path / "case.toml").run()  # compiles, which would take each of them minutes
     (tmp_path / "case.toml").write_text(edited(LONG))
     run = ("run", "case.toml", "--no-figures")
     others = {signal.SIGHUP: "other"}
@@ -91,8 +93,11 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
 
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
     workplace.run(edited(("every = 0.01", "every = 0.001")), "--out", "before")  # compiles
-    stopped = start(tmp_path, "run", "case.toml", "--out", "stopped")
-    full = start(tmp_path, "run", "case.toml", "--out", "full", preexec_fn=limited(120_000))
+    stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
+    full = start(
+        tmp_path, "run", "case.toml", "--out", "full", "--figures", "png",
+        preexec_fn=limited(120_000),
+    )  # fmt: skip
     wait_for_line(stopped, "drawing figures")  # takes some seconds from here on
     stopped.send_signal(signal.SIGINT)
     status, _, err = ended(stopped)

@@ -172,7 +172,7 @@ def test_a_full_disk_is_got_around(workplace, edited, monkeypatch, tmp_path_fact
 def test_figures_that_cannot_be_drawn_do_not_hide_the_result(workplace, edited) -> None:
     Path("r/structure.png").mkdir(parents=True)
     workplace.write(edited(("every = 0.01", "every = 0.02")))
-    failed = workplace.call("run", "case.toml", "--out", "r")
+    failed = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert failed.status == 1
     assert "wrote r/result.nc" in failed.out
     reason, kept = failed.err.splitlines()

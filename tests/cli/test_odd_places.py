@@ -36,7 +36,9 @@ def test_all_that_is_odd_at_once(tmp_path, edited) -> None:
     Path(os.fsdecode(file)).write_text(edited(FEW, TITLE), encoding="utf-8")
     odd = {"PYTHONIOENCODING": "ascii", "HOME": None, "MPLBACKEND": "bogus", "TMPDIR": "/nowhere"}
     odd["LC_ALL"] = "xx_YY.none"
-    run = start(tmp_path, "run", ODD + b".toml", "--out", b"o/" + ODD, changes=odd)
+    run = start(
+        tmp_path, "run", ODD + b".toml", "--out", b"o/" + ODD, "--figures", "png", changes=odd
+    )
     status, out, err = ended(run)
     assert status == 0, err
     assert "F\\xe4lle \\u6298 $x^{$: 13 nodes" in out

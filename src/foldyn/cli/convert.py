@@ -1,4 +1,4 @@
-"""`foldyn convert`: a pattern file read, checked, and written in another format."""
+"""`foldyn convert`: a pattern file, a result or a case, written in another format."""
 
 from __future__ import annotations
 
@@ -6,85 +6,139 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.options import add_switches, flag
+from foldyn.cli.options import add_reading, add_switches, flag, frame_of
 from foldyn.cli.streams import speech
 from foldyn.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from foldyn.formats import Frame
-    from foldyn.patterns import Pattern
+    from foldyn.cases import Case
 
 RESULT = ".nc"
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of a NetCDF file."""
+PATTERNS_ONLY = ("check", "unit")
+RESULTS_ONLY = ("format", "every", "frames", "seconds", "rows", "fields", "nodes")
+DECKS_ONLY = ("divisions", "modes", "element")
+"""Options that belong to one kind of files."""
 
 
 def add_convert(commands: Any) -> None:
     """Add the arguments of `foldyn convert`."""
     command = commands.add_parser(
         "convert",
-        help="read a pattern file, check it, write it in another format",
-        description="Read a pattern file and write it in the format that the ending of OUT names; "
-        "a result (.nc) is written with all of its states, or in one of them. --check says what "
-        "was assumed, repaired and doubted, with the conditions of flat folding at each vertex.",
+        help="write a pattern file or a result in another format",
+        description="Read a pattern file, or a result (.nc), and write it in the format that the "
+        "ending of OUT names; a case file becomes an input deck (.inp, .tcl). --check says what "
+        "was assumed of a pattern file, repaired and doubted, with the conditions of flat folding "
+        "at each vertex.",
     )
-    command.add_argument("file", metavar="IN", help="pattern file, or a motion or path (.nc)")
+    command.add_argument("file", metavar="IN", help="pattern file, result (.nc) or case file")
     command.add_argument("out", metavar="OUT", nargs="?", help="file to make or to replace")
     flag(command, "--check", "print the diagnosis; without OUT, write nothing")
-    command.add_argument("--scale", type=float, help="factor on all lengths")
-    command.add_argument("--unit", help="unit of the coordinates of IN: mm, cm, m, in, ...")
-    command.add_argument("--frame", help="number or title of the frame, or number of the sample")
-    command.add_argument("--every", type=int, help="of a result, take every such sample (1)")
+    add_reading(
+        command,
+        "number or title of the frame, or number of the sample",
+        "factor on all lengths, or displacements of a result",
+    )
+    command.add_argument("--format", help="format of a result, where the ending does not name it")
+    command.add_argument("--every", type=int, help="of a result, take every such sample")
+    command.add_argument("--frames", type=int, help="of a result, take so many samples, evenly")
+    command.add_argument("--seconds", type=float, help="how long an animation (.glb) takes")
+    command.add_argument("--rows", help="of tables, what a row is for: time,node (default), time")
+    command.add_argument("--fields", help="of a result, these variables: displacement,velocity")
+    command.add_argument("--nodes", help="of a result, these nodes: 0,7,12")
+    command.add_argument("--divisions", type=int, help="of input decks, pieces of every edge (16)")
+    command.add_argument("--modes", type=int, help="of input decks, how many frequencies (6)")
+    command.add_argument("--element", help="of Abaqus, kind of the triangles: STRI3 (default), S3")
     add_switches(command, figures=False)
 
 
 def convert(given: argparse.Namespace) -> None:
     """Do what the arguments of `add_convert` ask for."""
-    from foldyn.formats import write_pattern
-
     if given.out is None and not given.check:
         raise InputError(": missing; name the file to write, or give --check", "OUT")
     source = Path(given.file)
-    is_result = source.suffix.lower() == RESULT
-    pattern, frames = (_states if is_result else _pattern)(given, source)
-    if given.out is not None:
-        write_pattern(given.out, pattern, frames)
-        more = f", {len(frames)} frames" if frames else ""
-        speech(given.quiet)(
-            f"wrote {given.out}: {len(pattern.vertices)} vertices, {len(pattern.faces)} panels, "
-            f"{len(pattern.creases)} creases{more}"
-        )
+    if _is_result(source):
+        _export(given, source)
+    elif _is_case(given.file):
+        _export(given, _case(given.file))
+    else:
+        _convert_pattern(given, source)
 
 
-def _pattern(given: argparse.Namespace, source: Path) -> tuple[Pattern, Sequence[Frame]]:
-    """Pattern of a file; its diagnosis is printed, or warned of."""
-    from foldyn.formats import diagnose, read_pattern
-
-    if given.every is not None:
-        raise InputError(": only for results (.nc); leave it out", "--every")
-    frame = int(given.frame) if given.frame and given.frame.isdecimal() else given.frame
-    if not given.check:
-        return read_pattern(source, given.scale, given.unit, frame, "line"), ()
-    pattern, diagnosis = diagnose(source, given.scale, given.unit, frame, "line")
-    print(f"{source}: {pattern!r}")
-    print(diagnosis)
-    return pattern, ()
+def _is_result(source: Path) -> bool:
+    """Whether a file is a result, by its suffix or by its first bytes."""
+    if source.suffix.lower() == RESULT:
+        return True
+    try:
+        with source.open("rb") as file:
+            return file.read(len(HDF5)) == HDF5
+    except OSError:  # said by who reads it
+        return False
 
 
-def _states(given: argparse.Namespace, source: Path) -> tuple[Pattern, Sequence[Frame]]:
-    """Pattern of a result with its states, or in one of them."""
-    from foldyn.formats import FORMATS
-    from foldyn.results import frames_of, load, state_of
+def _is_case(name: str) -> bool:
+    """Whether this names a case file, or a shipped one."""
+    from foldyn.studies import shipped_cases
 
-    for name in ("check", "scale", "unit"):
+    return name.endswith(".toml") or (name in shipped_cases() and not Path(name).exists())
+
+
+def _case(name: str) -> Case:
+    """The case that a file describes."""
+    from foldyn.analyses import read_case
+    from foldyn.studies import find_case
+
+    return read_case(find_case(name)).case()
+
+
+def _export(given: argparse.Namespace, what: Path | Case) -> None:
+    """Write a result or a case in the format of another program."""
+    from foldyn.exports import export
+
+    for name in PATTERNS_ONLY:
         if getattr(given, name):
             raise InputError(": only for pattern files; leave it out", f"--{name}")
     if given.frame is not None and not given.frame.isdecimal():
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
-    result = load(source)
-    fmt = FORMATS.get(Path(given.out).suffix.lower())
-    if given.frame is None and (fmt is None or fmt.frames):
-        return frames_of(result, 1 if given.every is None else given.every)
-    if given.every is not None:
-        raise InputError(": only where all states are written, as .fold", "--every")
-    return state_of(result, None if given.frame is None else int(given.frame)), ()
+    options = {name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale")}
+    frame = None if given.frame is None else int(given.frame)
+    try:
+        files = export(what, given.out, frame=frame, **options)
+    except InputError as error:
+        raise error.within("--" if error.key in (*options, "frame") else "") from None
+    speech(given.quiet)(f"wrote {_listed(files)}")
+
+
+def _listed(files: Sequence[Path]) -> str:
+    """Names of files, the first and the last of many, with their size."""
+    size = sum(file.stat().st_size for file in files)
+    names = ", ".join(map(str, files))
+    if len(files) > 3:
+        names = f"{files[0]} to {files[-1].name} ({len(files)} files)"
+    return f"{names}: {size / 1e3:.4g} kB"
+
+
+def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
+    """Write a pattern file in another format; its diagnosis is printed, or warned of."""
+    from foldyn.formats import diagnose, read_pattern, write_pattern
+
+    for names, kind in ((RESULTS_ONLY, "results (.nc)"), (DECKS_ONLY, "input decks (.inp, .tcl)")):
+        for name in names:
+            if getattr(given, name) is not None:
+                raise InputError(f": only for {kind}; leave it out", f"--{name}")
+    frame = frame_of(given.frame)
+    if given.check:
+        pattern, diagnosis = diagnose(source, given.scale, given.unit, frame, "line")
+        print(f"{source}: {pattern!r}")
+        print(diagnosis)
+    else:
+        pattern = read_pattern(source, given.scale, given.unit, frame, "line")
+    if given.out is not None:
+        write_pattern(given.out, pattern)
+        speech(given.quiet)(
+            f"wrote {given.out}: {len(pattern.vertices)} vertices, {len(pattern.faces)} panels, "
+            f"{len(pattern.creases)} creases"
+        )

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import add_results
+from foldyn.cli.options import BOTH, add_figures, add_results
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import progress_bar, speech
+from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
+from foldyn.plots import FIGURES
 
 if TYPE_CHECKING:
     from foldyn.experiment import Course, Estimate, Fit
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
 
 WRITTEN = ("fit.json", "fit.nc", "fitted.toml")
 KEPT = "evaluations"
-DRAWN = ("report.html", "correlation.png", "data-[0-9].png", "data-[0-9][0-9].png")
+DRAWN = [
+    "report.html",
+    *(f"{n}.{form}" for n in ("correlation", "data-[0-9]", "data-[0-9][0-9]") for form in FIGURES),
+]
 
 
 def add_fit(commands: Any) -> None:
@@ -62,17 +67,23 @@ def add_fit(commands: Any) -> None:
     fit.add_argument("--starts", type=int, help="searches, from random starts within the bounds")
     fit.add_argument("--processes", type=int, help="evaluations that run at a time")
     add_results(fit, "NAME-fit")
+    add_figures(fit)
 
 
 def run_fit(given: argparse.Namespace) -> Path:
     """Fit what the arguments of `add_fit` ask for; returns the folder of the results."""
+    begun = time.perf_counter(), time.process_time()
+    if given.figures and given.no_figures:
+        raise InputError(BOTH)
     plan = plan_of(given)
     folder = Path(f"{plan.path.stem}-fit" if given.out is None else given.out)
     names = [*WRITTEN, *([] if given.no_figures else ["report.html"])]
     owner = Owner.of("fit", plan.path, folder)
     say = speech(given.quiet)
     with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
-        found = _fit(plan, results, given.quiet)
+        with noted_warnings() as noted:
+            found = _fit(plan, results, given.quiet)
+        wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
         for one in found.estimates:
             say(f"  {_line(one, found.confidence)}")
         for score in found.scores:
@@ -83,10 +94,13 @@ def run_fit(given: argparse.Namespace) -> Path:
             results.keep(name, write)
         say(f"wrote {folder / WRITTEN[0]}")
         if not given.no_figures:
+            from foldyn.analyses.provenance import Call
             from foldyn.experiment.calibration.fit_page import write_fit
 
             with drawing(folder):
-                say(f"wrote {write_fit(found, folder, plan.title)}")
+                call = Call(given.typed, tuple(noted), wall, cpu)
+                page = write_fit(found, folder, plan.title, call=call, figures=given.figures)
+                say(f"wrote {page}")
     return folder
 
 

@@ -6,15 +6,17 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
-from foldyn.cli.options import add_switches
+from foldyn.cli.options import add_film, add_reading, add_switches, frame_of
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import progress_bar, speech
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.input_files import read_text
 
 if TYPE_CHECKING:
-    from foldyn.formats import Frame
+    from collections.abc import Callable
+
     from foldyn.statics import Folding
 
 MOST = 8  # MiB, of a file of angles
@@ -27,7 +29,7 @@ def add_fold(commands: Any) -> None:
         help="fold a pattern file",
         description="Fold a flat or partly folded pattern, every mountain and valley its own way, "
         "and say what does not fold. OUT is the folded pattern, as FOLD with the states on the way "
-        "as frames; a picture and an animation stand beside it.",
+        "as frames; a page that shows the way stands beside it.",
     )
     command.add_argument("pattern", metavar="PATTERN", help="pattern file: FOLD, SVG, CP, ...")
     aim = command.add_mutually_exclusive_group()
@@ -52,31 +54,40 @@ def add_fold(commands: Any) -> None:
         help="pattern, folded (open from the folded state), or auto (default): folded where the "
         "pattern does not fold its way",
     )
-    command.add_argument("--scale", type=float, help="factor on all lengths")
-    command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
-    command.add_argument("--frame", help="number or title of the frame to start from")
-    command.add_argument("--out", help="file to write (default: NAME-folded.fold)")
+    command.add_argument(
+        "--panels",
+        default="whole",
+        help="subdivided: cut from their middles, so that they bend as paper does (default: whole)",
+    )
+    add_reading(command, "number or title of the frame to start from")
+    command.add_argument(
+        "--out",
+        help="file to write (default: NAME-folded.fold): the folded pattern, or as a result (.nc) "
+        "the states on the way",
+    )
+    add_film(command)
     add_switches(command)
 
 
 def run_fold(given: Namespace) -> Path:
     """Run the command; returns the path of the folded pattern."""
-    from foldyn.formats import FORMATS, read_pattern, write_pattern
+    from foldyn.formats import read_pattern
+    from foldyn.plots.writers import find_ffmpeg
     from foldyn.statics import fold
 
     source = Path(given.pattern)
-    pattern = read_pattern(source, given.scale, given.unit, _frame(given.frame))
+    pattern = read_pattern(source, given.scale, given.unit, frame_of(given.frame))
     out = Path(f"{source.stem}-folded.fold" if given.out is None else given.out)
-    fmt = FORMATS.get(out.suffix.lower())
-    if fmt is None or fmt.write is None:
-        able = ", ".join(end for end, each in FORMATS.items() if each.write is not None)
-        raise InputError(f"--out {out}: name a file that ends in one of {able}")
+    write = _writer(out)
     check_folder(out.parent, given.out, [out.name])
+    if given.film == "mp4":
+        with within("--film mp4: "):
+            find_ffmpeg()
     angles = None
     if given.angles is not None:
         angles = read_angles(given.angles)
     elif given.to_frame is not None:
-        angles = read_pattern(source, given.scale, given.unit, _frame(given.to_frame))
+        angles = read_pattern(source, given.scale, given.unit, frame_of(given.to_frame))
     say = speech(given.quiet)
     with progress_bar(given.quiet, total=given.steps, unit="step") as bar:
 
@@ -86,28 +97,34 @@ def run_fold(given: Namespace) -> Path:
             bar.update()
 
         folding = fold(
-            pattern, angles, given.to, steps=given.steps, start=given.start, progress=tell
-        )
+            pattern, angles, given.to, steps=given.steps, start=given.start,
+            panels=given.panels, progress=tell,
+        )  # fmt: skip
     out.parent.mkdir(parents=True, exist_ok=True)
     with ENDINGS.saving():
-        write_pattern(out, folding.pattern, _frames(folding) if fmt.frames else ())
+        write(folding)
     say(folding.report())
     say(f"wrote {out}")
     if not given.no_figures:
         with drawing(out, f"\nfoldyn: kept what was computed: {out}"):
-            say(f"wrote {', '.join(_figures(folding, out))}")
+            say(f"wrote {', '.join(_drawn(folding, out, source.stem, given))}")
     return out
 
 
-def _frame(given: str | None) -> int | str | None:
-    return int(given) if given is not None and given.isdecimal() else given
+def _writer(out: Path) -> Callable[[Folding], None]:
+    """What writes a folding to a file of this name."""
+    from foldyn.formats import FORMATS, write_pattern
+    from foldyn.results import frames_of, save
 
-
-def _frames(folding: Folding) -> list[Frame]:
-    from foldyn.formats import Frame
-
-    positions, last = folding.path["position"].values, len(folding.path["step"]) - 1
-    return [Frame(f"step {k} of {last}", x) for k, x in enumerate(positions)]
+    if out.suffix.lower() == RESULT:
+        return lambda folding: save(folding.path, out)
+    fmt = FORMATS.get(out.suffix.lower())
+    if fmt is None or fmt.write is None:
+        able = ", ".join(end for end, each in FORMATS.items() if each.write is not None)
+        raise InputError(f"--out {out}: name a file that ends in one of {able}, or in {RESULT}")
+    return lambda folding: write_pattern(
+        out, folding.pattern, frames_of(folding.path).frames if fmt.frames else ()
+    )
 
 
 def read_angles(path: str) -> dict[Any, float]:
@@ -138,13 +155,13 @@ def read_angles(path: str) -> dict[Any, float]:
     return found
 
 
-def _figures(folding: Folding, out: Path) -> list[str]:
-    """Draw the states and the animation; returns the names of their files."""
+def _drawn(folding: Folding, out: Path, name: str, given: Namespace) -> list[str]:
+    """Draw the page, and the film where it is asked for; returns the names of their files."""
     from foldyn import plots
-    from foldyn.writing import whole
+    from foldyn.analyses.folding_page import write_folding_page
 
-    picture, film = out.with_suffix(".png"), out.with_suffix(".gif")
-    with whole(picture) as part:
-        plots.draw_folding(folding).savefig(part, dpi=120)
-    plots.animate_folding(folding, film)
-    return [str(picture), str(film)]
+    page = write_folding_page(out.with_suffix(".html"), folding, f"{name}, folded", given.typed)
+    films = []
+    if given.film:
+        films.append(plots.animate_folding(folding, out.with_suffix(f".{given.film}")))
+    return [str(path) for path in (page, *films)]

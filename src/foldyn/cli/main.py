@@ -19,16 +19,20 @@ from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
-from foldyn.cli.options import add_film, add_results
+from foldyn.cli.options import add_figures, add_film, add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
 from foldyn.cli.track import add_track, track
+from foldyn.cli.view import add_view, run_view
 from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-OTHERS = {"convert": convert, "fit": run_fit, "fold": run_fold, "track": track, "study": study}
+OTHERS = {
+    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study, "track": track,
+    "view": run_view,
+}  # fmt: skip
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment of OpenCV: we report a broken film ourselves, and its decoders keep quiet."""
@@ -112,6 +116,7 @@ def parser() -> argparse.ArgumentParser:
     add_study(commands)
     add_fit(commands)
     add_track(commands)
+    add_view(commands)
     commands.add_parser(
         "info",
         help="versions, threads, optional parts, shipped cases",
@@ -126,6 +131,7 @@ def _add_case(command: argparse.ArgumentParser, results: str) -> None:
         "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
     )
     add_results(command, f"NAME-{results}")
+    add_figures(command)
 
 
 def _add_common(command: argparse.ArgumentParser, results: str) -> None:

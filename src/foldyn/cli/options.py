@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from foldyn.plots import ANIMATIONS, FIGURES
+
 
 def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:
     """Add an option without a value."""
@@ -17,10 +19,33 @@ def add_results(command: argparse.ArgumentParser, default: str, figures: bool = 
     add_switches(command, figures)
 
 
+def add_reading(
+    command: argparse.ArgumentParser, frame: str, scale: str = "factor on all lengths"
+) -> None:
+    """Add how a pattern file is read; `frame` and `scale` say what these are for."""
+    command.add_argument("--scale", type=float, help=scale)
+    command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
+    command.add_argument("--frame", help=frame)
+
+
+def frame_of(given: str | None) -> int | str | None:
+    """Number or title of a frame."""
+    return int(given) if given is not None and given.isdecimal() else given
+
+
+BOTH = "--figures: draws figures; leave out --no-figures"
+"""Message where both are given."""
+
+
+def add_figures(command: argparse.ArgumentParser) -> None:
+    """Add the figures for papers."""
+    command.add_argument("--figures", choices=FIGURES, help="draw figures too, beside the page")
+
+
 def add_film(command: argparse.ArgumentParser) -> None:
     """Add the film of what moves."""
     command.add_argument(
-        "--film", choices=("gif", "mp4"), help="write the motion as a film too, beside its page"
+        "--film", choices=ANIMATIONS, help="write the motion as a film too, beside its page"
     )
 
 

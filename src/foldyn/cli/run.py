@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Mapping
@@ -12,12 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
-from foldyn.analyses.provenance import mesh_error
+from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
-from foldyn.cli.streams import speech
+from foldyn.cli.streams import noted_warnings, speech
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
+from foldyn.plots import FIGURES
 from foldyn.studies import find_case
 
 if TYPE_CHECKING:
@@ -28,10 +31,11 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "shell": ("nodes", "triangles", "folds"),
 }
 """What is counted in the structure of each model."""
-DRAWN = (
-    "report.html", "structure.png", "laws.png",
-    *(name for kind in ANALYSES.values() for name in kind.files),
-)  # fmt: skip
+FILES = ["structure", "laws", *(name for kind in ANALYSES.values() for name in kind.files)]
+DRAWN = [
+    "report.html", *(name for name in FILES if "." in name),
+    *(f"{name}.{form}" for name in FILES if "." not in name for form in FIGURES),
+]  # fmt: skip
 """Files of all pages."""
 
 
@@ -42,8 +46,11 @@ def run(given: Namespace) -> Path:
     folder is stamped with the command and the case file: others' results in it are refused, or
     replaced where that is asked for.
     """
-    path, figures = find_case(given.case), not given.no_figures
+    begun = time.perf_counter(), time.process_time()
+    path, page = find_case(given.case), not given.no_figures
     command, suffix = given.command, "results" if given.command == "run" else given.command
+    if given.figures and not page:
+        raise InputError(BOTH)
     if given.model is not None:
         command, suffix = f"{command} --model {given.model}", f"{given.model}-{suffix}"
     folder = Path(f"{path.stem}-{suffix}" if given.out is None else given.out)
@@ -54,22 +61,30 @@ def run(given: Namespace) -> Path:
             case_file = replace(case_file, output=output)
         task = [case_file.computation(mass) for mass in case_file.masses]
         with case_file.placing():
-            case_file.analysis.check([one.compute for one in task], figures)
-        if figures:
+            case_file.analysis.check([one.compute for one in task], given.figures is not None)
+        if page:
             _check_video(case_file)
     names = [one.file for one in task]
     say = speech(given.quiet)
     introduction = _introduction(case_file, task, caught, say)
     owner = Owner.of(command, path, folder)
-    pages = ["report.html"] if figures else []
+    pages = ["report.html"] if page else []
     with held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept:
-        done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
+        with noted_warnings() as noted:
+            bar = not given.quiet and sys.stderr.isatty()
+            done = _computed(task, kept, introduction, bar, say)
+        call = Call(
+            given.typed, tuple(noted), time.perf_counter() - begun[0],
+            time.process_time() - begun[1],
+        )  # fmt: skip
         say(f"wrote {', '.join(kept.kept)}")
-        if figures:
+        if page:
+            drawn = given.figures or case_file.output.animation
             with drawing(case_file.path):  # whatever keeps them from it, the results are there
-                say("drawing figures")
-                page = case_file.analysis.page(case_file, done, folder, given.typed)
-            say(f"wrote figures and {page}")
+                if drawn:
+                    say("drawing figures")
+                written = case_file.analysis.page(case_file, done, folder, call, given.figures)
+            say(f"wrote {'figures and ' if drawn else ''}{written}")
     return folder
 
 

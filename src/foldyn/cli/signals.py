@@ -30,6 +30,11 @@ class Endings:
         """Exit status of a process that was ended: 128 and the signal's number."""
         return 128 + (self.first or signal.SIGINT)
 
+    @property
+    def by_hand(self) -> bool:
+        """Whether Ctrl-C came, and not what ends a job."""
+        return self.first in (None, signal.SIGINT)
+
     @contextmanager
     def heeded(self) -> Iterator[None]:
         """Handle signals within the block; those that are ignored, as under nohup, stay ignored."""

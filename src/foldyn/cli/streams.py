@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -87,3 +88,18 @@ def progress_bar(quiet: bool, **options: Any) -> Any:
     from tqdm import tqdm
 
     return tqdm(disable=quiet or not sys.stderr.isatty(), leave=False, **options)
+
+
+@contextmanager
+def noted_warnings() -> Iterator[list[str]]:
+    """Note warnings, each once, which are shown all the same."""
+    noted, show = list[str](), warnings.showwarning
+
+    def both(message: Warning | str, *rest: Any) -> None:
+        if str(message) not in noted:
+            noted.append(str(message))
+        show(message, *rest)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = both
+        yield noted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -94,9 +95,11 @@ def _data(names: Sequence[str] | None, say: Say) -> Data | None:
 
 
 def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:
+    from foldyn.analyses.provenance import Call
     from foldyn.studies.herkal import report
     from foldyn.studies.herkal.study import FULL, QUICK, RESULTS, Study
 
+    begun = time.perf_counter(), time.process_time()
     data = _data(given.data, say)
     one = Study(QUICK if given.quick else FULL, results.folder, data)
     n = one.plan.numerics
@@ -109,7 +112,8 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
         say(f"the specimen: calibrated to {names or 'a synthetic film'}")
     ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
-    return report.write(one), ended
+    wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+    return report.write(one, Call(given.typed, wall=wall, cpu=cpu)), ended
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:

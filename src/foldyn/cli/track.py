@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.folder import check_folder, drawing, rescued
-from foldyn.cli.options import add_switches
+from foldyn.cli.options import BOTH, add_figures, add_switches
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import progress_bar, speech
+from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.input_files import check_file
 from foldyn.studies import find_case
@@ -25,9 +26,12 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from foldyn.experiment import TrackedModel, Tracking
+    from foldyn.cases import Case
+    from foldyn.experiment import Tracking
+    from foldyn.experiment.tracking.tracks_page import Footage
 
-_SHOWN = 3  # nodes in the figure of histories
+QUALITY = 75
+"""Of the pictures in a page, in percent."""
 _KEPT = "\nfoldyn: kept what was computed: "
 
 
@@ -70,17 +74,24 @@ def add_track(commands: Any) -> None:
     track.add_argument("--loads", metavar="N,N,...", help="load of each photograph (N)")
     track.add_argument("--reach", metavar="PIXELS", help="length of the edges that make a corner")
     add_switches(track)
+    add_figures(track)
 
 
 def track(given: Namespace) -> Path:
     """Run the command; returns the path of the tracks."""
     from foldyn import experiment
+    from foldyn.analyses.provenance import Call
+    from foldyn.experiment.tracking.tracks_page import write_tracks_page
 
+    begun = time.perf_counter(), time.process_time()
+    if given.figures and given.no_figures:
+        raise InputError(BOTH)
     experiment.opencv()  # nothing else is worth a look without it
     out = Path(given.out)
     if out.suffix != ".nc":
         raise InputError(f"--out {given.out}: name a file that ends in .nc")
-    check_folder(out.parent, given.out, [out.name, out.with_suffix(".csv").name])
+    names = [out.with_suffix(end).name for end in (".nc", ".csv", ".html")]
+    check_folder(out.parent, given.out, names)
     photos = _are_photos(given.inputs)
     settings = _tracking(given)
     roi, rate = whole_numbers(given, "roi", 4), one_number(given, "rate")
@@ -88,7 +99,8 @@ def track(given: Namespace) -> Path:
     if loads is not None and not photos:
         raise InputError("--loads: a film has times; loads belong to photographs")
     film = None if photos else experiment.open_film(given.inputs[0], roi, rate)  # type: ignore
-    model = None if given.model is None else model_of(given.model)
+    thing = None if given.model is None else modeled(given.model)
+    model = None if thing is None else experiment.TrackedModel.of(thing)
     if photos and model is None:
         raise InputError(
             "--model: photographs need one: from one to the next points move too far to be "
@@ -96,7 +108,7 @@ def track(given: Namespace) -> Path:
         )
     say = speech(given.quiet)
     total, unit = (len(given.inputs), "photo") if film is None else (None, "frame")
-    with progress_bar(given.quiet, total=total, unit=unit) as bar:
+    with noted_warnings() as noted, progress_bar(given.quiet, total=total, unit=unit) as bar:
 
         def tell(number: int) -> None:
             bar.update()
@@ -111,7 +123,14 @@ def track(given: Namespace) -> Path:
     say(f"wrote {out}, {out.with_suffix('.csv')}")
     if not given.no_figures:
         with drawing(out, f"{_KEPT}{out}"):
-            say(f"wrote {', '.join(_figures(ds, out, given.inputs, film))}")
+            # without a model nothing else shows what was tracked
+            form = given.figures or (None if "displacement" in ds else "png")
+            written = [] if form is None else _figures(ds, out, given.inputs, film, form)
+            wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+            call = Call(given.typed, tuple(noted), wall, cpu)
+            footage = _footage(given, written, thing, film, ds)
+            page = write_tracks_page(ds, out, footage, call)
+            say(f"wrote {', '.join([*written, str(page)])}")
     return out
 
 
@@ -165,16 +184,15 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
     return [number(option, value) for value in values]
 
 
-def model_of(name: str) -> TrackedModel:
-    """Model from a result, from a case at rest, or with all states of a static case's path."""
+def modeled(name: str) -> Case | xarray.Dataset:
+    """Model as a result, as a case at rest, or as a static case's path with all its states."""
     import foldyn as fd
-    from foldyn.experiment import TrackedModel
 
     if name.endswith(".nc"):
-        return TrackedModel.of(fd.load(name))
+        return fd.load(name)
     case_file = fd.read_case(find_case(name))
     static = case_file.analysis.kind == "statics"
-    return TrackedModel.of(case_file.run() if static else case_file.case())
+    return case_file.run() if static else case_file.case()
 
 
 def summary(ds: xarray.Dataset) -> str:
@@ -236,15 +254,18 @@ def _tracking(given: Namespace) -> Tracking:
     )
 
 
-def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) -> list[str]:
+def _figures(
+    ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any, form: str
+) -> list[str]:
     """Draw the overlays and histories; returns the names of their files."""
     from foldyn import plots
     from foldyn.experiment import read_photo
+    from foldyn.experiment.tracking.tracks_page import most_moved
 
     written: list[str] = []
 
     def save(name: str, figure: Figure) -> None:
-        file = out.with_name(f"{out.stem}-{name}.png")
+        file = out.with_name(f"{out.stem}-{name}.{form}")
         with whole(file) as part:
             figure.savefig(part)
         written.append(str(file))
@@ -256,18 +277,36 @@ def _figures(ds: xarray.Dataset, out: Path, inputs: Sequence[str], film: Any) ->
         for k, name in enumerate(inputs):
             save(f"overlay-{k}", plots.draw_overlay(read_photo(name), ds, k))
     if "displacement" in ds:
-        save("history", plots.plot_tracks(ds, _best(ds)))
+        save("history", plots.plot_tracks(ds, most_moved(ds)))
     return written
 
 
-def _best(ds: xarray.Dataset) -> list[int]:
-    """Nodes that move most among those that were measured most of the time."""
-    import numpy as np
+def _footage(
+    given: Namespace, written: Sequence[str], thing: Case | xarray.Dataset | None, film: Any,
+    tracks: xarray.Dataset,
+) -> Footage:  # fmt: skip
+    """What tracks were found in, for their page."""
+    from foldyn.cases import Case
+    from foldyn.experiment import read_photo
+    from foldyn.experiment.tracking.tracks_page import Footage, spread
+    from foldyn.report import Picture
+    from foldyn.results import case_of
 
-    moved = ds["displacement"].values
-    known = np.isfinite(moved)
-    high = np.where(known, moved, -np.inf).max(axis=0)
-    low = np.where(known, moved, np.inf).min(axis=0)
-    span = np.where(np.isfinite(high - low), high - low, 0.0).max(axis=1)
-    span[ds["tracked"].values < 0.9 * ds["tracked"].values.max()] = -1.0
-    return sorted(int(node) for node in np.argsort(-span)[:_SHOWN])
+    case = thing if thing is None or isinstance(thing, Case) else case_of(thing)
+    overlays = [name for name in written if "-overlay" in name and name.endswith(".png")]
+    figures = [Picture(name, "The model where it was recognized.") for name in overlays]
+    options = ("model", "scale", "reference", "distance", "match", "nodes", "reach")
+    settings = {name: str(value) for name in options if (value := getattr(given, name))}
+    if film is None:
+        photos = [_jpeg(read_photo(name)) for name in given.inputs]
+        return Footage(given.inputs, dict(enumerate(photos)), figures, case, settings)
+    pictures = spread(tracks.sizes["time"], lambda frame: _jpeg(film.picture(frame)))
+    return Footage(given.inputs, pictures, figures, case, settings)
+
+
+def _jpeg(picture: Any) -> bytes:
+    """A gray picture as a file, for a page."""
+    from foldyn.experiment import opencv
+
+    cv2 = opencv()
+    return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()

@@ -1,0 +1,58 @@
+"""`foldyn view`: a case file with sliders, results or a pattern in the browser."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from foldyn.cli.options import flag
+from foldyn.cli.signals import ENDINGS
+from foldyn.cli.streams import speech
+
+
+def add_view(commands: Any) -> None:
+    """Add the command and its arguments."""
+    command = commands.add_parser(
+        "view",
+        help="look at a case file, results or a pattern in the browser",
+        description="Open a page in the browser: a case file with sliders for the numbers of its "
+        "pattern, sheet and damping, computed anew with each change; results, several of one kind "
+        "in step; or a pattern, folded to its fold angles. The page is served to this machine "
+        "alone until Ctrl-C.",
+    )
+    command.add_argument(
+        "files", metavar="FILE", nargs="+",
+        help="case file (TOML) or the name of a shipped one, results (.nc), or a pattern file",
+    )  # fmt: skip
+    command.add_argument("--port", type=int, default=0, help="port (default: any that is free)")
+    flag(command, "--no-browser", "print the address and open no browser")
+    flag(command, "--quiet", "print nothing but the address")
+    flag(command, "--force", "go on even if more than half of the memory is needed, as estimated")
+
+
+def run_view(given: Namespace) -> None:
+    """Serve the page until Ctrl-C."""
+    from threadpoolctl import threadpool_limits
+
+    from foldyn.live.files import served
+    from foldyn.studies import find_case
+
+    say = speech(given.quiet)
+    server, title = served([find_case(name) for name in given.files], given.port)
+    with server, threadpool_limits(1, user_api="blas"):  # small matrices
+        try:
+            print(server.address, flush=True)
+            say(f"{title}: the page is at this address until Ctrl-C")
+            if not given.no_browser:
+                _open(server.address)
+            server.serve_forever()
+        except KeyboardInterrupt:
+            if not ENDINGS.by_hand:
+                raise
+            say("")
+
+
+def _open(address: str) -> None:
+    import webbrowser
+
+    webbrowser.open(address)
