@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH, add_figures, add_results
 from foldyn.cli.stamp import Owner
@@ -72,7 +72,7 @@ def add_fit(commands: Any) -> None:
 
 def run_fit(given: argparse.Namespace) -> Path:
     """Fit what the arguments of `add_fit` ask for; returns the folder of the results."""
-    begun = time.perf_counter(), time.process_time()
+    clock = Clock.now()
     if given.figures and given.no_figures:
         raise InputError(BOTH)
     plan = plan_of(given)
@@ -83,7 +83,7 @@ def run_fit(given: argparse.Namespace) -> Path:
     with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
         with noted_warnings() as noted:
             found = _fit(plan, results, given.quiet)
-        wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+        spent = clock.spent()
         for one in found.estimates:
             say(f"  {_line(one, found.confidence)}")
         for score in found.scores:
@@ -98,7 +98,7 @@ def run_fit(given: argparse.Namespace) -> Path:
             from foldyn.experiment.calibration.fit_page import write_fit
 
             with drawing(folder):
-                call = Call(given.typed, tuple(noted), wall, cpu)
+                call = Call(given.typed, tuple(noted), **spent)
                 page = write_fit(found, folder, plan.title, call=call, figures=given.figures)
                 say(f"wrote {page}")
     return folder

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Mapping
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
+from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
@@ -46,7 +46,7 @@ def run(given: Namespace) -> Path:
     folder is stamped with the command and the case file: others' results in it are refused, or
     replaced where that is asked for.
     """
-    begun = time.perf_counter(), time.process_time()
+    clock = Clock.now()
     path, page = find_case(given.case), not given.no_figures
     command, suffix = given.command, "results" if given.command == "run" else given.command
     if given.figures and not page:
@@ -73,10 +73,7 @@ def run(given: Namespace) -> Path:
         with noted_warnings() as noted:
             bar = not given.quiet and sys.stderr.isatty()
             done = _computed(task, kept, introduction, bar, say)
-        call = Call(
-            given.typed, tuple(noted), time.perf_counter() - begun[0],
-            time.process_time() - begun[1],
-        )  # fmt: skip
+        call = Call(given.typed, tuple(noted), **clock.spent())
         say(f"wrote {', '.join(kept.kept)}")
         if page:
             drawn = given.figures or case_file.output.animation

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, held
 from foldyn.cli.options import add_results, flag
 from foldyn.cli.stamp import Owner
@@ -99,7 +99,7 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
     from foldyn.studies.herkal import report
     from foldyn.studies.herkal.study import FULL, QUICK, RESULTS, Study
 
-    begun = time.perf_counter(), time.process_time()
+    clock = Clock.now()
     data = _data(given.data, say)
     one = Study(QUICK if given.quick else FULL, results.folder, data)
     n = one.plan.numerics
@@ -112,8 +112,7 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
         say(f"the specimen: calibrated to {names or 'a synthetic film'}")
     ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
-    wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-    return report.write(one, Call(given.typed, wall=wall, cpu=cpu)), ended
+    return report.write(one, Call(given.typed, **clock.spent())), ended
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cli.clock import Clock
 from foldyn.cli.folder import check_folder, drawing, rescued
 from foldyn.cli.options import BOTH, add_figures, add_switches
 from foldyn.cli.signals import ENDINGS
@@ -83,7 +83,7 @@ def track(given: Namespace) -> Path:
     from foldyn.analyses.provenance import Call
     from foldyn.experiment.tracking.tracks_page import write_tracks_page
 
-    begun = time.perf_counter(), time.process_time()
+    clock = Clock.now()
     if given.figures and given.no_figures:
         raise InputError(BOTH)
     experiment.opencv()  # nothing else is worth a look without it
@@ -126,8 +126,7 @@ def track(given: Namespace) -> Path:
             # without a model nothing else shows what was tracked
             form = given.figures or (None if "displacement" in ds else "png")
             written = [] if form is None else _figures(ds, out, given.inputs, film, form)
-            wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-            call = Call(given.typed, tuple(noted), wall, cpu)
+            call = Call(given.typed, tuple(noted), **clock.spent())
             footage = _footage(given, written, thing, film, ds)
             page = write_tracks_page(ds, out, footage, call)
             say(f"wrote {', '.join([*written, str(page)])}")
