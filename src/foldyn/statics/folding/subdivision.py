@@ -25,6 +25,13 @@ def are_slivers(corners: NDArray) -> NDArray[np.bool_]:
     return area < SLIVER * (sides**2).sum(axis=2).max(axis=1)
 
 
+def _sides(triangles: NDArray) -> tuple[NDArray, NDArray[np.int64]]:
+    """Sides (k, 2) of triangles (n, 3), each once; the rows (n, 3) of those of each, in order."""
+    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    sides, row = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    return sides, row.reshape(-1, 3)
+
+
 def subdivided(pattern: Pattern) -> tuple[Pattern, NDArray[np.int64]]:
     """Barycentric subdivision of a pattern, and the crease (nc,) that each of its creases halves.
 
@@ -44,9 +51,8 @@ def subdivided(pattern: Pattern) -> tuple[Pattern, NDArray[np.int64]]:
             'sliver; take "whole", or divide the panel at the one in the middle',
             "panels",
         )
-    corners = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)  # (nt, 3, 2)
-    edges, middle = np.unique(np.sort(corners.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-    middle = len(pattern.vertices) + middle.reshape(-1, 3)
+    edges, middle = _sides(triangles)
+    middle += len(pattern.vertices)
     center = middle.max() + 1 + np.arange(len(triangles))
     points = np.concatenate([
         pattern.vertices, pattern.vertices[edges].mean(axis=1),
@@ -64,18 +70,17 @@ def subdivided(pattern: Pattern) -> tuple[Pattern, NDArray[np.int64]]:
     rim = {
         edge_of(end, number[edge_of(*pair)]) for pair in pattern.boundary.tolist() for end in pair
     }
-    sides = np.unique(np.sort(np.concatenate([
-        np.array(faces)[:, [0, 1]], np.array(faces)[:, [1, 2]], np.array(faces)[:, [0, 2]]
-    ]), axis=1), axis=0)  # fmt: skip
-    welds = [pair for a, b in sides.tolist() if (pair := (a, b)) not in parent and pair not in rim]
+    welds = [
+        pair
+        for a, b in _sides(np.array(faces))[0].tolist()
+        if (pair := (a, b)) not in parent and pair not in rim
+    ]
+    pairs, halved = np.array([*parent]), np.array([*parent.values()])
     letters, angles = pattern.assignments, pattern.fold_angles.tolist()
     made = Pattern(
         points, faces, {pair: letters[k] for pair, k in parent.items()}, pattern.name,
         fold_angles={pair: angles[k] for pair, k in parent.items()},
-        families={
-            name: [pair for pair, k in parent.items() if k in set(rows.tolist())]
-            for name, rows in pattern.families.items()
-        },
+        families={name: pairs[np.isin(halved, own)] for name, own in pattern.families.items()},
         custom=pattern.custom, welds=welds,
     )  # fmt: skip
     row = edge_lookup(made.creases)
