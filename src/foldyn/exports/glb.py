@@ -145,20 +145,20 @@ def _content(case: Case, shapes: Shapes, animations: list[Animation]) -> Content
 
 def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Panels, and the lines of each kind, with their materials."""
+    structure = case.structure
     paper = {"baseColorFactor": linear(PAPER), "metallicFactor": 0.0, "roughnessFactor": 0.9}
     primitives = [
-        {"mode": TRIANGLES, "material": 0, "indices": content.indices(case.structure.triangles)}
+        {"mode": TRIANGLES, "material": 0, "indices": content.indices(structure.triangles)}
     ]
     materials: list[dict[str, Any]] = [
         {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
     ]
-    structure = case.structure
     pairs, kind, *_ = edge_pieces(structure.pattern, structure.nodes, structure.edge_nodes)
-    for number_, letter in enumerate(KINDS):
-        if not (kind == number_).any():
+    for row, letter in enumerate(KINDS):
+        if not (kind == row).any():
             continue
         color = {"baseColorFactor": linear(CREASES.get(letter, BLACK)), "metallicFactor": 0.0}
-        lines = content.indices(pairs[kind == number_])
+        lines = content.indices(pairs[kind == row])
         primitives.append({"mode": LINES, "material": len(materials), "indices": lines})
         materials.append(
             {

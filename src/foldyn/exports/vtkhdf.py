@@ -20,6 +20,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
+from foldyn.exports.chosen import ALONG
 from foldyn.formats.writers import warn_of_boards
 from foldyn.results import shapes_of
 from foldyn.results.netcdf import fill
@@ -78,7 +79,7 @@ def write(
     """
     warn_of_boards(case.structure.pattern)
     shapes = shapes_of(result, every, frames)
-    dimension = next(name for name in ("time", "step", "mode") if name in result.sizes)
+    dimension = ALONG[result.attrs["foldyn_result"]]
     some = result.isel({dimension: shapes.samples})
     moments = some[dimension].values if dimension in some.coords else shapes.samples
     mesh = _mesh(case.structure)

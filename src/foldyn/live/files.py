@@ -16,6 +16,7 @@ from foldyn.live.embedded import View, check_results, results_stage
 from foldyn.live.page import live_page
 from foldyn.live.server import Server
 from foldyn.patterns import Pattern
+from foldyn.patterns.frames import fold_angles
 from foldyn.results import load
 from foldyn.statics import fold
 from foldyn.viewer import Stage, rest_stage
@@ -82,9 +83,8 @@ def _pattern(path: Path) -> View:
 def folded_stage(pattern: Pattern, title: str) -> Stage:
     """Stage of a pattern: on its way to its own fold angles, if that is quick."""
     wanted = pattern.fold_angles
-    now = np.pi - pattern.dihedrals
     given = np.isfinite(wanted)
-    moves = given.any() and float(np.abs(wanted - now)[given].max()) > 1e-6
+    moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
         try:
             with warnings.catch_warnings():  # what does not fold is for `foldyn fold` to say

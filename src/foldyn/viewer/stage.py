@@ -175,10 +175,8 @@ def allowed(size: float, largest: float) -> float:
 def _modes(
     arrays: Arrays, key: str, case: Case, result: xr.Dataset, own: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    shapes, words = (
-        result["shape"].transpose("mode", "node", "axis").values,
-        character(result, case=case),
-    )
+    shapes = result["shape"].transpose("mode", "node", "axis").values
+    words = character(result, case=case)
     out = []
     for k, frequency in enumerate(result["frequency"].values.tolist()):
         damping = float(result["damping_ratio"][k]) if "damping_ratio" in result else np.nan
