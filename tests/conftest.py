@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from browsers import browser  # noqa: F401 - a fixture
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 # no doctests in them, and pytest cannot collect several modules of one name

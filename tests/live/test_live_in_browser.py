@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import threading
 import tomllib
 from pathlib import Path
@@ -11,14 +10,9 @@ import pytest
 from live_samples import FOLD, MIURA, write
 
 import foldyn as fd
+from browsers import listened
 from foldyn.live.files import served
 
-playwright = pytest.importorskip("playwright.sync_api")
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
-SHAKY = ("GL Driver Message", "GPU stall")  # of software rendering
 LIVE = "document.getElementById('live')"
 COLORS = """page => { page.play(false); page.draw();
 const c = document.createElement('canvas'), { canvas } = page.view;
@@ -27,32 +21,11 @@ const x = c.getContext('2d'); x.drawImage(canvas, 0, 0);
 return new Set(new Uint32Array(x.getImageData(0, 0, c.width, c.height).data.buffer)).size }"""
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader"]
-        chromium = started.chromium.launch(executable_path=BROWSER, args=arguments)
-        yield chromium
-        chromium.close()
-
-
 @pytest.fixture
 def tab(browser):
     """A page that keeps what it complains of."""
     context = browser.new_context(reduced_motion="reduce", accept_downloads=True)
-    page = context.new_page()
-    page.errors, page.asked = [], []
-    page.on("pageerror", lambda error: page.errors.append(str(error)))
-    page.on(
-        "console",
-        lambda m: (
-            m.type in ("error", "warning")
-            and not any(word in m.text for word in SHAKY)
-            and page.errors.append(m.text)
-        ),
-    )
-    page.on("request", lambda asked: page.asked.append(asked.url))
-    yield page
+    yield listened(context)
     context.close()
 
 
@@ -68,7 +41,7 @@ def running(request, tmp_path_factory):
 
 
 def shown(tab, count):
-    tab.wait_for_selector(f"#live[data-shown='{count}']", timeout=60_000)
+    tab.wait_for_selector(f"#live[data-shown='{count}']", timeout=300_000)  # the first compiles
 
 
 def opened(tab, server):
