@@ -19,7 +19,7 @@ from foldyn import __version__
 from foldyn.cases import Case
 from foldyn.exports.gltf import LINES, TRIANGLES, Content, linear
 from foldyn.formats.writers import warn_of_boards
-from foldyn.plots.palette import BLACK, CREASE_NAMES, CREASES, PAPER
+from foldyn.patterns.palette import BLACK, CREASE_NAMES, CREASES, PAPER
 from foldyn.results import Shapes, shapes_of
 from foldyn.values import number
 from foldyn.viewer.sheet import KINDS, edge_pieces

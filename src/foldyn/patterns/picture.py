@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.patterns.palette import CREASES, PAPER
+
 if TYPE_CHECKING:
     from foldyn.patterns.pattern import Pattern
 
@@ -20,11 +22,12 @@ MOST_PANELS = 600
 """Beyond, the picture would be too large for a notebook; there is none."""
 MOST_WORDS = 200
 """Letters below it."""
-PAPER = (242, 223, 184)
-BACK = (217, 195, 154)
+FRONT, BACK = bytes.fromhex(PAPER[1:]), (217, 195, 154)
 LINES = {
-    "M": ("#d55e00", "1.6", ""), "V": ("#0072b2", "1.6", "5 3"), "F": ("#767676", "1.2", "1.5 2"),
-    "U": ("#b8578e", "1.4", "5 2 1 2"), "B": ("#444", "1.1", ""),
+    "M": (CREASES["M"], "1.6", ""), "V": (CREASES["V"], "1.6", "5 3"),
+    "F": (CREASES["F"], "1.2", "1.5 2"),
+    "U": ("#B8578E", "1.4", "5 2 1 2"),  # as on the page: thin lines need a darker purple
+    "B": ("#444", "1.1", ""),
 }  # fmt: skip
 """Color, width and dashes of edges by their letter, "B" for boundaries."""
 
@@ -71,7 +74,7 @@ def _panels(pattern: Pattern, places: NDArray, depth: NDArray, toward: NDArray) 
     out = []
     for face in order.tolist():
         corners = " ".join(f"{a:g} {b:g}" for a, b in places[list(pattern.faces[face])].tolist())
-        base, bright = (PAPER if facing[face] >= 0.0 else BACK), 0.72 + 0.28 * abs(facing[face])
+        base, bright = (FRONT if facing[face] >= 0.0 else BACK), 0.72 + 0.28 * abs(facing[face])
         fill = "".join(f"{round(bright * part):02x}" for part in base)
         out.append(f'<path d="M{corners}z" fill="#{fill}"/>')
         for edge in edges_of[face]:

@@ -17,8 +17,8 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.patterns.palette import PAPER
 from foldyn.plots import style
-from foldyn.plots.palette import PAPER
 
 Points = NDArray[np.float64]
 """Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from foldyn.plots.palette import (  # noqa: F401  figures take all colors from here
+from foldyn.patterns.palette import (  # noqa: F401  figures take all colors from here
     BLACK,
     BLUE,
     CREASE_NAMES,
