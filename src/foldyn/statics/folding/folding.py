@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, FoldynWarning, InputError
+from foldyn.mechanics.crossings import crossing_panels
 from foldyn.patterns import Pattern
-from foldyn.patterns.crossings import crossing_panels
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
+from foldyn.results.crossings import pairs_text
 from foldyn.statics.folding.energy import FoldEnergy
 from foldyn.statics.folding.layer_order import with_layers
 from foldyn.statics.folding.record import folded_pattern, path_of
@@ -37,7 +38,7 @@ from foldyn.values import choice, whole
 if TYPE_CHECKING:
     import xarray
 
-MOST_SHOWN = 8  # creases and pairs of panels that a text names
+MOST_SHOWN = 8  # creases that a text names
 SHUT = 1e-3  # rad from 180 degrees: a crease counts as closed
 CRUMPLED = 0.1  # strain beyond which a state is taken only where there is no other
 STARTS = ("auto", "pattern", "folded")
@@ -170,7 +171,7 @@ class Folding:
             )
         if self.first_crossings:
             step, pairs = min(self.first_crossings.items())
-            shown = _listed([f"{a} and {b}" for a, b in pairs.tolist()])
+            shown = pairs_text(pairs)
             now = f"{len(self.crossings)} pairs" if len(self.crossings) else "none"
             lines.append(
                 f"panels cross: from step {step} of {steps} on ({shown}); in the folded state {now}"
@@ -238,7 +239,9 @@ def fold(
     Warns
     -----
     FoldynWarning
-        Mountains or valleys that have not turned their own way; panels that cross.
+        Mountains or valleys that have not turned their own way.
+    CrossingWarning
+        Panels that pass through each other in a state of the path.
 
     Notes
     -----
@@ -385,12 +388,13 @@ def _warn(folding: Folding) -> None:
             FoldynWarning,
             stacklevel=3,
         )
-    if len(folding.crossings):
-        shown = _listed([f"{a} and {b}" for a, b in folding.crossings.tolist()])
+    if folding.first_crossings:
+        step, pairs = min(folding.first_crossings.items())
+        shown, where = pairs_text(pairs), f"first at step {step} of the path"
+        if len(folding.crossings):
+            shown, where = pairs_text(folding.crossings), f"in the folded state, {where}"
         warnings.warn(
-            f"panels pass through each other in the folded state: {shown}",
-            FoldynWarning,
-            stacklevel=3,
+            f"panels pass through each other: {shown}, {where}", CrossingWarning, stacklevel=3
         )
 
 
