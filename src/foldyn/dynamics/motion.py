@@ -48,8 +48,8 @@ INACCURATE = 1e-2  # relative energy error above which the user is warned
 EXPLODED = 1.0  # and above which the motion is stopped
 # Panels that cross are looked for at samples so far apart that it takes a small share of the time
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
-IMPLICIT_WORK = 250  # how many of them one of an implicit method, with its solution, stands for
-FEW = 10_000  # triangles looked at that take no time to speak of
+IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
+FEW = 1000  # triangles looked at that take no time to speak of
 SWING = 0.5  # turn (rad) of a hinge in one step that is too much for any law
 MET = 1e-3  # rad from closed: panels that have met
 

@@ -93,7 +93,8 @@ def crossings_of(case: Case, displacement: NDArray, stride: int = 1) -> Crossing
 
     def seen(samples: range) -> dict[int, NDArray[np.int64]]:
         finite = [k for k in samples if np.isfinite(displacement[k]).all()]
-        return {k: np.setdiff1d(keys(displacement[k]), at_rest) for k in finite}
+        found = {k: keys(displacement[k]) for k in finite}
+        return {k: np.setdiff1d(new, at_rest) if len(new) else new for k, new in found.items()}
 
     found = seen(range((count - 1) % stride, count, stride))
     earliest = next((k for k, pairs in found.items() if len(pairs)), 0)
