@@ -176,3 +176,7 @@ class FoldynWarning(UserWarning):
 
     def __init__(self, message: object = "") -> None:
         super().__init__(shortened(str(message)))
+
+
+class CrossingWarning(FoldynWarning):
+    """Panels pass through each other in a result; the message says which, and when first."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, FoldynWarning, InputError
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -242,7 +242,8 @@ def test_panels_that_pass_through_each_other_are_named():
     points = [(a, b) for a in x for b in (0.0, 1.0)]
     faces = [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(3)]
     pattern = fd.Pattern(points, faces, ["V", "V"])
-    with pytest.warns(FoldynWarning, match="pass through each other in the folded state: 0 and 2"):
+    said = "pass through each other: 0 and 2, in the folded state, first at step 7 of the path"
+    with pytest.warns(CrossingWarning, match=said):
         folding = fd.fold(pattern, 170, steps=10)
     assert folding.crossings.tolist() == [[0, 2]]
     # they meet where the flaps have the height of their hinges' distance over 2 tan

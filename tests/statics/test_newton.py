@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 
 import foldyn as fd
-from foldyn.errors import ComputationError
+from foldyn.errors import ComputationError, CrossingWarning
 from foldyn.statics import OrigamiProblem, Settings, Solver, trace
 from foldyn.structures import ModelOptions
 
@@ -208,7 +208,8 @@ def test_panels_do_not_pass_through_each_other():
     s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01), fold_law="linear", preset="herkal")
     supports = [fd.Fix([0, 1], "xyz"), fd.Fix([2, 3], "y"), fd.Impose([4, 5], "x", -0.75)]
     case = fd.Case(s, [*supports, fd.Fix([4, 5], "yz")])
-    with pytest.raises(ComputationError) as caught:
+    # before that their middles do, which bulge towards each other
+    with pytest.warns(CrossingWarning, match="0 and 1"), pytest.raises(ComputationError) as caught:
         trace(case, "displacement", steps=20)
     path = caught.value.partial
     folded = np.degrees([s.dihedrals(u)[0][0] for u in path.displacement.values])

@@ -23,6 +23,7 @@ from foldyn.report.album import (
     Album,
     ByRule,
     by_mass_rule,
+    crossing_panels,
     load_charts,
     rules,
     shown_nodes,
@@ -194,6 +195,7 @@ class MotionAnalysis(Analysis):
         )
         yield Heading("The numbers")
         yield _table(case_file, results, nodes)
+        yield from crossing_panels(results)
         yield Text(
             "The energy error is the largest imbalance of kinetic + strain + dissipated energy - "
             "work, relative to the largest of them. The results carry their own case and can be "

@@ -10,7 +10,14 @@ import xarray
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
-from foldyn.report.album import Album, ByRule, listed, shown_nodes, visible_scale
+from foldyn.report.album import (
+    Album,
+    ByRule,
+    crossing_panels,
+    listed,
+    shown_nodes,
+    visible_scale,
+)
 from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
@@ -69,6 +76,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
         yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
     yield Heading("The numbers")
     yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
+    yield from crossing_panels(results)
     yield _run(case_file, path)
     yield Text(
         f"{_multiplied(path)} Stable means that the tangent stiffness of the free nodes has no "

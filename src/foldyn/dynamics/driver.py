@@ -115,6 +115,8 @@ def simulate(
     -----
     FoldynWarning
         The energy balance is off by more than 1 % of the energies at play.
+    CrossingWarning
+        Panels pass through each other at a sample that was looked at.
 
     Notes
     -----

@@ -28,12 +28,15 @@ from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import expected_samples
 from foldyn.errors import (
     ComputationError,
+    CrossingWarning,
     FoldynWarning,
     InstabilityError,
     MotionInterrupted,
     PenetrationError,
 )
 from foldyn.results import trajectory_dataset
+from foldyn.results.crossings import Crossings, crossings_of
+from foldyn.structures.locking import kept_apart
 
 if TYPE_CHECKING:
     import xarray
@@ -43,6 +46,12 @@ CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY se
 REPORT_EVERY = 0.25
 INACCURATE = 1e-2  # relative energy error above which the user is warned
 EXPLODED = 1.0  # and above which the motion is stopped
+# Panels that cross are looked for at samples so far apart that it takes a small share of the time
+PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
+IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
+FEW = 1000  # triangles looked at that take no time to speak of
+SWING = 0.5  # turn (rad) of a hinge in one step that is too much for any law
+MET = 1e-3  # rad from closed: panels that have met
 
 
 class Motion:
@@ -74,7 +83,12 @@ class Motion:
     def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
         """Integrate the motion; see `simulate`."""
         self.samples(progress)
-        return self._dataset()
+        crossings = self._crossings()
+        if len(crossings.first):
+            when = f"t = {self._out.time[crossings.first[0]]:.6g} s"
+            text = crossings.text(when, self.stored)
+            warnings.warn(text, CrossingWarning, stacklevel=3)
+        return self._dataset(crossings)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
@@ -212,10 +226,18 @@ class Motion:
             wings = f"wings {i}, {l}" if l is not None else f"wing {i}, the edge is clamped"
             self._stop(
                 f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} ({wings}) "
-                "jumped by more than pi; a fold law that locks (EnhancedLinear) or a smaller step "
-                "keeps panels apart",
+                f"jumped by more than pi; {self._apart(hinge)}",
                 PenetrationError,
             )
+        if code == Outcome.STUCK and len(hinges):
+            closed = _from_closed(self._course.angle)
+            hinge = int(closed.argmin())
+            if closed[hinge] < MET:
+                j, k = order[hinges[hinge, :2]].tolist()
+                self._stop(
+                    f"{moment} the error asks for a step of {tally.wanted:.3g} s: panels meet "
+                    f"about nodes {j}-{k}; {self._apart(hinge)}"
+                )
         if code == Outcome.STUCK:
             self._stop(
                 f"{moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps too "
@@ -234,15 +256,34 @@ class Motion:
             )
         self._stop(f"{moment} the motion is no longer finite: {reason}")
 
-    def _dataset(self) -> xarray.Dataset:
-        """Samples stored so far, with the case and the statistics."""
+    def _apart(self, hinge: int) -> str:
+        """How to keep the panels at a hinge apart; its dihedral is that of the last step."""
+        if self.plan.dt > self.critical or _from_closed(self._course.angle[hinge]) > SWING:
+            return f"the hinge has turned too far within a step: {self._smaller_step()}"
+        j, k = self._packed.numbering.order[self._packed.model.hinges[hinge, :2]].tolist()
+        return kept_apart(self.case.structure, j, k)
+
+    def _crossings(self) -> Crossings:
+        """Panels that cross at the samples so far."""
+        each = IMPLICIT_WORK if self.method.implicit else 1
+        threads = self._engine.threads if self._engine else 1
+        work = each * int(self._course.tally.evaluations) / threads
+        few = FEW // max(1, len(self.case.structure.triangles))
+        looks = max(1, few, int(work / PER_LOOK))
+        stride = -(-max(1, self.stored) // looks)
+        return crossings_of(self.case, self._written().displacement, stride)
+
+    def _dataset(self, crossings: Crossings | None = None) -> xarray.Dataset:
+        """Samples stored so far, with the case, the statistics and the panels that cross."""
         out = self._written()
+        crossings = crossings or self._crossings()
         names = audited(self.case.energy_groups)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
-        return trajectory_dataset(
+        result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), self._sampler.columns(self.stored),
         )  # fmt: skip
+        return crossings.recorded(result)
 
     def _written(self) -> Samples:
         return Samples(*(array[: self.stored] for array in self._out))
@@ -305,3 +346,8 @@ class Motion:
                 f"displacements of this size ({rounding:.2g} J), which may be all that moves"
             )
         return f"{off}: {self._smaller_step()}"
+
+
+def _from_closed(angle: NDArray) -> NDArray:
+    """How far (rad) dihedrals are from 0 and 2 pi."""
+    return np.minimum(angle, 2.0 * np.pi - angle)

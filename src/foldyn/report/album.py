@@ -26,6 +26,8 @@ CURVE_STEP, CURVE_POINTS = 4, 801
 """Points of curves in charts: every so manieth of a law, and so many of a load."""
 MOST_NODES = 12
 """Nodes that one figure shows at most."""
+MOST_PAIRS = 24
+"""Pairs of panels that a table shows at most."""
 
 
 class Album:
@@ -164,3 +166,26 @@ def by_mass_rule(
         )
         rows.append([rule, *cells])
     return Table(["mass rule", *columns], rows, caption, digits=3)
+
+
+def crossing_panels(results: ByRule) -> list[Section]:
+    """Table of the panels that pass through each other in motions or paths, if any do."""
+    rows, along = [], "time"
+    for rule, result in results.items():
+        if "crossing_panels" not in result:
+            continue
+        along = "time" if "time" in result else "load_factor"
+        pairs, first = result["crossing_panels"].values, result["crossing_first"].values
+        at = result[along].values[first]
+        cells = zip(pairs.tolist(), first.tolist(), at.tolist(), strict=True)
+        rows += [[rule, *pair, k, value] for pair, k, value in cells]
+    if not rows:
+        return []
+    more = f"; the first {MOST_PAIRS} of {len(rows)}" if len(rows) > MOST_PAIRS else ""
+    unit = "time (s)" if along == "time" else "load factor"
+    caption = (
+        "Panels that pass through each other, which nothing keeps them from, and where this was "
+        f"seen first{more}"
+    )
+    header = ["mass rule", "panel", "and panel", "sample", unit]
+    return [Table(header, rows[:MOST_PAIRS], caption)]

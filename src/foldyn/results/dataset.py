@@ -15,6 +15,7 @@ from foldyn.cases.document import Document, pattern_document, to_document
 from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
+    CROSSINGS,
     ESTIMATES,
     FIDELITY,
     FOLDING,
@@ -50,7 +51,8 @@ DOCUMENT: Mapping[str, tuple[str, ...]] = {
 """Variables of the case, which every result has, with their dimensions; other tables have one of
 their own."""
 TAKEN = frozenset(
-    {*MOTION, *DOCUMENT, "time", "node", "axis", "support", "support_node", "support_axis"}
+    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis"}
+    | {"support", "support_node", "support_axis"}
 )
 """Names that every motion has."""
 LENGTHS = ("rest_position", "vertices", "board_corners", "board_thickness")

@@ -62,6 +62,11 @@ FOLDING: Mapping[str, Quantity] = {
     "strain": Quantity(text="largest strain of a bar"),
     "bend": Quantity("rad", "largest turn of a bend within a panel"),
 }
+CROSSINGS: Mapping[str, Quantity] = {
+    "crossing_panels": Quantity(text="panels that pass through each other", dims=("two",)),
+    "crossing_first": Quantity(text="first sample (from 0) at which they were seen to"),
+}
+"""What motions and paths have besides where panels cross, along the dimension crossing."""
 MODES: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency"),
     "eigenvalue": Quantity("rad2/s2", "square of the angular frequency (negative: unstable)"),

@@ -18,13 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.errors import ComputationError, FoldynWarning, MotionInterrupted
+from foldyn.errors import ComputationError, CrossingWarning, FoldynWarning, MotionInterrupted
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
+from foldyn.results.crossings import crossings_of
 from foldyn.statics.newton import Solver
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.path_methods import METHODS
-from foldyn.statics.stepping import PathStoppedError, Point, Walk
+from foldyn.statics.stepping import (
+    REMEDY_COLLISION,
+    REMEDY_LOCKED,
+    PathStoppedError,
+    Point,
+    Walk,
+)
+from foldyn.structures.locking import kept_apart, locks
 from foldyn.structures.mesh import hinge_angles
 
 if TYPE_CHECKING:
@@ -137,7 +145,7 @@ def record(
             if progress is not None:
                 progress(station.point)
     except PathStoppedError as stop:
-        remedy = _closed(problem, points) or stop.remedy
+        remedy = _closed(problem, points) or _true(stop.remedy, problem)
         partial = dataset("stopped", stopped_because=stop.reason, remedy=remedy)
         raise ComputationError(f"{stop.reason}; {remedy}", partial) from None
     except KeyboardInterrupt:
@@ -146,6 +154,13 @@ def record(
     path = dataset("complete")
     assert path is not None, "every path has a first point"
     return path
+
+
+def _true(remedy: str, problem: OrigamiProblem) -> str:
+    """The remedy of a path that has stopped, or what can be done where that is done already."""
+    if remedy == REMEDY_COLLISION and locks(problem.structure.fold_law):
+        return REMEDY_LOCKED
+    return remedy
 
 
 def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
@@ -158,10 +173,8 @@ def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
     crease = int(np.argmax(np.abs(folds - 180.0)))
     if abs(folds[crease] - 180.0) < CLOSED:
         return ""
-    return (
-        f"crease {crease} is closed ({folds[crease]:.5g} degrees): a fold law that locks "
-        "before panels meet ('enhanced') lets the path go on"
-    )
+    apart = kept_apart(structure, *structure.folds[crease, :2].tolist())
+    return f"crease {crease} is closed ({folds[crease]:.5g} degrees): {apart}"
 
 
 def _dataset(
@@ -177,11 +190,17 @@ def _dataset(
         warnings.warn(message, FoldynWarning, stacklevel=5)
     residuals = [problem.residual(p.u, p.factor) for p in points]
     energies = np.array([problem.energies(p.u, p.factor) for p in points])
+    displacement = np.array([problem.displacement(p.u) for p in points])
+    crossings = crossings_of(problem.case, displacement)
+    if len(crossings.first):
+        at = int(crossings.first[0])
+        when = f"point {at} (load factor {points[at].factor:.6g})"
+        warnings.warn(crossings.text(when, len(points)), CrossingWarning, stacklevel=5)
     own = "an adaptive load, a function of the user's own, acted on it"
-    return path_dataset(
+    result = path_dataset(
         problem.case,
         [p.factor for p in points],
-        [problem.displacement(p.u) for p in points],
+        displacement,
         np.reshape([problem.reactions(p.u, p.factor) for p in points], (len(points), -1)),
         {
             **dict(zip(problem.groups, energies.T, strict=True)),
@@ -205,6 +224,7 @@ def _dataset(
         },
         (own,) if adaptive else (),
     )
+    return crossings.recorded(result)
 
 
 def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:

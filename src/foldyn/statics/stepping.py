@@ -32,6 +32,10 @@ REMEDY_LIMIT = (
     "(or take smaller steps)"
 )
 REMEDY_COLLISION = "let the folds lock before panels meet (fold_law 'enhanced')"
+REMEDY_LOCKED = (
+    "the folds lock already, but panels are pushed into each other: end the path before, or take "
+    "smaller steps"
+)
 
 
 @brief

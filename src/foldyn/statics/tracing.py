@@ -104,6 +104,8 @@ def trace(
     FoldynWarning
         The count of negative eigenvalues changes along the path, but for limit points that
         "mgdcm" and "arc_length" have located.
+    CrossingWarning
+        Panels pass through each other at a point.
 
     Examples
     --------

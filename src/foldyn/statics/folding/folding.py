@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import FoldynWarning, InputError
+from foldyn.errors import CrossingWarning, FoldynWarning, InputError
+from foldyn.mechanics.crossings import crossing_panels
 from foldyn.patterns import Pattern
-from foldyn.patterns.crossings import crossing_panels
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
+from foldyn.results.crossings import pairs_text
 from foldyn.statics.folding.energy import FoldEnergy
 from foldyn.statics.folding.layer_order import with_layers
 from foldyn.statics.folding.record import folded_pattern, path_of
@@ -37,7 +38,7 @@ from foldyn.values import choice, whole
 if TYPE_CHECKING:
     import xarray
 
-MOST_SHOWN = 8  # creases and pairs of panels that a text names
+MOST_SHOWN = 8  # creases that a text names
 SHUT = 1e-3  # rad from 180 degrees: a crease counts as closed
 CRUMPLED = 0.1  # strain beyond which a state is taken only where there is no other
 STARTS = ("auto", "pattern", "folded")
@@ -165,15 +166,14 @@ class Folding:
                 order = "in an order that is not known, since panels cross"
             else:
                 order = "in the order in which they have come"
-            lines.append(
-                f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
-            )
+            count = len(self.closed)
+            lines.append(f"{count} creases are closed: panels lie upon each other {order}")
         if self.first_crossings:
             step, pairs = min(self.first_crossings.items())
-            shown = _listed([f"{a} and {b}" for a, b in pairs.tolist()])
             now = f"{len(self.crossings)} pairs" if len(self.crossings) else "none"
             lines.append(
-                f"panels cross: from step {step} of {steps} on ({shown}); in the folded state {now}"
+                f"panels cross: from step {step} of {steps} on ({pairs_text(pairs)}); in the "
+                f"folded state {now}"
             )
         else:
             lines.append("no panels cross")
@@ -238,7 +238,9 @@ def fold(
     Warns
     -----
     FoldynWarning
-        Mountains or valleys that have not turned their own way; panels that cross.
+        Mountains or valleys that have not turned their own way.
+    CrossingWarning
+        Panels that pass through each other in a state of the path.
 
     Notes
     -----
@@ -378,22 +380,21 @@ def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -
 def _warn(folding: Folding) -> None:
     if folding.wrong:
         pairs = folding.path["crease_vertices"].values[list(folding.wrong)].tolist()
-        named = zip(folding.wrong, pairs, strict=True)
-        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in named])
+        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in zip(folding.wrong, pairs, strict=True)])
         warnings.warn(
             f"{len(folding.wrong)} mountains or valleys do not turn their way: creases {shown}",
-            FoldynWarning,
-            stacklevel=3,
-        )
-    if len(folding.crossings):
-        shown = _listed([f"{a} and {b}" for a, b in folding.crossings.tolist()])
+            FoldynWarning, stacklevel=3,
+        )  # fmt: skip
+    if folding.first_crossings:
+        step, pairs = min(folding.first_crossings.items())
+        shown, where = pairs_text(pairs), f"first at step {step} of the path"
+        if len(folding.crossings):
+            shown, where = pairs_text(folding.crossings), f"in the folded state, {where}"
         warnings.warn(
-            f"panels pass through each other in the folded state: {shown}",
-            FoldynWarning,
-            stacklevel=3,
-        )
+            f"panels pass through each other: {shown}, {where}", CrossingWarning, stacklevel=3,
+        )  # fmt: skip
 
 
 def _listed(items: Sequence[str]) -> str:
-    more = f" and {len(items) - MOST_SHOWN} more" if len(items) > MOST_SHOWN else ""
-    return ", ".join(items[:MOST_SHOWN]) + more
+    more = len(items) - MOST_SHOWN
+    return ", ".join(items[:MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,235 @@
+"""Panels that pass through each other, told from panels that touch.
+
+Two triangles that are not in one plane cross where each has corners on both sides of the other's
+plane, and the pieces of line that the planes cut from them overlap. Touching is no crossing: a
+corner, or a side, that they share or that lies on the other, or layers upon each other. But panels
+may cross along sides of their triangles, each of which touches only (two flaps of one size that
+fold over a panel meet in their middles): so it is panels that must be on both sides of each other,
+counted over their triangles that overlap somewhere.
+
+Two triangles with one common corner can cross along a line from there, and are compared as others
+are. Two with a common side cannot, but for an angle between them that passes 0 or 2 pi, which is
+looked for where angles are. Triangles of one panel are compared only where they have no corner in
+common.
+
+Boxes about the triangles are put into a regular grid, whose cells are as large as boxes are on
+average, and those that share a cell are compared: time and memory grow with their number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import kernel, scalar
+
+TOUCHING = 1e-9  # of a triangle's size: a corner so near a plane lies in it
+LEVEL = 1e-3  # rad between planes: triangles lie upon each other
+OVERLAP = 1e-5  # of the smaller triangle's size: pieces that only touch have less in common
+ABOVE, BELOW = 1, 2  # where parts of a triangle are
+BOTH = 3
+FEWEST, SPREAD = 64, 2  # the grid has at most this many cells, and this many per triangle more
+LARGEST = 0.0625  # of the largest box: the least size of a cell
+ROOM = 64  # pairs at first
+
+
+def crossing_panels(points: NDArray, triangles: NDArray, panels: NDArray) -> NDArray[np.int64]:
+    """Pairs of panels (k, 2), the lower first, that cross each other, or themselves.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Coordinates (m), all finite.
+    triangles : ndarray of int, shape (m, 3)
+        Triangles into which panels are cut.
+    panels : ndarray of int, shape (m,)
+        The panel of each.
+    """
+    x = np.array(points, np.float64, order="C")
+    rows, owners = np.array(triangles, np.int64), np.array(panels, np.int64)
+    found = np.empty((ROOM, 4), np.int64)
+    while (count := _overlapping(x, rows, owners, found)) > len(found):
+        found = np.empty((count, 4), np.int64)
+    if not count:
+        return np.zeros((0, 2), np.int64)
+    pairs, which = np.unique(found[:count, :2], axis=0, return_inverse=True)
+    sides = np.zeros((len(pairs), 2), np.int64)
+    np.bitwise_or.at(sides, which.ravel(), found[:count, 2:])
+    return pairs[(sides == BOTH).all(axis=1)]
+
+
+@kernel
+def _overlapping(x, triangles, panels, found):
+    """Panels of triangles that overlap, and the sides of the other on which each is.
+
+    Rows (lower panel, higher panel, sides of the one, of the other) go into `found` as far as there
+    is room; returns their number.
+    """
+    low, high, normal, size = _boxes(x, triangles)
+    start, members, cell, origin, shape = _grid(low, high, size)
+    count = 0
+    for here in range(start.size - 1):
+        for first in range(start[here], start[here + 1]):
+            i = members[first]
+            for second in range(first + 1, start[here + 1]):
+                j = members[second]
+                apart = False
+                at = 0
+                for axis in range(3):
+                    lower = max(low[i, axis], low[j, axis])
+                    apart |= lower > min(high[i, axis], high[j, axis])
+                    at = at * shape[axis] + _place(lower, origin[axis], cell, shape[axis])
+                if apart or at != here:  # two may meet in several cells
+                    continue
+                shared = 0
+                for a in range(3):
+                    for b in range(3):
+                        shared += triangles[i, a] == triangles[j, b]
+                one, other = (i, j) if panels[i] <= panels[j] else (j, i)
+                alike = panels[i] == panels[j]
+                if shared > 1 or (shared == 1 and alike):
+                    continue
+                of_one, of_other = _sides(x, triangles, normal, size, one, other)
+                # within a panel nobody knows which triangle belongs to which part of it
+                if of_one == 0 or (alike and (of_one != BOTH or of_other != BOTH)):
+                    continue
+                if count < found.shape[0]:
+                    found[count, 0], found[count, 1] = panels[one], panels[other]
+                    found[count, 2], found[count, 3] = of_one, of_other
+                count += 1
+    return count
+
+
+@kernel
+def _sides(x, triangles, normal, size, one, other):
+    """On which sides of each other two triangles are that overlap; (0, 0) where they do not."""
+    least = TOUCHING * max(size[one], size[other])
+    lx = normal[one, 1] * normal[other, 2] - normal[one, 2] * normal[other, 1]
+    ly = normal[one, 2] * normal[other, 0] - normal[one, 0] * normal[other, 2]
+    lz = normal[one, 0] * normal[other, 1] - normal[one, 1] * normal[other, 0]
+    if lx * lx + ly * ly + lz * lz < LEVEL * LEVEL:
+        return 0, 0
+    of_one, first, last = _cut(x, triangles, normal, one, other, one, least, lx, ly, lz)
+    if of_one == 0:
+        return 0, 0
+    of_other, begin, end = _cut(x, triangles, normal, other, one, one, least, lx, ly, lz)
+    common = min(last, end) - max(first, begin)
+    length = np.sqrt(lx * lx + ly * ly + lz * lz)
+    if of_other == 0 or not common > OVERLAP * min(size[one], size[other]) * length:
+        return 0, 0
+    return of_one, of_other
+
+
+@kernel
+def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
+    """Sides of the other's plane on which a triangle is, and what the plane cuts from it.
+
+    That is the piece of the line of both planes from `first` to `last` along (lx, ly, lz), counted
+    from a corner of the triangle `origin`. The sides are 0 where it does not reach the plane.
+    """
+    base, zero = triangles[other, 0], triangles[origin, 0]
+    nx, ny, nz = normal[other, 0], normal[other, 1], normal[other, 2]
+    sides, first, last = 0, np.inf, -np.inf
+    before, place = 0.0, 0.0
+    for k in range(4):
+        a = triangles[one, k % 3]
+        height = (x[a, 0] - x[base, 0]) * nx + (x[a, 1] - x[base, 1]) * ny
+        height += (x[a, 2] - x[base, 2]) * nz
+        along = (x[a, 0] - x[zero, 0]) * lx + (x[a, 1] - x[zero, 1]) * ly
+        along += (x[a, 2] - x[zero, 2]) * lz
+        if height > least:
+            sides |= ABOVE
+        elif height < -least:
+            sides |= BELOW
+        else:
+            first, last = min(first, along), max(last, along)
+        if k > 0 and min(height, before) < -least and max(height, before) > least:
+            at = place + before / (before - height) * (along - place)
+            first, last = min(first, at), max(last, at)
+        before, place = height, along
+    return (sides if first <= last else 0), first, last
+
+
+@kernel
+def _boxes(x, triangles):
+    """Bounds (m, 3), unit normals (m, 3) and sizes (m,) of triangles, their boxes' longest sides.
+
+    The normal is zero where a triangle has no area.
+    """
+    count = len(triangles)
+    low, high = np.empty((count, 3)), np.empty((count, 3))
+    normal, size = np.zeros((count, 3)), np.empty(count)
+    for i in range(count):
+        a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+        largest = 0.0
+        for axis in range(3):
+            low[i, axis] = min(x[a, axis], x[b, axis], x[c, axis])
+            high[i, axis] = max(x[a, axis], x[b, axis], x[c, axis])
+            largest = max(largest, high[i, axis] - low[i, axis])
+        size[i] = largest
+        total = 0.0
+        for axis in range(3):
+            p, q = (axis + 1) % 3, (axis + 2) % 3
+            across = (x[b, p] - x[a, p]) * (x[c, q] - x[a, q])
+            across -= (x[b, q] - x[a, q]) * (x[c, p] - x[a, p])
+            normal[i, axis] = across
+            total += across * across
+        for axis in range(3):
+            normal[i, axis] /= np.sqrt(total) if total > 0.0 else 1.0
+    return low, high, normal, size
+
+
+@kernel
+def _grid(low, high, size):
+    """Cells of a regular grid with the boxes that they hold.
+
+    Returns `start` (cells + 1,) and `members`: cell c holds members[start[c]:start[c + 1]]; the
+    size of a cell, the grid's origin and how many cells it has along each axis.
+    """
+    count = len(low)
+    origin, span = np.zeros(3), np.zeros(3)
+    shape = np.ones(3, np.int64)
+    cell = 1.0
+    if count:
+        for axis in range(3):
+            origin[axis], top = low[0, axis], high[0, axis]
+            for i in range(count):
+                origin[axis], top = min(origin[axis], low[i, axis]), max(top, high[i, axis])
+            span[axis] = top - origin[axis]
+        total, largest = 0.0, 1e-300
+        for i in range(count):
+            total, largest = total + size[i], max(largest, size[i])
+        cell = max(total / count, LARGEST * largest)
+    most = FEWEST + SPREAD * count
+    while (span[0] / cell + 1.0) * (span[1] / cell + 1.0) * (span[2] / cell + 1.0) > most:
+        cell *= 1.25
+    for axis in range(3):
+        shape[axis] = int(span[axis] / cell) + 1
+    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
+    members = np.empty(0, np.int64)
+    lower, upper = np.empty(3, np.int64), np.empty(3, np.int64)
+    for filling in (False, True):
+        for i in range(count):
+            for axis in range(3):
+                lower[axis] = _place(low[i, axis], origin[axis], cell, shape[axis])
+                upper[axis] = _place(high[i, axis], origin[axis], cell, shape[axis])
+            for p in range(lower[0], upper[0] + 1):
+                for q in range(lower[1], upper[1] + 1):
+                    for r in range(lower[2], upper[2] + 1):
+                        here = (p * shape[1] + q) * shape[2] + r
+                        if filling:
+                            start[here] -= 1
+                            members[start[here]] = i
+                        else:
+                            start[here] += 1
+        if not filling:
+            for here in range(1, start.size):
+                start[here] += start[here - 1]
+            members = np.empty(start[start.size - 1], np.int64)
+    return start, members, cell, origin, shape
+
+
+@scalar
+def _place(value, origin, cell, number):
+    """Place of a coordinate among `number` cells of a grid along an axis."""
+    return min(int((value - origin) / cell), number - 1)

@@ -1,0 +1,123 @@
+"""Panels that pass through each other at the samples of a result: looked for, said and recorded.
+
+Without contact nothing keeps panels apart. Those that cross in the pattern as it was drawn are left
+out, and so are boards (thick panels), which are not where the pattern's panels are.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.mechanics.crossings import crossing_panels
+from foldyn.results.quantities import CROSSINGS, variable
+
+MOST_SHOWN = 8  # pairs of panels that a text names
+
+
+class Crossings(NamedTuple):
+    """What was seen.
+
+    Attributes
+    ----------
+    looked : (l,)
+        Samples that were looked at.
+    crossed : (k,)
+        Those among them at which panels cross.
+    panels, first : (p, 2), (p,)
+        Pairs of panels that cross at any of these, in the order of the samples at which they were
+        seen first, and these samples.
+    """
+
+    looked: NDArray[np.int64]
+    crossed: NDArray[np.int64]
+    panels: NDArray[np.int64]
+    first: NDArray[np.int64]
+
+    def recorded(self, result: xr.Dataset) -> xr.Dataset:
+        """The result with what was seen."""
+        counts = {"crossing_looks": len(self.looked), "crossing_samples": len(self.crossed)}
+        if not len(self.crossed):
+            return result.assign_attrs(counts)
+        found = {"crossing_panels": self.panels, "crossing_first": self.first}
+        known = {
+            name: variable(("crossing", *CROSSINGS[name].dims), values, "", CROSSINGS[name].text)
+            for name, values in found.items()
+        }
+        return result.assign(known).assign_attrs(counts)
+
+    def text(self, when: str, samples: int) -> str:
+        """Say what was seen, in words; empty where nothing was.
+
+        when : the first sample with a crossing, "t = 0.1 s".
+        samples : how many the result has.
+        """
+        if not len(self.crossed):
+            return ""
+        all_looked = len(self.looked) == samples
+        seen = f"{samples} samples" if all_looked else f"{len(self.looked)} samples looked at"
+        return (
+            f"panels pass through each other: {pairs_text(self.panels)}, first at {when}, and at "
+            f"{len(self.crossed)} of the {seen}. Nothing keeps them apart: what follows is not "
+            "what a real sheet does"
+        )
+
+
+def crossings_of(case: Case, displacement: NDArray, stride: int = 1) -> Crossings:
+    """Look for panels that pass through each other.
+
+    Parameters
+    ----------
+    case : Case
+    displacement : ndarray, shape (k, n, 3)
+        Of the nodes at each sample, m. Samples that are not finite are not looked at.
+    stride : int
+        Every so manieth sample is looked at, so that the last one is; where panels cross, also
+        those between the first such sample and the one before it.
+    """
+    structure, count = case.structure, len(displacement)
+    pattern, panels = structure.pattern, structure.triangle_panel
+    if not len(panels) or (pattern is not None and pattern.boards is not None):
+        return _found({}, 1)
+    many = int(panels.max()) + 1
+
+    def keys(u: NDArray) -> NDArray[np.int64]:
+        """Numbers of the pairs that cross, first * many + second."""
+        return crossing_panels(structure.nodes + u, structure.triangles, panels) @ [many, 1]
+
+    at_rest = keys(np.zeros_like(structure.nodes))
+
+    def seen(samples: range) -> dict[int, NDArray[np.int64]]:
+        finite = [k for k in samples if np.isfinite(displacement[k]).all()]
+        found = {k: keys(displacement[k]) for k in finite}
+        return {k: np.setdiff1d(new, at_rest) if len(new) else new for k, new in found.items()}
+
+    found = seen(range((count - 1) % stride, count, stride))
+    earliest = next((k for k, pairs in found.items() if len(pairs)), 0)
+    return _found(found | seen(range(max(0, earliest - stride + 1), earliest)), many)
+
+
+def _found(seen: dict[int, NDArray[np.int64]], many: int) -> Crossings:
+    """What was seen, from the numbers of the pairs that cross at each sample."""
+    looked = sorted(seen)
+    crossed = [k for k in looked if len(seen[k])]
+    keys = np.concatenate([np.zeros(0, np.int64), *(seen[k] for k in crossed)])
+    samples = np.repeat(np.array(crossed, np.int64), [len(seen[k]) for k in crossed])
+    first = np.sort(np.unique(keys, return_index=True)[1])
+    return Crossings(
+        np.array(looked, np.int64),
+        np.array(crossed, np.int64),
+        np.stack(np.divmod(keys[first], many), axis=1),
+        samples[first],
+    )
+
+
+def pairs_text(panels: NDArray) -> str:
+    """Pairs of panels (k, 2) in words: "0 and 2, 5 itself and 3 more pairs"."""
+    named = [f"{a} and {b}" if a != b else f"{a} itself" for a, b in panels[:MOST_SHOWN].tolist()]
+    more = len(panels) - len(named)
+    return ", ".join(named) + (f" and {more} more pair{'s' if more > 1 else ''}" if more else "")
