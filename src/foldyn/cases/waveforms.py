@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import call1
 
 CONSTANT, PULSE, HALF_SINE, RAMP, SMOOTH_RAMP, STEP, HARMONIC, CHIRP, TABLE = range(9)
@@ -137,7 +137,7 @@ def waveform(w, row, t, derive):
     return 1.0, 0.0, 0.0
 
 
-@kernel
+@inner
 def _tabulated(w, row, t):
     """Piecewise polynomial, its first and last value held outside."""
     low, high = w.first[row], w.first[row + 1] - 1

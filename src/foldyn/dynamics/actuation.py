@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.materials.switch import hinge_rest_slope, move_rest
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.kernels import folds_of
@@ -56,7 +56,7 @@ def turn(model, actuators, factor):
         move_rest(actuators.code[k], rest, p[e])
 
 
-@kernel
+@inner
 def actuator_power(model, actuators, factor, angle):
     """Power (W) that turning folds with dihedrals `angle` (nh,) put into the structure."""
     (rest_angle, p, stiffness), power = folds_of(model), 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.dynamics.system import record
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.mechanics.threads import largest, part, total, wait
 
 
@@ -90,7 +90,7 @@ def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
     )
 
 
-@scalar
+@inner_scalar
 def passed_through(now, before, first, last):
     """Hinge from first to last whose dihedral jumped by more than pi, or -1.
 
@@ -108,7 +108,7 @@ def passed_through(now, before, first, last):
     return -1
 
 
-@kernel
+@inner
 def sample(model, system, mass, u, v, a, t, course, out, work, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
     k = course.tally.samples
@@ -130,7 +130,7 @@ def tell(team, work_in, work_out, wrong):
     note[WORK], note[DISSIPATED], note[WRONG] = work_in, work_out, wrong
 
 
-@scalar
+@inner_scalar
 def observe(model, system, mass, course, a, step, plan, out, work, s):
     """What follows `acceleration` at the time of a fixed step; every member of a team calls it.
 

@@ -22,7 +22,7 @@ from foldyn.cases import Case
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import kinetic_energy, moving_energy
 from foldyn.dynamics.modal_damping import ModalRows
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Numbering
 from foldyn.mechanics.viscous import Viscous, add_viscous_elements, viscous_elements_work
@@ -92,13 +92,13 @@ def drag(damping, velocity):
     return damping.alpha * velocity
 
 
-@scalar
+@inner_scalar
 def drag_power(damping, kinetic):
     """Power (W) that drag takes at a kinetic energy (J)."""
     return 2.0 * damping.alpha * kinetic
 
 
-@kernel
+@inner
 def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
     """Work of moving supports against drag in a step of h, and what drag takes in all, J.
 
@@ -115,7 +115,7 @@ def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
     return carried, taken + carried
 
 
-@scalar
+@inner_scalar
 def viscous_row(damping, velocity, i):
     """Viscous force at one dof, N, of flat velocities."""
     force = 0.0
@@ -124,7 +124,7 @@ def viscous_row(damping, velocity, i):
     return force
 
 
-@scalar
+@inner_scalar
 def add_viscous(damping, velocity, force, first, last):
     """Add it to the dofs first to last of a force, all flat; returns the power taken, W."""
     power = 0.0
@@ -135,7 +135,7 @@ def add_viscous(damping, velocity, force, first, last):
     return power
 
 
-@kernel
+@inner
 def viscous_work(damping, velocity, shift):
     """Work (J) of the viscous force along a shift, both (n, 3)."""
     work, v, along = 0.0, flat(velocity), flat(shift)
@@ -144,13 +144,13 @@ def viscous_work(damping, velocity, shift):
     return work
 
 
-@scalar
+@inner_scalar
 def has_dampers(damping):
     """Whether there are any."""
     return damping.modal.shape[0] > 0 or damping.elements.coefficient.size > 0
 
 
-@kernel
+@inner
 def add_dampers(damping, u, v, force):
     """Add the dampers' forces at u and v to `force`, all (rows, 3); returns the power taken, W."""
     power = add_viscous_elements(damping.elements, u, v, force)
@@ -165,7 +165,7 @@ def add_dampers(damping, u, v, force):
     return power
 
 
-@kernel
+@inner
 def dampers_work(damping, u, v, shift):
     """Work (J) of the dampers' forces at u and v along a shift, all (rows, 3)."""
     work = viscous_elements_work(damping.elements, u, v, shift)

@@ -13,7 +13,7 @@ import numpy as np
 from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
 from foldyn.dynamics.system import acceleration
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 
 ORDER = 5
@@ -58,7 +58,7 @@ def growth(omega, damping, dt):
     return np.abs(1.0 + z * (1.0 + z * series)).max(axis=0)
 
 
-@kernel
+@inner
 def _combine(base, slopes, weights, h, count, out):
     """out = base + h sum of weights times the first `count` slopes; all but weights (., n)."""
     for i in range(base.size):
@@ -68,7 +68,7 @@ def _combine(base, slopes, weights, h, count, out):
         out[i] = base[i] + h * total
 
 
-@kernel
+@inner
 def _integral(start, slopes, h, weights, count):
     """Start + h sum of weights times the first `count` slopes."""
     for j in range(count):

@@ -35,7 +35,7 @@ from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, carry
 from foldyn.dynamics.ties import follow_masters
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
 from foldyn.mechanics.following import add_following
@@ -165,7 +165,7 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     return norms(system, out, inertia, mean, new.pushed)
 
 
-@kernel
+@inner
 def _halfway(h, s):
     """Middle and mean velocity, s.stage[0] and s.product, of a step.
 

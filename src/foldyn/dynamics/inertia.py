@@ -18,7 +18,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import factorize
 from foldyn.dynamics.ties import Ties, follow_masters, hand_over, reduced
 from foldyn.errors import InputError
-from foldyn.jit.compiled import kernel, scalar, summing
+from foldyn.jit.compiled import inner, inner_scalar, kernel, summing
 from foldyn.jit.intrinsics import flat
 
 
@@ -177,7 +177,7 @@ def substitute(m, r, a, scratch):
             a[m.nodes[first + i], c] = scratch[m.column_order[first + i]]
 
 
-@kernel
+@inner
 def _substitute_tied(m, r, a, scratch):
     """The same with constraints; r, a (3n,)."""
     for i in range(a.size):
@@ -219,7 +219,7 @@ def moving_energy(mass, factor):
     return 0.5 * total
 
 
-@scalar
+@inner_scalar
 def kinetic_energy(m, v, product, own):
     """v M v / 2 (J) of the nodes own[0] to own[1], of all if the matrix is not diagonal.
 

@@ -39,7 +39,7 @@ from foldyn.dynamics.inertia import (
 )
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, add_reactions, ties_of
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
 from foldyn.mechanics.following import Following, joined, push_following
@@ -252,7 +252,7 @@ def carry(moved, factor, derivative, still, out):
         values[moved.dof[k]] += moved.value[k] * factor[moved.row[k], derivative]
 
 
-@kernel
+@inner
 def _moving_power(moved, moved_mass, damping, force, factor):
     """Power (W) of moving supports but for what changes the kinetic energy of S f'."""
     power = drag_power(damping, moving_energy(moved_mass, factor))
@@ -262,7 +262,7 @@ def _moving_power(moved, moved_mass, damping, force, factor):
     return power
 
 
-@scalar
+@inner_scalar
 def acceleration(model, system, mass, q, w, t, out, work, s):
     """Acceleration q'' (n, 3) at time t, q and w the displacement and velocity without S f.
 
@@ -320,6 +320,12 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
 
 
 @kernel
+def accelerate(model, system, mass, q, w, t, out, work, s):
+    """See `acceleration`: for Python."""
+    return acceleration(model, system, mass, q, w, t, out, work, s)
+
+
+@inner
 def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity, reaction, energy):
     """Write one sample after `acceleration`.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases.constraints import Constraints
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.body import Numbering
 
 
@@ -90,7 +90,7 @@ def hand_over(ties, force):
         force[ties.slave[k]] = 0.0
 
 
-@kernel
+@inner
 def add_reactions(rows, force, factor, out):
     """Add `factor` times what the supports exert on them, by a force on all dofs, flat."""
     for k in range(out.size):

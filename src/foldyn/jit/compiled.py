@@ -52,22 +52,47 @@ class Alone(Compiler):
         return super().compile_extra(func)
 
 
-def _decorator(**options: Any) -> Callable[..., Any]:
+def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
+    """Decorator of compiled functions.
+
+    inner : for calls from compiled functions alone. What Python calls takes its arguments apart
+        first, which is more code than most functions that get a whole model.
+    """
     # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
     # of a branch in every loop
-    compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
+    compiled = njit(
+        error_model="numpy", pipeline_class=Alone, no_cpython_wrapper=inner,
+        no_cfunc_wrapper=inner, **options,
+    )  # fmt: skip
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher: Any = compiled(function)
         dispatcher._cache = Kept(function)  # as njit(cache=True) sets Numba's own
+        if inner:
+            _shut(dispatcher)
         return dispatcher
 
     return decorate
 
 
+def _shut(dispatcher: Any) -> None:
+    """Refuse calls from Python, which would end the process: there is nothing to call."""
+
+    def add(result: Any) -> None:
+        dispatcher.overloads[tuple(result.signature.args)] = result
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise TypeError(f"{dispatcher.__name__} is for compiled functions; Python cannot call it")
+
+    dispatcher.add_overload, dispatcher._compile_for_args = add, refuse
+
+
 kernel = _decorator(fastmath=_FUSED)
+# only called by kernels
+inner = _decorator(fastmath=_FUSED, inner=True)
 # laws and other small formulas: inlined into the kernels that call them
 scalar = _decorator(fastmath=_FUSED, forceinline=True)
+inner_scalar = _decorator(fastmath=_FUSED, forceinline=True, inner=True)
 # sums whose order does not matter: in any order they can be vectorized; NaN survives here too
 summing = _decorator(fastmath=_FUSED | {"reassoc"})
 # without Python's lock: for functions that threads run together

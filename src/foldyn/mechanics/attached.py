@@ -18,7 +18,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 from foldyn.mechanics.kernels import energies_of, folds_of, force_of
 from foldyn.mechanics.threads import Team
@@ -87,7 +87,7 @@ def no_springs() -> Springs:
     return Springs(ends, vectors, numbers, ends, vectors, numbers, numbers, numbers)
 
 
-@scalar
+@inner_scalar
 def clamp_dihedral(clamps, u, e):
     """Dihedral (rad) of a clamp at displacement u, followed by its gradient (12 numbers)."""
     p = clamps.points
@@ -171,7 +171,7 @@ def clamp_blocks(clamps, u):
     return out
 
 
-@scalar
+@inner_scalar
 def directed_extension(springs, u, s):
     """(u_a - u_b) . d of a directed spring, m."""
     a, b = springs.ends[s, 0], springs.ends[s, 1]
@@ -182,7 +182,7 @@ def directed_extension(springs, u, s):
     return extension
 
 
-@scalar
+@inner_scalar
 def axial_extension(springs, u, s):
     """l - l0 of an axial spring, and l, m; from displacements, so that nothing cancels."""
     a, b = springs.axial_ends[s, 0], springs.axial_ends[s, 1]

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, kernel, scalar
 
 TOUCHING = 1e-9  # of a triangle's size: a corner so near a plane lies in it
 LEVEL = 1e-3  # rad between planes: triangles lie upon each other
@@ -150,7 +150,7 @@ def _cut(x, triangles, normal, one, other, origin, least, lx, ly, lz):
     return (sides if first <= last else 0), first, last
 
 
-@kernel
+@inner
 def _boxes(x, triangles):
     """Bounds (m, 3), unit normals (m, 3) and sizes (m,) of triangles, their boxes' longest sides.
 

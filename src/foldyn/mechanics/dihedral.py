@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, scalar
 
 PI = math.pi
 TAN_PI_8 = math.sqrt(2.0) - 1.0
@@ -51,7 +51,7 @@ def branch_free_atan2(y, x):
     return -angle if y < 0.0 else angle
 
 
-@scalar
+@inner_scalar
 def dihedral_gradient(jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz):
     """Dihedral (rad, 0..2 pi) and its gradient with respect to the points j, k, i, l."""
     bx, by, bz = kx - jx, ky - jy, kz - jz
@@ -107,7 +107,7 @@ def _difference(points, p, q):
     return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
 
 
-@kernel
+@inner
 def add_hessian(points, gradient, moment, block):
     """Add moment times the second derivative of the dihedral to `block`.
 
@@ -153,7 +153,7 @@ def add_hessian(points, gradient, moment, block):
             block[1, p, 1, q] -= jk + ik + lk
 
 
-@scalar
+@inner_scalar
 def carry_wing(block):
     """Give what a block (4, 3, 4, 3) has at its last node to the first two, half to each."""
     for row in range(2):

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials.switch import bar_energy, hinge_energy
 from foldyn.mechanics.dihedral import dihedral_gradient
 
 
-@scalar
+@inner_scalar
 def bar_extension(model, u, bar):
     """Stretch minus one of a bar, from displacements."""
     a, b = model.bars[bar, 0], model.bars[bar, 1]
@@ -23,7 +23,7 @@ def bar_extension(model, u, bar):
     return x / (1.0 + math.sqrt(1.0 + x))
 
 
-@scalar
+@inner_scalar
 def hinge_dihedral(model, u, hinge):
     """Dihedral (rad) of a hinge at displacement u, followed by its gradient (12 numbers)."""
     rest, h = model.rest, model.hinges

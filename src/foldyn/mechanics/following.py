@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.dihedral import add_hessian, carry_wing, dihedral_gradient
 
@@ -186,7 +186,7 @@ def _edges(loads, u, t, a, b):
         b[c] = loads.sides[t, 1, c] + u[3 * third + c] - u[3 * first + c]
 
 
-@kernel
+@inner
 def _hinge(loads, u, h, points, gradient):
     """Corners of a hinge and the gradient of its dihedral, (4, 3) both; whether a wing rides."""
     j, k = loads.hinges[h, 0], loads.hinges[h, 1]
@@ -237,7 +237,7 @@ def add_following(loads, u, factor, out):
         out[loads.hidden[e]] += loads.push[e] * factor[loads.push_row[e], 0]
 
 
-@kernel
+@inner
 def push_following(loads, u, v, factor, pushed, bracket):
     """Take the forces at u from `bracket`, keep them in `pushed`; returns their power on v, W.
 

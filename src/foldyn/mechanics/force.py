@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.jit.intrinsics import flat, prefetch_range
 from foldyn.jit.rows import LANES, add_rows, load_rows
 from foldyn.materials import enhanced_linear, ogden, superlinear
@@ -81,7 +81,7 @@ def _scratch(rows: int) -> dict[str, NDArray]:
     }
 
 
-@scalar
+@inner_scalar
 def whole_lanes(m):
     """The count of lanes to compute for m elements: the rest of a vector costs nothing."""
     return (m + LANES - 1) // LANES * LANES
@@ -112,7 +112,7 @@ def scatter(rows, mask, nodes, width, v, first, m, vector, at, factor, start):
             rows[row + c] += factor[start + q] * vector[at + c * BLOCK + q]
 
 
-@scalar
+@inner_scalar
 def first_above(nodes, width, start, end, node):
     """First of the elements start to end whose lowest node is not below `node`, a strip's end."""
     while start < end:
@@ -127,7 +127,7 @@ def first_above(nodes, width, start, end, node):
     return start
 
 
-@scalar
+@inner_scalar
 def elements_of(nodes, width, run, low, high, n):
     """Elements of a run with lowest nodes from low to high, multiples of GROUP or the end n."""
     start, end = run[0], run[1]
@@ -186,7 +186,7 @@ def add_bar_forces(model, low, high, work):
             scatter(sums, mask, bars, 2, 1, first, m, x, 0, s, 0)
 
 
-@scalar
+@inner_scalar
 def enhanced_moments(stiffness, rest, p, low, high, first, m, angle, value):
     """Moments of hinges of the enhanced linear law: those between low and high at once."""
     beyond = 0
@@ -202,7 +202,7 @@ def enhanced_moments(stiffness, rest, p, low, high, first, m, angle, value):
                 value[q] = stiffness[e] * at
 
 
-@scalar
+@inner_scalar
 def superlinear_moments(stiffness, rest, first, m, angle, value):
     """Moments of hinges of the superlinear law."""
     for q in range(m):
@@ -210,7 +210,7 @@ def superlinear_moments(stiffness, rest, first, m, angle, value):
         value[q] = stiffness[e] * superlinear.moment(angle[q], rest[e])
 
 
-@kernel
+@inner
 def hinge_moments(code, address, stiffness, rest, p, first, m, angle, value):
     """Moment (N m) of the m hinges of a block with dihedrals `angle`, all of one law."""
     for q in range(m):
@@ -310,7 +310,7 @@ def finish(force, work, start, end):
             force[3 * i + c] = sums[4 * (i & work.strips.mask) + c]
 
 
-@scalar
+@inner_scalar
 def finish_edge(force, work, start, end):
     """Add the sums of the nodes start to end to those of an edge strip."""
     mask, sums = work.strips.mask, flat(work.sums)
@@ -319,7 +319,7 @@ def finish_edge(force, work, start, end):
             force[3 * i + c] += sums[4 * (i & mask) + c]
 
 
-@scalar
+@inner_scalar
 def strip_force(model, s, u, force, work, keep):
     """Force (n, 3) on the nodes work.strips.finished[s], for each strip s in turn.
 

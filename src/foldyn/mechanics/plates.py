@@ -17,7 +17,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -109,7 +109,7 @@ def turn_folds(model, x, work):
         work.fold_angle[f] = work.angle[f] - model.per_reach * both
 
 
-@kernel
+@inner
 def turn_plate(model, x, work, p):
     """Angles phi of plate p, to work.turn."""
     folds = model.fold_rest.size
@@ -166,7 +166,7 @@ def plates_force(model, u, x, force, couple, work):
                 force[node, c] += work.moment[h] * work.gradient[h, 3 * v + c]
 
 
-@kernel
+@inner
 def turn_moments(model, x, couple, work):
     """Moments of all hinges, and forces (r,) on the dofs of rotations, at known dihedrals."""
     turn_folds(model, x, work)

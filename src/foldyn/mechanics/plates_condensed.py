@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
+from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.kernels import Whole, energies_of, folds_of, force_of
 from foldyn.mechanics.model import ranks
@@ -152,7 +153,7 @@ def factorize_band(band):
                 band[i, width + j - i] = total / band[j, width]
 
 
-@kernel
+@inner
 def solve_band(factor, x):
     """Solve with a factor of `factorize_band`, in place."""
     size, width = factor.shape[0], factor.shape[1] - 1
@@ -181,7 +182,9 @@ def balance(model, u, work):
                     plates.addresses[2],
                 )  # fmt: skip
                 slope[f] = max(found, LEAST)
-            work.factor[:] = model.band
+            factor, band = flat(work.factor), flat(model.band)
+            for k in range(band.size):  # an assignment of slices takes seconds to compile
+                factor[k] = band[k]
             add_folds(plates, model.rank, slope, work.factor)
             factorize_band(work.factor)
         largest = 0.0

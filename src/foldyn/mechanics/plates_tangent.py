@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.materials.switch import hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.plates import BarsPlates, fold_moment, turn_folds, turn_hinges, turn_plate
@@ -108,7 +108,7 @@ def _joined(parts: Sequence[NDArray]) -> NDArray:
     return np.concatenate([np.zeros(0, np.int64), *parts])
 
 
-@kernel
+@inner
 def _curvature(model, u, work, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):

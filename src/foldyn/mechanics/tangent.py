@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.materials.switch import bar_slope, bar_stress, hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.energy import bar_extension, hinge_dihedral
@@ -61,7 +61,7 @@ def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
     )
 
 
-@scalar
+@inner_scalar
 def add_to_bar(data, slots, e, p, q, value):
     """Add an entry (p, q) to the blocks of both ends of a bar, and its negative between them."""
     data[slots[e, 0, 0], p, q] += value
@@ -70,7 +70,7 @@ def add_to_bar(data, slots, e, p, q, value):
     data[slots[e, 1, 0], p, q] -= value
 
 
-@scalar
+@inner_scalar
 def add_to_hinge(data, slots, e, block, slope, turning, turned):
     """Add `block` (4, 3, 4, 3) and slope times two gradients (4, 3) to the blocks of a hinge."""
     for v in range(4):

@@ -20,7 +20,7 @@ import numpy as np
 from numba import config
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, scalar
 from foldyn.jit.intrinsics import call0, fetch_add, look
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.strips import shares
@@ -105,7 +105,7 @@ def run_together(function: Any, members: Sequence[Team], arguments: Sequence[tup
     return results
 
 
-@kernel
+@inner
 def _wait(team):
     """Count the round's arrivals; the last one starts the next round."""
     now = look(team.state, ROUND)

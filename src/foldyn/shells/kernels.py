@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.switch import hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
@@ -114,7 +114,7 @@ def ride(model, u, work):
             work.gradient[e, c] = found[1 + c]
 
 
-@scalar
+@inner_scalar
 def wing_points(model, u, e, out):
     """Points (4, 3) of a hinge with a wing."""
     j, k = model.hinges[e, 0], model.hinges[e, 1]
@@ -125,7 +125,7 @@ def wing_points(model, u, e, out):
         out[3, c] = model.rest[model.hinges[e, 3], c] + 0.5 * (u[j, c] + u[k, c])
 
 
-@kernel
+@inner
 def side_strains(model, u, t, out):
     """Green strains of the sides of a triangle, from displacements."""
     for k in range(3):
@@ -137,7 +137,7 @@ def side_strains(model, u, t, out):
         out[k] = 0.5 * total * model.per_length2[t, k]
 
 
-@kernel
+@inner
 def side_rotations(model, x, turn, t, out):
     """Rotations beta of the sheet at the sides of a triangle."""
     for k in range(3):

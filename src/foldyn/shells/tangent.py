@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, inner_scalar, kernel, scalar
 from foldyn.materials.switch import hinge_moment, hinge_slope
 from foldyn.mechanics.dihedral import add_hessian, carry_wing
 from foldyn.shells.kernels import (
@@ -120,7 +120,7 @@ def _neighborhoods(model: ShellModel) -> tuple[NDArray, NDArray]:
     return np.where(nodes < model.nodes, nodes, -1), corner
 
 
-@scalar
+@inner_scalar
 def _scatter(indptr, dof, first, nodes, block, data):
     """Add a block of places, `nodes` nodes and then rotations, to the entries of the matrix."""
     for i in range(dof.size):
@@ -138,7 +138,7 @@ def _scatter(indptr, dof, first, nodes, block, data):
                     data[at + b] += block[p + a, q + b]
 
 
-@scalar
+@inner_scalar
 def _membrane(model, t, e, gap, block):
     """Add the second derivative of a triangle's membrane energy, gap (3, 3) its sides now."""
     for k in range(3):
@@ -210,7 +210,7 @@ def _add_triangles(model, pattern, u, x, work, data):
         _scatter(pattern.indptr, pattern.triangle_dof[t], pattern.triangle[t], 6, block, data)
 
 
-@kernel
+@inner
 def _curvature(model, u, work, h, points, gradient, out):
     """Moment of hinge h times the second derivative of its dihedral, to out (4, 3, 4, 3)."""
     for v in range(4):

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.materials import switch
 from foldyn.mechanics.dihedral import add_hessian, dihedral_gradient
 from foldyn.mechanics.energy import hinge_dihedral
@@ -35,7 +35,7 @@ LEAST = 1e-9  # strain or rad: over less than that Gauss's rule misses nothing
 ANGLE_NOISE = 4e-15  # the same of a dihedral, rad
 
 
-@scalar
+@inner_scalar
 def _extension(x):
     """Stretch less one where stretch^2 - 1 is x."""
     return x / (1.0 + math.sqrt(1.0 + x))

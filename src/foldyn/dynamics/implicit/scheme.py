@@ -19,9 +19,9 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.system import Packed, Scratch, acceleration, scratch
+from foldyn.dynamics.system import Packed, Scratch, accelerate, scratch
 from foldyn.dynamics.ties import hand_over
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 
 EPS = float(np.finfo(float).eps)
@@ -162,7 +162,7 @@ class Scheme(ABC):
     def begin(self, t: float) -> None:
         """Make `old` the beginning of a motion, or of its part after a jump, at t (s)."""
         old, s = self.old, self.scratch
-        acceleration(*self.packed.arrays, old.q, old.w, t, old.a, self.work, s)
+        accelerate(*self.packed.arrays, old.q, old.w, t, old.a, self.work, s)
         old.a[self.massless] = 0.0
         self._speed[:], self._last = old.w, 0.0
         self._growth[:] = 0.0
@@ -209,7 +209,7 @@ class Scheme(ABC):
         for moved, force in ((change, self._pushed), (np.zeros_like(change), self.out)):
             s.factor[:], s.time[0] = phase.factor, 0.0  # evaluated as if for this time
             s.factor[:, 0] += moved
-            acceleration(*self.packed.arrays, phase.q, phase.w, 0.0, self.earlier, self.work, s)
+            accelerate(*self.packed.arrays, phase.q, phase.w, 0.0, self.earlier, self.work, s)
             force[:] = s.force
         s.time[0] = np.nan
         self._pushed -= self.out
@@ -328,7 +328,7 @@ def norms(system, force, inertia, factor, following):
     return np.sqrt(left), np.sqrt(max(inertia, reactions, pushed))
 
 
-@kernel
+@inner
 def add_load_work(loads, old, new, shift, work):
     """`work` (J) and that of the loads along a shift (n, 3), between two phases."""
     along, before, after = flat(shift), old.factor, new.factor
