@@ -135,12 +135,19 @@ class Folding:
         total = sum(letter in "MV" for letter in self.pattern.assignments)
         return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
 
+    @property
+    def _where_crossed(self) -> str:
+        step, pairs = min(self.first_crossings.items())
+        return (
+            f"from step {step} of {len(self.path['step']) - 1} on ({pairs_text(pairs)}); in the "
+            f"folded state {pairs_text(self.crossings) or 'none'}"
+        )
+
     def report(self) -> str:
         """Text of a few lines: which creases turn, strain left, panels that cross."""
         lines = [self._turned]
         if self.wrong:
             lines[0] += f"; not {_listed([str(k) for k in self.wrong])}"
-        steps = len(self.path["step"]) - 1
         if self.kind == "rigid":
             way = "at every step" if self.rigid_path else "in the folded state, not on the way"
             lines.append(f"rigidly foldable: panels are plane and unstrained {way}")
@@ -170,12 +177,7 @@ class Folding:
                 f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
             )
         if self.first_crossings:
-            step, pairs = min(self.first_crossings.items())
-            shown = pairs_text(pairs)
-            now = f"{len(self.crossings)} pairs" if len(self.crossings) else "none"
-            lines.append(
-                f"panels cross: from step {step} of {steps} on ({shown}); in the folded state {now}"
-            )
+            lines.append(f"panels cross {self._where_crossed}")
         else:
             lines.append("no panels cross")
         return "\n".join(lines)
@@ -389,13 +391,8 @@ def _warn(folding: Folding) -> None:
             stacklevel=3,
         )
     if folding.first_crossings:
-        step, pairs = min(folding.first_crossings.items())
-        shown, where = pairs_text(pairs), f"first at step {step} of the path"
-        if len(folding.crossings):
-            shown, where = pairs_text(folding.crossings), f"in the folded state, {where}"
-        warnings.warn(
-            f"panels pass through each other: {shown}, {where}", CrossingWarning, stacklevel=3
-        )
+        text = f"panels pass through each other {folding._where_crossed}"
+        warnings.warn(text, CrossingWarning, stacklevel=3)
 
 
 def _listed(items: Sequence[str]) -> str:
