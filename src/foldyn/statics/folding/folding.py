@@ -18,7 +18,6 @@ from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.results.crossings import pairs_text
 from foldyn.statics.folding.energy import FoldEnergy
-from foldyn.statics.folding.layer_order import with_layers
 from foldyn.statics.folding.record import folded_pattern, path_of
 from foldyn.statics.folding.subdivision import subdivided
 from foldyn.statics.folding.targets import fold_targets, full_angles
@@ -344,11 +343,11 @@ def _strain(way: Way) -> float:
 
 def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:
     """Measure the states of a way."""
+    from foldyn.statics.folding.layer_order import with_layers  # loads a library
+
     path = path_of(pattern, energy, way)
-    crossed = [
-        _crossed(pattern, energy, x, turns)
-        for x, turns in zip(path["position"].values, path["fold_angle"].values, strict=True)
-    ]
+    states = zip(path["position"].values, path["fold_angle"].values, strict=True)
+    crossed = [_crossed(pattern, energy, x, turns) for x, turns in states]
     first, before = {}, set()
     for step, pairs in enumerate(crossed):
         now = set(map(tuple, pairs.tolist()))
