@@ -13,7 +13,8 @@ DEMO_FLAGS ?=
 PYTEST_FLAGS ?=
 OLDEST ?= .venv-oldest
 OLDEST_TESTS := tests/jit tests/materials tests/mechanics tests/results $(addprefix tests/analyses/test_,casefile.py casefile_messages.py limits.py)
-WORKERS ?= -n auto --maxprocesses 4
+# the tests of a file on one worker, so that two seldom compile the same
+WORKERS ?= -n auto --maxprocesses 4 --dist loadfile
 
 .PHONY: help demo test test-oldest lint format docs wheel-check clean setup
 .DEFAULT_GOAL := help

@@ -64,3 +64,9 @@ def modes(case):
 def shell_motion():
     structure = fd.shell(fd.patterns.simple_fold(), SHEET, divisions=2)
     return motion_of(fd.Case(structure, [fd.Fix([0, 1])]))
+
+
+@pytest.fixture(scope="session")
+def folding():
+    """A fold of two panels on its way."""
+    return fd.fold(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=170), 0.5, steps=4).path

@@ -65,6 +65,13 @@ def test_positions_at_the_keys_are_those_of_the_result(motion, tmp_path):
     assert scene.mesh.extras["targetNames"][1] == "t = 0.75 s"
 
 
+def test_a_folding_goes_its_way_in_even_steps(folding, tmp_path):
+    way = folding
+    scene = exported(way, tmp_path, seconds=4.0)
+    for time, positions in enumerate(way["position"].values):
+        np.testing.assert_allclose(scene.at(float(time)), positions, atol=1e-6)
+
+
 def test_the_sheet_stands_upright(motion, tmp_path):
     """The format's y axis points up, ours is z."""
     x, y, z, w = exported(motion, tmp_path).file.nodes[0].rotation

@@ -148,3 +148,16 @@ def test_offsets_lead_to_each_sample_without_vtk(motion, case, tmp_path):
             values = root["CellData/strain"][first : first + count]
             np.testing.assert_array_equal(values[kind == BAR], strain[k].astype(np.float32))
             assert steps["CellDataOffsets/kind"][k] == 0
+
+
+def test_a_folding_has_the_angles_of_its_creases(folding, tmp_path):
+    way = folding
+    (file,) = fd.export(way, tmp_path / "x.vtkhdf")
+    with h5py.File(file) as read:
+        root = read["VTKHDF"]
+        points = root["Points"][:].reshape(way.sizes["step"], -1, 3)
+        np.testing.assert_allclose(points, way["position"].values, atol=1e-6)
+        crease = root["CellData/crease"][:]
+        turn = root["CellData/turn"][:].reshape(way.sizes["step"], -1)[:, crease >= 0]
+        np.testing.assert_allclose(turn, np.degrees(way["fold_angle"].values), rtol=1e-6)
+        np.testing.assert_array_equal(root["FieldData/share"][:], way["share"].values)

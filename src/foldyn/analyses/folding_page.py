@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from foldyn import plots
+from foldyn.analyses.provenance import Call, cost_rows, inputs_table
 from foldyn.plots.along import evenly
 from foldyn.report.page import write_report
 from foldyn.report.sections import Heading, Picture, Section, Table, Text
@@ -21,7 +21,7 @@ MOST_ROWS = 12
 
 
 def write_folding_page(
-    path: str | PathLike[str], folding: Folding, title: str, command: str = ""
+    path: str | PathLike[str], folding: Folding, title: str, call: Call | None = None
 ) -> Path:
     """Write the page of a folding.
 
@@ -31,8 +31,8 @@ def write_folding_page(
         File to write, in an existing directory.
     folding : Folding
     title : str
-    command : str
-        What was typed to compute it.
+    call : Call, optional
+        How it was asked for, and its cost.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def write_folding_page(
         _states(folding),
         _numbers(folding),
         Heading("How it was computed"),
-        _computed(folding, command),
+        _computed(folding, call or Call()),
     ]
     return write_report(path, title, sections)
 
@@ -83,12 +83,7 @@ def _numbers(folding: Folding) -> Section:
     )  # fmt: skip
 
 
-def _computed(folding: Folding, command: str) -> Section:
-    version = folding.path.attrs["foldyn_version"]
-    rows = [
-        ["starts from", f"the {folding.started_from} state" if folding.started_from == "folded"
-         else "the pattern as it is"],
-        ["computed", f"{datetime.now():%Y-%m-%d %H:%M}, Foldyn {version}"],
-        *([["command", command]] if command else []),
-    ]  # fmt: skip
-    return Table(["part", "as computed"], rows)
+def _computed(folding: Folding, call: Call) -> Section:
+    folded = folding.started_from == "folded"
+    begun = ("starts from", "the folded state" if folded else "the pattern as it is")
+    return inputs_table([begun, *cost_rows(folding.path.attrs["foldyn_version"], call)])

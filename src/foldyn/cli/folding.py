@@ -6,17 +6,20 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foldyn.cli.clock import Clock
 from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
 from foldyn.cli.options import add_film, add_reading, add_switches, frame_of
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import progress_bar, speech
+from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import InputError, within
 from foldyn.input_files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from foldyn.analyses.provenance import Call
+    from foldyn.patterns import Pattern
     from foldyn.statics import Folding
 
 MOST = 8  # MiB, of a file of angles
@@ -71,24 +74,44 @@ def add_fold(commands: Any) -> None:
 
 def run_fold(given: Namespace) -> Path:
     """Run the command; returns the path of the folded pattern."""
+    from foldyn.analyses.provenance import Call
     from foldyn.formats import read_pattern
     from foldyn.plots.writers import find_ffmpeg
+
+    clock = Clock.now()
+    source = Path(given.pattern)
+    with noted_warnings() as noted:
+        pattern = read_pattern(source, given.scale, given.unit, frame_of(given.frame))
+        out = Path(f"{source.stem}-folded.fold" if given.out is None else given.out)
+        write = _writer(out)
+        check_folder(out.parent, given.out, [out.name])
+        if given.film == "mp4":
+            with within("--film mp4: "):
+                find_ffmpeg()
+        folding = _folded(pattern, source, given)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with ENDINGS.saving():
+        write(folding)
+    call = Call(given.typed, tuple(noted), **clock.spent())
+    say = speech(given.quiet)
+    say(folding.report())
+    say(f"wrote {out}")
+    if not given.no_figures:
+        with drawing(out, f"\nfoldyn: kept what was computed: {out}"):
+            say(f"wrote {', '.join(_drawn(folding, out, source.stem, given, call))}")
+    return out
+
+
+def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
+    """Fold a pattern as it is asked for."""
+    from foldyn.formats import read_pattern
     from foldyn.statics import fold
 
-    source = Path(given.pattern)
-    pattern = read_pattern(source, given.scale, given.unit, frame_of(given.frame))
-    out = Path(f"{source.stem}-folded.fold" if given.out is None else given.out)
-    write = _writer(out)
-    check_folder(out.parent, given.out, [out.name])
-    if given.film == "mp4":
-        with within("--film mp4: "):
-            find_ffmpeg()
     angles = None
     if given.angles is not None:
         angles = read_angles(given.angles)
     elif given.to_frame is not None:
         angles = read_pattern(source, given.scale, given.unit, frame_of(given.to_frame))
-    say = speech(given.quiet)
     with progress_bar(given.quiet, total=given.steps, unit="step") as bar:
 
         def tell(step: int, steps: int) -> None:
@@ -96,19 +119,10 @@ def run_fold(given: Namespace) -> Path:
                 bar.reset(steps)
             bar.update()
 
-        folding = fold(
+        return fold(
             pattern, angles, given.to, steps=given.steps, start=given.start,
             panels=given.panels, progress=tell,
         )  # fmt: skip
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with ENDINGS.saving():
-        write(folding)
-    say(folding.report())
-    say(f"wrote {out}")
-    if not given.no_figures:
-        with drawing(out, f"\nfoldyn: kept what was computed: {out}"):
-            say(f"wrote {', '.join(_drawn(folding, out, source.stem, given))}")
-    return out
 
 
 def _writer(out: Path) -> Callable[[Folding], None]:
@@ -155,12 +169,12 @@ def read_angles(path: str) -> dict[Any, float]:
     return found
 
 
-def _drawn(folding: Folding, out: Path, name: str, given: Namespace) -> list[str]:
+def _drawn(folding: Folding, out: Path, name: str, given: Namespace, call: Call) -> list[str]:
     """Draw the page, and the film where it is asked for; returns the names of their files."""
     from foldyn import plots
     from foldyn.analyses.folding_page import write_folding_page
 
-    page = write_folding_page(out.with_suffix(".html"), folding, f"{name}, folded", given.typed)
+    page = write_folding_page(out.with_suffix(".html"), folding, f"{name}, folded", call)
     films = []
     if given.film:
         films.append(plots.animate_folding(folding, out.with_suffix(f".{given.film}")))

@@ -112,7 +112,7 @@ def _study(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence
         say(f"the specimen: calibrated to {names or 'a synthetic film'}")
     ended = _computed(one.compute, one.count, results, RESULTS, say, given.quiet)
     say("drawing figures")
-    return report.write(one, Call(given.typed, **clock.spent())), ended
+    return report.write(one, Call(given.typed, (), **clock.spent())), ended
 
 
 def _vary(given: Namespace, results: Results, say: Say) -> tuple[Path, Sequence[Done]]:

@@ -18,6 +18,7 @@ ALONG = {
     "modes": "mode",
     "frf": "frequency",
     "fidelity": "mode",
+    "folding": "step",
 }
 """The dimension along which a kind of results runs."""
 TABLES = "tables_"

@@ -59,7 +59,7 @@ def write(
     Parameters
     ----------
     result : xarray.Dataset
-        A motion, an equilibrium path or modes.
+        A motion, an equilibrium path, modes or a folding.
     path : Path
     case : Case
         Of the result.

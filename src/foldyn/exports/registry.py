@@ -17,6 +17,7 @@ from foldyn.exports import abaqus, csv_tables, glb, mat, opensees, pattern_state
 from foldyn.exports.chosen import ALONG
 from foldyn.results import case_of, check_result, load
 from foldyn.values import choice, show, suggest
+from foldyn.viewer.folding import folding_case
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Export:
     suffixes : tuple of str
         Of its files, lower case with the dot.
     kinds : tuple of str
-        Kinds of results that it holds: "trajectory", "path", "modes", "frf", "fidelity".
+        Kinds of results that it holds, of `chosen.ALONG`.
     write : callable
         ``write(result, path, case, **options)`` makes the file, or several beside it, and returns
         the paths of all that it made. Its keyword-only arguments are the options of the format.
@@ -58,15 +59,17 @@ class Export:
         return tuple(each.name for each in arguments if each.kind is each.KEYWORD_ONLY)
 
 
-SHAPES = ("trajectory", "path", "modes")
+SHAPES = ("trajectory", "path", "modes", "folding")
 """Kinds of results that go through shapes."""
+OF_SHEETS = tuple(kind for kind in ALONG if kind != "folding")
+"""Kinds of results that have a case; a folding is of a pattern alone."""
 
 _EXPORTS = (
     Export("glb", (".glb",), SHAPES, glb.write, "an animation for Blender and browsers"),
     Export(
         "pattern",
         pattern_states.SUFFIXES,
-        (*SHAPES, "folding"),
+        SHAPES,
         pattern_states.write,
         "states as patterns: frames of a FOLD file, a series of OBJ or STL files",
         needs_case=False,
@@ -82,10 +85,8 @@ _EXPORTS = (
         "universal files, for modal software",
         needs_case=False,
     ),
-    Export(
-        "opensees", (".tcl",), tuple(ALONG), opensees.write, "OpenSees: the shell", of_cases=True
-    ),
-    Export("abaqus", (".inp",), tuple(ALONG), abaqus.write, "Abaqus: the shell", of_cases=True),
+    Export("opensees", (".tcl",), OF_SHEETS, opensees.write, "OpenSees: the shell", of_cases=True),
+    Export("abaqus", (".inp",), OF_SHEETS, abaqus.write, "Abaqus: the shell", of_cases=True),
 )
 
 EXPORTS: dict[str, Export] = {each.name: each for each in _EXPORTS}
@@ -169,10 +170,12 @@ def _case_for(chosen: Export, result: xr.Dataset | Case) -> Case | None:
         able = [each.name for each in _EXPORTS if kind in each.kinds]
         raise InputError(
             f": is of kind {kind!r}, which the format {chosen.name} does not hold; it holds "
-            f"{', '.join(chosen.kinds)}, and {kind!r} goes to {', '.join(able) or 'no format'}",
+            f"{', '.join(chosen.kinds)}; formats for {kind!r}: {', '.join(able) or 'none'}",
             "result",
         )
-    return case_of(result) if chosen.needs_case else None
+    if not chosen.needs_case:
+        return None
+    return folding_case(result) if kind == "folding" else case_of(result)
 
 
 def _path(name: str, path: Any) -> Path:

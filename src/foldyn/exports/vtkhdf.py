@@ -26,7 +26,7 @@ from foldyn.results import shapes_of
 from foldyn.results.netcdf import fill
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
-from foldyn.viewer.fields import Field, fields
+from foldyn.viewer.fields import Field, fields, folding_fields
 from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.writing import whole
 
@@ -70,7 +70,8 @@ def write(
     Parameters
     ----------
     result : xarray.Dataset
-        A motion or a path, whose nodes move; or modes, whose nodes stay and have a field `shape`.
+        A motion, a path or a folding, whose nodes move; or modes, whose nodes stay and have a
+        field `shape`.
     path : Path
     case : Case
         Of the result.
@@ -88,7 +89,7 @@ def write(
         points = shapes.nodes[None]
     else:
         points = shapes.nodes + shapes.displacement
-        cells |= _cell_fields(mesh, fields(case, some, shapes.displacement))
+        cells |= _cell_fields(mesh, _known(case, some, shapes.displacement))
 
     def put(sink: Any) -> None:
         with h5py.File(sink, "w") as file:
@@ -123,6 +124,12 @@ def _mesh(structure: Discretized) -> Mesh:
         numbered(1, np.arange(len(bars))),
         numbered(2, structure.triangle_panel),
     )
+
+
+def _known(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, Field]:
+    if result.attrs["foldyn_result"] == "folding":
+        return folding_fields(case, displacement, result["fold_angle"].values)
+    return fields(case, result, displacement)
 
 
 def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:

@@ -60,7 +60,7 @@ def shapes_of(
     Parameters
     ----------
     result : xarray.Dataset
-        A motion, an equilibrium path, or modes.
+        A motion, an equilibrium path, modes, or `Folding.path`.
     every : int, optional
         Take every such sample; the last one is always taken.
     frames : int, optional

@@ -172,9 +172,8 @@ class Folding:
                 order = "in an order that is not known, since panels cross"
             else:
                 order = "in the order in which they have come"
-            lines.append(
-                f"{len(self.closed)} creases are closed: panels lie upon each other {order}"
-            )
+            count = len(self.closed)
+            lines.append(f"{count} creases are closed: panels lie upon each other {order}")
         if self.first_crossings:
             lines.append(f"panels cross {self._where_crossed}")
         else:
@@ -382,18 +381,16 @@ def _crossed(pattern: Pattern, energy: FoldEnergy, x: NDArray, turns: NDArray) -
 def _warn(folding: Folding) -> None:
     if folding.wrong:
         pairs = folding.path["crease_vertices"].values[list(folding.wrong)].tolist()
-        named = zip(folding.wrong, pairs, strict=True)
-        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in named])
+        shown = _listed([f"{k} ({a}, {b})" for k, (a, b) in zip(folding.wrong, pairs, strict=True)])
         warnings.warn(
             f"{len(folding.wrong)} mountains or valleys do not turn their way: creases {shown}",
-            FoldynWarning,
-            stacklevel=3,
-        )
+            FoldynWarning, stacklevel=3,
+        )  # fmt: skip
     if folding.first_crossings:
         text = f"panels pass through each other {folding._where_crossed}"
         warnings.warn(text, CrossingWarning, stacklevel=3)
 
 
 def _listed(items: Sequence[str]) -> str:
-    more = f" and {len(items) - MOST_SHOWN} more" if len(items) > MOST_SHOWN else ""
-    return ", ".join(items[:MOST_SHOWN]) + more
+    more = len(items) - MOST_SHOWN
+    return ", ".join(items[:MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")

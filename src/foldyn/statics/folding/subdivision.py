@@ -75,12 +75,15 @@ def subdivided(pattern: Pattern) -> tuple[Pattern, NDArray[np.int64]]:
         for a, b in _sides(np.array(faces))[0].tolist()
         if (pair := (a, b)) not in parent and pair not in rim
     ]
-    pairs, halved = np.array([*parent]), np.array([*parent.values()])
+    families = {name: {*rows.tolist()} for name, rows in pattern.families.items()}
     letters, angles = pattern.assignments, pattern.fold_angles.tolist()
     made = Pattern(
         points, faces, {pair: letters[k] for pair, k in parent.items()}, pattern.name,
         fold_angles={pair: angles[k] for pair, k in parent.items()},
-        families={name: pairs[np.isin(halved, own)] for name, own in pattern.families.items()},
+        families={
+            name: [pair for pair, k in parent.items() if k in own]
+            for name, own in families.items()
+        },
         custom=pattern.custom, welds=welds,
     )  # fmt: skip
     row = edge_lookup(made.creases)
