@@ -118,10 +118,11 @@ def test_figures_of_many_nodes_and_no_load(workplace, monkeypatch) -> None:
 
 
 def test_a_page_without_figures(workplace, edited) -> None:
-    """It has what they show, as charts of the page, and Matplotlib is not loaded for it."""
+    """It has what they show, as charts of the page; libraries it does without are not loaded."""
     workplace.write(edited(("every = 0.01", "every = 0.02")))
     code = "import sys; from foldyn.cli.main import main; status = main(sys.argv[1:]); "
-    code += "sys.exit(status or 10 * ('matplotlib' in sys.modules))"
+    code += "unused = {'matplotlib', 'shapely', 'scipy.spatial'} & set(sys.modules); "
+    code += "sys.exit(status or 10 * len(unused))"
     assert subprocess.call([sys.executable, "-c", code, "run", "case.toml", "--quiet"]) == 0
     folder = Path("case-results")
     assert sorted(path.name for path in folder.iterdir() if path.name != stamp.NAME) == [

@@ -242,7 +242,7 @@ def test_panels_that_pass_through_each_other_are_named():
     points = [(a, b) for a in x for b in (0.0, 1.0)]
     faces = [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(3)]
     pattern = fd.Pattern(points, faces, ["V", "V"])
-    said = "pass through each other: 0 and 2, in the folded state, first at step 7 of the path"
+    said = r"each other from step 7 of 10 on \(0 and 2\); in the folded state 0 and 2"
     with pytest.warns(CrossingWarning, match=said):
         folding = fd.fold(pattern, 170, steps=10)
     assert folding.crossings.tolist() == [[0, 2]]

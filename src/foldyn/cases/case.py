@@ -180,6 +180,13 @@ class Case(Supported, Loaded, Damped):
             return points  # a sheet without mass
 
     @cached_property
+    def free_mass(self) -> sparse.csr_array:
+        """Mass matrix of the free dofs among those of the nodes, kg, as constraints leave it."""
+        whole = sparse.kron(self.mass, sparse.eye_array(3), format="csr")
+        free = self.free_dofs
+        return sparse.csr_array(self.constraints.matrix(whole)[free][:, free])
+
+    @cached_property
     def point_masses(self) -> NDArray[np.float64]:
         """Sum (n,) of the point masses on each node, kg."""
         return read_only(nodal_masses(self.masses, self.structure))

@@ -111,7 +111,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     ties = case.constraints
     force = ties.force(_applied(case, u) - stiffness @ _imposed(case))
     k = ties.matrix(stiffness)[free][:, free]
-    m = ties.matrix(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))[free][:, free]
+    m = case.free_mass
     spin, deforming, moving = _split(structure.nodes + u, v)
     pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
     softest = (2.0 * math.pi / duration) ** 2

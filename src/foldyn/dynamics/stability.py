@@ -86,6 +86,8 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     """Largest rate (1/s) at which dashpots and creases damp a motion about u (n, 3)."""
+    if not case.dashpots and not case.crease_damping.any():
+        return 0.0
     return _largest_quotient(case, dampers(case).matrix(case.body.dofs(_state(case, u))))
 
 
@@ -99,10 +101,8 @@ def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
     k = sparse.csr_array(case.constraints.matrix(matrix)[free][:, free])
     if not k.count_nonzero():
         return 0.0
-    whole = sparse.kron(case.mass, sparse.eye_array(3), format="csr")
-    m = case.constraints.matrix(whole)[free][:, free]
     try:
-        return _largest_eigenvalue(k, m)
+        return _largest_eigenvalue(k, case.free_mass)
     except (RuntimeError, np.linalg.LinAlgError, SingularTangentError) as error:
         raise ComputationError(
             f"the largest frequency, which the critical step needs, cannot be computed: {error}"

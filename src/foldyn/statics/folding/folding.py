@@ -18,7 +18,6 @@ from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.results.crossings import pairs_text
 from foldyn.statics.folding.energy import FoldEnergy
-from foldyn.statics.folding.layer_order import with_layers
 from foldyn.statics.folding.record import folded_pattern, path_of
 from foldyn.statics.folding.subdivision import subdivided
 from foldyn.statics.folding.targets import fold_targets, full_angles
@@ -135,12 +134,19 @@ class Folding:
         total = sum(letter in "MV" for letter in self.pattern.assignments)
         return f"{total - len(self.wrong)} of {total} mountains and valleys turn their way"
 
+    @property
+    def _where_crossed(self) -> str:
+        step, pairs = min(self.first_crossings.items())
+        return (
+            f"from step {step} of {len(self.path['step']) - 1} on ({pairs_text(pairs)}); in the "
+            f"folded state {pairs_text(self.crossings) or 'none'}"
+        )
+
     def report(self) -> str:
         """Text of a few lines: which creases turn, strain left, panels that cross."""
         lines = [self._turned]
         if self.wrong:
             lines[0] += f"; not {_listed([str(k) for k in self.wrong])}"
-        steps = len(self.path["step"]) - 1
         if self.kind == "rigid":
             way = "at every step" if self.rigid_path else "in the folded state, not on the way"
             lines.append(f"rigidly foldable: panels are plane and unstrained {way}")
@@ -169,12 +175,7 @@ class Folding:
             count = len(self.closed)
             lines.append(f"{count} creases are closed: panels lie upon each other {order}")
         if self.first_crossings:
-            step, pairs = min(self.first_crossings.items())
-            now = f"{len(self.crossings)} pairs" if len(self.crossings) else "none"
-            lines.append(
-                f"panels cross: from step {step} of {steps} on ({pairs_text(pairs)}); in the "
-                f"folded state {now}"
-            )
+            lines.append(f"panels cross {self._where_crossed}")
         else:
             lines.append("no panels cross")
         return "\n".join(lines)
@@ -341,11 +342,11 @@ def _strain(way: Way) -> float:
 
 def _result(pattern: Pattern, energy: FoldEnergy, way: Way, targets: NDArray) -> Folding:
     """Measure the states of a way."""
+    from foldyn.statics.folding.layer_order import with_layers  # loads a library
+
     path = path_of(pattern, energy, way)
-    crossed = [
-        _crossed(pattern, energy, x, turns)
-        for x, turns in zip(path["position"].values, path["fold_angle"].values, strict=True)
-    ]
+    states = zip(path["position"].values, path["fold_angle"].values, strict=True)
+    crossed = [_crossed(pattern, energy, x, turns) for x, turns in states]
     first, before = {}, set()
     for step, pairs in enumerate(crossed):
         now = set(map(tuple, pairs.tolist()))
@@ -386,13 +387,8 @@ def _warn(folding: Folding) -> None:
             FoldynWarning, stacklevel=3,
         )  # fmt: skip
     if folding.first_crossings:
-        step, pairs = min(folding.first_crossings.items())
-        shown, where = pairs_text(pairs), f"first at step {step} of the path"
-        if len(folding.crossings):
-            shown, where = pairs_text(folding.crossings), f"in the folded state, {where}"
-        warnings.warn(
-            f"panels pass through each other: {shown}, {where}", CrossingWarning, stacklevel=3,
-        )  # fmt: skip
+        text = f"panels pass through each other {folding._where_crossed}"
+        warnings.warn(text, CrossingWarning, stacklevel=3)
 
 
 def _listed(items: Sequence[str]) -> str:
