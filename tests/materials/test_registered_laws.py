@@ -10,13 +10,25 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, bar_law, hinge_law
+from foldyn.materials import (
+    BAR_LAWS,
+    HINGE_LAWS,
+    BarLaw,
+    HingeLaw,
+    MemoryLaw,
+    bar_law,
+    hinge_law,
+)
 from foldyn.materials.switch import move_rest
 
 ROOT = Path(__file__).resolve().parents[2]
 STEP = 1e-5
 HINGES = {
-    **{name: hinge_law(name) for name in HINGE_LAWS},
+    **{name: hinge_law(name) for name, law in HINGE_LAWS.items() if not issubclass(law, MemoryLaw)},
+    # their elastic parts
+    "prony": fd.Prony(0.5, 0.1, law=fd.EnhancedLinear(90, 270)),
+    "plastic": fd.Plastic(0.1),
+    "eyring": fd.Eyring(0.01, 1e-3, law="linear"),
     # limits within the rest angles below: locked at rest
     "locked, stress-free": fd.EnhancedLinear(90, 270),
     "locked, as published": fd.EnhancedLinear(90, 270, rest="as_published"),
@@ -75,9 +87,15 @@ def test_a_hinge_law_is_linear_where_it_says_so(name):
     np.testing.assert_array_equal(law.moment(THETA, REST)[within], (THETA - REST)[within])
 
 
+def test_every_law_is_among_these():
+    assert set(HINGE_LAWS) <= set(HINGES)
+
+
 def test_codes_of_registered_laws_differ():
-    for laws in (BAR_LAWS, HINGE_LAWS):
-        codes = [kind().code for kind in laws.values()]
+    """But for laws with memory, which have that of their elastic part."""
+    elastic = [law for law in HINGE_LAWS.values() if not issubclass(law, MemoryLaw)]
+    for laws in (BAR_LAWS.values(), elastic):
+        codes = [kind().code for kind in laws]
         assert len(set(codes)) == len(codes)
 
 

@@ -154,7 +154,9 @@ def case_of_document(path: Path, document: Mapping[str, Any], text: str = "") ->
             if sheet.density is not None:
                 _ = structure.mass  # a rule may refuse this pattern: say so before anything runs
         with within("", path):
-            return Case(structure, schema.supports, schema.loads, damping, schema.masses)
+            return Case(
+                structure, schema.supports, schema.loads, damping, schema.masses, schema.contact
+            )
 
     case = make(masses[0])
     cases = {masses[0]: case}

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
+from foldyn.cases.contact import contact_from
 from foldyn.cases.damping import (
     STATES,
     CreaseDamping,
@@ -370,3 +371,4 @@ class CaseSchema(Section):
     supports: list[Annotated[Any, part(support_from)]] = []
     loads: list[Annotated[Any, part(load_from)]] = []
     masses: list[Annotated[Any, part(mass_from)]] = []
+    contact: Annotated[Any, part(contact_from)] = None

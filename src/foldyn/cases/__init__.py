@@ -2,6 +2,7 @@
 
 from foldyn.cases import histories, loads
 from foldyn.cases.case import Case
+from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh
 from foldyn.cases.dashpots import Dashpot
 from foldyn.cases.histories import *  # noqa: F403 - what it lists
@@ -16,6 +17,7 @@ __all__ = [
     "SUPPORTS",
     "BaseMotion",
     "Case",
+    "Contact",
     "CreaseDamping",
     "Dashpot",
     "Fix",
@@ -23,6 +25,7 @@ __all__ = [
     "Impose",
     "Link",
     "ModalDamping",
+    "Plane",
     "PointMass",
     "Rayleigh",
     "Spring",

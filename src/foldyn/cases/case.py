@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.cases.contact import Contact
 from foldyn.cases.damped import Damped
 from foldyn.cases.damping import Damping, Rayleigh, dampings
+from foldyn.cases.history import History, as_history
 from foldyn.cases.loaded import Loaded
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
@@ -22,9 +24,12 @@ from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, FoldynWarning, InputError, within
 from foldyn.mechanics.attached_body import GROUP, attached
 from foldyn.mechanics.body import Body
+from foldyn.mechanics.contact.body import GROUP as CONTACT
+from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.patterns.picture import picture
 from foldyn.structures.discretized import read_only
 from foldyn.structures.mass import center_of_mass, inertia_tensor, row_sums
+from foldyn.structures.remembering import Remembering, remembering
 from foldyn.values import brief, show
 
 
@@ -46,6 +51,9 @@ class Case(Supported, Loaded, Damped):
         Damping; none by default. Several add up.
     masses : sequence of PointMass
         What nodes carry beside the mass of the sheet; none by default.
+    contact : Contact, optional
+        Panels that touch each other, and planes; without it they pass through each other. Explicit
+        integrators take it.
 
     Attributes
     ----------
@@ -102,6 +110,7 @@ class Case(Supported, Loaded, Damped):
     loads: Sequence[Load] = ()
     damping: Damping | Sequence[Damping] = field(default_factory=Rayleigh)
     masses: Sequence[PointMass] = ()
+    contact: Contact | None = None
 
     def _repr_html_(self) -> str | None:
         """A picture for notebooks."""
@@ -113,6 +122,8 @@ class Case(Supported, Loaded, Damped):
         for name, kinds in (("supports", SUPPORTS), ("loads", LOADS), ("masses", (PointMass,))):
             object.__setattr__(self, name, _tuple_of(name, kinds, getattr(self, name)))
         object.__setattr__(self, "damping", dampings(self.damping))
+        if self.contact is not None and not isinstance(self.contact, Contact):
+            raise InputError(f"contact = {show(self.contact)}: must be a Contact")
         self._check_selections()
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:
@@ -151,14 +162,53 @@ class Case(Supported, Loaded, Damped):
     @cached_property
     def body(self) -> Body:
         """What solvers take: the structure with what the case adds to its stiffness."""
+        body = self.elastic_body
+        if self.contact is None:
+            return body
+        held = self.fixed & ~self.imposed
+        for vector, _ in self.base_terms:
+            held &= vector == 0.0
+        still = np.asarray(held.all(axis=1))
+        return TouchingBody(body, self.contact.sheets(self.structure, still))
+
+    @cached_property
+    def elastic_body(self) -> Body:
+        """The same without contact: what vibrations, damping and critical steps are about."""
         body = self.structure.body
         return body if self.springs is None else attached(body, springs=self.springs)
+
+    @cached_property
+    def remembering(self) -> tuple[Remembering, ...]:
+        """Its hinges whose laws have memory, by kinds; `body` has the elastic parts alone."""
+        return remembering(self.structure, self.body)
+
+    def check_flow(self) -> None:
+        """Refuse changes of rest angles from which laws measure what has flowed."""
+        for change, _ in self.rest_terms:
+            for number in np.flatnonzero(change).tolist():
+                law = self.body.rest_law(number)
+                if any(part.law is law and not part.law.relaxes for part in self.remembering):
+                    raise InputError(
+                        f"loads: something turns the rest angle of a hinge with the law "
+                        f"{law.name!r}, which yields or creeps away from it: move its panels "
+                        "instead (Impose), or take the law prony or an elastic one"
+                    )
+
+    @property
+    def obstacle_terms(self) -> tuple[tuple[int, History], ...]:
+        """Numbers of the planes of its contact that move, and their histories."""
+        planes = enumerate(() if self.contact is None else self.contact.planes)
+        return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
 
     @property
     def energy_groups(self) -> Mapping[str, str]:
         """Parts of its strain energy, and what they are."""
-        groups = self.structure.energy_groups
-        return groups if self.springs is None else {**groups, GROUP: "strain energy of the springs"}
+        groups = dict(self.structure.energy_groups)
+        if self.springs is not None:
+            groups[GROUP] = "strain energy of the springs"
+        if self.contact is not None:
+            groups[CONTACT] = "energy of contact"
+        return groups
 
     @cached_property
     def mass(self) -> sparse.csr_array:

@@ -35,11 +35,15 @@ def history_from(table: Any, folder: Path | None = None) -> History:
 def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     """Law from its name, or from its table such as ``{kind = "enhanced", theta1 = 75}``.
 
-    A name is returned as it is.
+    A name is returned as it is. A law that has another within, as ``law = {kind = "enhanced"}``,
+    gets that one in the same way.
     """
     if isinstance(spec, str):
         return choice("", spec, laws)
     kind, arguments = _kind_of(spec, laws)
+    if isinstance(arguments.get("law"), Mapping):
+        with within(".law"):
+            arguments = {**arguments, "law": law_from(arguments["law"], laws)}
     return call_from(laws[kind], arguments, skip=("name",))
 
 

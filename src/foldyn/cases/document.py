@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases.case import Case
+from foldyn.cases.contact import Contact, contact_from
 from foldyn.cases.damping import damping_from, damping_table
 from foldyn.cases.decode import law_from
 from foldyn.cases.histories import HISTORIES, Constant, History, Table
@@ -28,7 +29,7 @@ from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.supports import support_from
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.materials import BAR_LAWS, HINGE_LAWS
+from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize, sheet_from
 from foldyn.values import plain
@@ -146,6 +147,8 @@ class _Writer:
         }
         if case.masses:
             sections["masses"] = [self._part(mass) for mass in case.masses]
+        if case.contact is not None:
+            sections["contact"] = self._contact(case.contact)
         if not self.obstacles and not structure.as_made:
             self.obstacles.append(
                 "its structure differs from what discretize makes of its pattern, sheet and options"
@@ -242,8 +245,20 @@ class _Writer:
             )
             return {"kind": "user", "name": str(law.name)}
         names = [f.name for f in dataclasses.fields(law) if f.init and f.name != "name"]
-        values = {name: plain(getattr(law, name)) for name in names}
+        values = {}
+        for part in names:
+            value = getattr(law, part)
+            values[part] = self._law(name, value) if isinstance(value, HingeLaw) else plain(value)
         return {"kind": kind, **{k: value for k, value in values.items() if value is not None}}
+
+    def _contact(self, contact: Contact) -> dict[str, Any]:
+        planes = []
+        for plane in contact.planes:
+            table = plane.table()
+            if plane.history is not None:
+                table["history"] = self._history(as_history(plane.history), True)
+            planes.append(table)
+        return {**contact.table(), **({"planes": planes} if planes else {})}
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
@@ -287,10 +302,12 @@ def _read(sections: Mapping[str, Any]) -> Case:
     supports = [support_from(item) for item in sections["supports"]]
     loads = [load_from(item) for item in sections["loads"]]
     masses = [mass_from(item) for item in sections.get("masses", ())]
+    contact = contact_from(sections["contact"]) if "contact" in sections else None
     structure = _structure(sections)
     with warnings.catch_warnings():  # they were issued when the case was first made
         warnings.simplefilter("ignore", FoldynWarning)
-        return Case(structure, supports, loads, damping_from(sections["damping"]), masses)
+        damping = damping_from(sections["damping"])
+        return Case(structure, supports, loads, damping, masses, contact)
 
 
 def _structure(sections: Mapping[str, Any]) -> Any:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from foldyn.errors import InputError
-from foldyn.values import brief, numbers
+from foldyn.values import brief, choice, numbers
 
 
 @brief
@@ -21,10 +21,15 @@ class State:
         Displacement (m) of every node from its rest position; zero by default.
     velocity : array_like, shape (n, 3), optional
         Velocity (m/s) of every node; zero by default.
+    memory : array_like of shape (b, 2), or "fresh", optional
+        State of the branches of laws with memory, as results have it (`memory`). "fresh": every
+        hinge has just come from its rest angle. By default those of the law `prony` have had the
+        time to relax there, all others are fresh.
     """
 
     displacement: ArrayLike | None = None
     velocity: ArrayLike | None = None
+    memory: ArrayLike | str | None = None
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -38,5 +43,9 @@ class State:
                 raise InputError(f"{name}: shape {array.shape}: must be (nodes, 3)")
             shapes.add(array.shape)
             object.__setattr__(self, name, array)
+        if isinstance(self.memory, str):
+            choice("memory", self.memory, ("fresh",))
+        elif self.memory is not None:
+            object.__setattr__(self, "memory", numbers("memory", self.memory))
         if len(shapes) == 2:
             raise InputError("displacement and velocity: must have the same shape")

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, observe, tell
-from foldyn.dynamics.system import acceleration
+from foldyn.dynamics.course import Outcome, observe, share, tell
+from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.kernels import elapse
 
 ORDER = 2
 
@@ -40,7 +41,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    dt, team, a = plan.dt, work.team, course.carry
+    team, a = work.team, course.carry
     low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
     fa, ahead = flat(a)[low:high], flat(s.stage[0])[low:high]
@@ -48,30 +49,35 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     begun = course.tally.steps
     end = min(begun + stretch, plan.steps)
     tell(team, 0.0, 0.0, 0)
-    if begun == 0:
-        powers[0], powers[1] = acceleration(
-            model, system, mass, course.u, course.v, plan.start, a, work, s
-        )
-        outcome, hinge = observe(model, system, mass, course, a, 0, plan, out, work, s)
-        if outcome != Outcome.DONE:
-            return outcome, hinge
-    for step in range(begun + 1, end + 1):
-        for i in range(u.size):
-            v[i] += 0.5 * dt * fa[i]
-            u[i] += dt * v[i]
-            ahead[i] = v[i] + 0.5 * dt * fa[i]
-        now = plan.start + step * dt
-        power_in, power_out = acceleration(
-            model, system, mass, course.u, s.stage[0], now, a, work, s
-        )
-        wrong = 0
-        for i in range(u.size):
-            v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
-            wrong += not abs(v[i]) < np.inf
-        tell(team, 0.5 * dt * (powers[0] + power_in), 0.5 * dt * (powers[1] + power_out), wrong)
-        powers[0], powers[1] = power_in, power_out
-        if team.number == 0:
-            course.tally.evaluations += 1
+    for step in range(begun + 1 if begun > 0 else 0, end + 1):  # step 0, of no length, is the start
+        work_in, work_out, wrong = 0.0, 0.0, 0
+        span = plan.dt if step > 0 else 0.0
+        left = span
+        while True:  # once, unless contact asks for shorter steps
+            dt = 0.0
+            if step > 0:
+                dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+            for i in range(u.size):
+                v[i] += 0.5 * dt * fa[i]
+                u[i] += dt * v[i]
+                ahead[i] = v[i] + 0.5 * dt * fa[i]
+            left = 0.0 if dt == left else left - dt
+            now = plan.start + step * plan.dt - left
+            elapse(model, span - left)
+            power_in, power_out = acceleration(
+                model, system, mass, course.u, s.stage[0], now, a, work, s
+            )
+            for i in range(u.size):
+                v[i] += 0.5 * dt * fa[i]  # the kick that ends the step
+                wrong += not abs(v[i]) < np.inf
+            work_in += 0.5 * dt * (powers[0] + power_in)
+            work_out += 0.5 * dt * (powers[1] + power_out)
+            powers[0], powers[1] = power_in, power_out
+            if team.number == 0 and step > 0:
+                course.tally.evaluations += 1
+            if left == 0.0 or wrong > 0:
+                break
+        tell(team, work_in, work_out, wrong)
         outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
         if outcome != Outcome.DONE:
             return outcome, hinge

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.dynamics.system import record
+from foldyn.dynamics.record import record
 from foldyn.jit.compiled import inner, inner_scalar, scalar
+from foldyn.materials.memory_law import VARIABLES
+from foldyn.mechanics.kernels import commit, recall
 from foldyn.mechanics.threads import largest, part, total, wait
 
 
@@ -24,6 +27,7 @@ class Outcome(IntEnum):
     NOT_CONVERGED = 5  # the equations of an implicit step were not solved, however small the step
 
 
+SHORTEST = 1e-6  # part of a fixed step: contact that asks for less is overrun
 WORK, DISSIPATED, WRONG, HINGE, OUTCOME = range(5)  # places of a member's notes to its team
 
 
@@ -73,13 +77,14 @@ class Samples(NamedTuple):
     velocity: NDArray  # (k, n, 3)
     reaction: NDArray  # (k, s)
     energy: NDArray  # (k, columns) as `audit.audited` names them
+    memory: NDArray  # (k, b, 2) states of the b branches of laws with memory
 
     def doubled(self) -> Samples:
         """These, with room for as many again."""
         return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in self))
 
 
-def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
+def samples(count: int, nodes: int, supported: int, energies: int, branches: int = 0) -> Samples:
     """Room for `count` samples."""
     return Samples(
         np.empty(count),
@@ -87,6 +92,7 @@ def samples(count: int, nodes: int, supported: int, energies: int) -> Samples:
         np.empty((count, nodes, 3)),
         np.empty((count, supported)),
         np.empty((count, energies)),
+        np.empty((count, branches, VARIABLES)),
     )
 
 
@@ -117,10 +123,19 @@ def sample(model, system, mass, u, v, a, t, course, out, work, s):
         model, system, mass, u, v, a, course.tally, work, s,
         out.displacement[k], out.velocity[k], out.reaction[k], out.energy[k],
     )  # fmt: skip
+    recall(model, out.memory[k])
     if not np.isfinite(out.energy[k].sum()):
         return Outcome.NOT_FINITE
     course.tally.samples += 1
     return Outcome.DONE
+
+
+@scalar
+def share(longest, left):
+    """Length (s) of the equal parts, none longer than `longest`, into which `left` is divided."""
+    if longest >= left:
+        return left
+    return left / math.ceil(min(left / max(longest, SHORTEST * left), 1.0 / SHORTEST))
 
 
 @scalar
@@ -153,6 +168,8 @@ def observe(model, system, mass, course, a, step, plan, out, work, s):
         tally.time = t
         tally.steps = step
         outcome = Outcome.DONE
+        if wrong == 0.0 and hinge < 0:
+            commit(model)
         if wrong == 0.0 and hinge < 0 and step == tally.samples * plan.every:
             outcome = sample(model, system, mass, course.u, course.v, a, t, course, out, work, s)
         team.note[0, OUTCOME] = outcome + 0  # as a number

@@ -34,10 +34,13 @@ class Dampers(NamedTuple):
 
     def placed(self, by: Numbering) -> Viscous:
         """Elements as they stand in memory while a motion is computed."""
-        elements, nodal = self.elements, 3 * len(by.order)
-        dofs = np.where(elements.dofs < nodal, by.dofs(np.minimum(elements.dofs, nodal - 1)), 0)
-        dofs = np.where(elements.dofs < nodal, dofs, elements.dofs)
-        return elements._replace(dofs=dofs)
+        return self.elements._replace(dofs=placed(self.elements.dofs, by))
+
+
+def placed(dofs: NDArray, by: Numbering) -> NDArray:
+    """Dofs of elements as they stand in memory while a motion is computed."""
+    nodal = 3 * len(by.order)
+    return np.where(dofs < nodal, by.dofs(np.minimum(dofs, nodal - 1)), dofs)
 
 
 def dampers(case: Case) -> Dampers:
@@ -48,7 +51,7 @@ def dampers(case: Case) -> Dampers:
     InputError
         The structure does not say which hinges are those of a damped crease.
     """
-    body, nodes = case.body, case.structure.nodes
+    body, nodes = case.elastic_body, case.structure.nodes
     pairs, strength = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
     constant = sparse.csr_array((body.size, body.size))
     for place, dashpot in case.dashpots:

@@ -56,7 +56,7 @@ def damping_of(case: Case, by: Numbering, start: NDArray | None, modal: ModalRow
 
     modal : its modal damping in that motion.
     """
-    matrix, body, rayleigh = sparse.csr_array((0, 0)), case.body, case.rayleigh
+    matrix, body, rayleigh = sparse.csr_array((0, 0)), case.elastic_body, case.rayleigh
     if rayleigh.beta > 0.0:
         state = start if rayleigh.state == "start" else None
         state = np.zeros_like(case.structure.nodes) if state is None else state

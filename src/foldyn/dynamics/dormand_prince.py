@@ -12,7 +12,7 @@ import numpy as np
 
 from foldyn.dynamics.course import Outcome, passed_through, sample
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration
+from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 
@@ -105,6 +105,17 @@ def _weights(theta, out):
         out[j] = theta * (p[0] + theta * (p[1] + theta * (p[2] + theta * p[3])))
 
 
+@inner
+def _accelerate(model, system, mass, q, w, t, out, work, s):
+    """See `acceleration`: one function that is called, as five copies take long to compile."""
+    return acceleration(model, system, mass, q, w, t, out, work, s)
+
+
+@inner
+def _longest(model, system, q, w, dt, work, s):
+    return longest_step(model, system, q, w, dt, work, s)
+
+
 @kernel
 def advance(model, system, mass, course, plan, out, work, s, stretch):
     """Advance a motion in place by at most `stretch` steps; returns (outcome, hinge).
@@ -122,9 +133,10 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     ut, vt, a = np.empty_like(course.u), np.empty_like(course.u), np.empty_like(course.u)
     fut, fvt, fa = flat(ut), flat(vt), flat(a)
     if tally.steps == 0:
-        powers[0, 0], powers[1, 0] = acceleration(
+        powers[0, 0], powers[1, 0] = _accelerate(
             model, system, mass, course.u, course.v, plan.start, a, work, s
         )
+        tally.wanted = _longest(model, system, course.u, course.v, tally.wanted, work, s)
         if tally.samples == 0:
             tally.farthest, tally.fastest = _largest(u), _largest(v)
             outcome = sample(
@@ -158,7 +170,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             moment = t + C[stage] * h
             if stops and C[stage] == 1.0:  # before what happens there
                 moment = np.nextafter(goal, -np.inf)
-            powers[0, stage], powers[1, stage] = acceleration(
+            powers[0, stage], powers[1, stage] = _accelerate(
                 model, system, mass, ut, vt, moment, a, work, s
             )
             for i in range(n):
@@ -184,6 +196,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         hinge = passed_through(work.angle, course.angle, 0, work.angle.size)
         if hinge >= 0:
             return Outcome.PENETRATION, hinge
+        longest = _longest(model, system, ut, vt, plan.dt, work, s)
         after = goal if h == goal - t else t + h
         tally.steps += 1
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
@@ -195,7 +208,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
             _combine(v, accelerations, weights, h, 7, fvt)
             tally.work = _integral(begun[0], powers[0], h, weights, 7)
             tally.dissipated = _integral(begun[1], powers[1], h, weights, 7)
-            acceleration(model, system, mass, ut, vt, due, a, work, s)
+            _accelerate(model, system, mass, ut, vt, due, a, work, s)
             tally.evaluations += 1
             outcome = sample(model, system, mass, ut, vt, a, due, course, out, work, s)
             if outcome != Outcome.DONE:
@@ -214,14 +227,15 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tally.wanted = min(plan.dt, h * max(0.2, min(factor, 5.0)))
         if stops:
             tally.wanted = max(tally.wanted, min(wanted, plan.dt))
-            powers[0, 0], powers[1, 0] = acceleration(
+            powers[0, 0], powers[1, 0] = _accelerate(
                 model, system, mass, course.u, course.v, after, a, work, s
             )
             tally.evaluations += 1
             for i in range(n):
                 accelerations[0, i] = fa[i]
+        tally.wanted = min(tally.wanted, longest)
         if plan.every > 0 and tally.steps % plan.every == 0:
-            acceleration(model, system, mass, course.u, course.v, after, a, work, s)
+            _accelerate(model, system, mass, course.u, course.v, after, a, work, s)
             tally.evaluations += 1
             outcome = sample(
                 model, system, mass, course.u, course.v, a, after, course, out, work, s

@@ -14,8 +14,14 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.course import StepPlan
+from foldyn.dynamics.hereditary import check_state
 from foldyn.dynamics.inertia import check_mass, is_lumped
-from foldyn.dynamics.initial import check_start, check_steady, warn_of_unstable_damping
+from foldyn.dynamics.initial import (
+    check_contact,
+    check_start,
+    check_steady,
+    warn_of_unstable_damping,
+)
 from foldyn.dynamics.method_choice import AUTO, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
@@ -23,6 +29,7 @@ from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack
+from foldyn.dynamics.touch import contact_quantities
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
 from foldyn.values import number
@@ -162,6 +169,8 @@ def prepare(
         )
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
+    check_contact(case, u, float(start))
+    remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
     reason = ""
     if method == AUTO:
@@ -207,8 +216,10 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
-    sampler = Sampler(case, sample or {}, u, v, plan.start)
-    return Motion(case, integrator, plan, critical, force, (u, v), packed, sampler, reason)
+    sampler = Sampler(case, sample or {}, u, v, plan.start, contact_quantities(case))
+    return Motion(
+        case, integrator, plan, critical, force, (u, v, remembered), packed, sampler, reason
+    )
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:

@@ -45,6 +45,7 @@ from foldyn.dynamics.system import Packed, acceleration, carry
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.kernels import elapse
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -167,6 +168,7 @@ def residual(model, system, mass, p, h, t, old, new, shift, out, work, s):
     if system.ties.slave.size > 0:  # of which the masters may be such nodes
         follow_masters(system.ties, a1)
         follow_masters(system.ties, w1)
+    elapse(model, h)
     acceleration(model, system, mass, new.q, new.w, t, out, work, s)
     for i in range(q0.size):
         b1[i] = flat(s.force)[i]

@@ -95,6 +95,14 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:
     )
 
 
+def lightness(mass: Inertia) -> NDArray:
+    """What the inverse (1/kg) of the mass of each node is at most."""
+    # a consistent matrix of triangles is at least half of its diagonal
+    share = 1.0 if mass.lumped else 0.5
+    own = share * mass.diagonal
+    return np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
+
+
 def _least(diagonal: NDArray, ties: Ties, own: NDArray) -> NDArray:
     """Least mass (n,) that the free dofs of each node feel; its own where a node has none."""
     least = np.full(len(own), np.inf)

@@ -53,6 +53,10 @@ def initial_state(result: Any, at: int = -1) -> State:
         for name in ("displacement", "velocity")
         if name == "displacement" or name in sample
     }
+    if "memory" in sample:
+        state["memory"] = check_variable(
+            sample, "memory", ("branch", "variable"), place="initial_state: "
+        ).to_numpy()
     return State(**state)
 
 
@@ -80,6 +84,49 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
     check_tied(case, pair[0], "initial")
     _check_tied_velocity(case, pair[1])
     return pair[0], pair[1]
+
+
+def check_contact(case: Case, u: NDArray, start: float) -> None:
+    """Refuse a start at which something has passed another; warn where panels overlap."""
+    if case.contact is None:
+        return
+    pattern = case.structure.pattern
+    if pattern is not None and pattern.boards is not None:
+        raise InputError(
+            ": is between the middle surfaces of a sheet, beside which thick panels are hinged; "
+            "leave out contact, or hinge_offset",
+            "contact",
+        )
+    x = case.structure.nodes + u
+    surface = np.unique(case.structure.triangles)
+    for i, plane in enumerate(case.contact.planes):
+        point, normal = np.array(plane.point), np.array(plane.normal)
+        if plane.history is not None:
+            point = point + float(plane.history(start)) * np.array(plane.motion)
+        height = (x[surface] - point) @ normal / np.linalg.norm(normal)
+        free = ~case.fixed[surface].all(axis=1)
+        if free.any() and height[free].min() <= 0.0:
+            behind = int(np.argmin(np.where(free, height, np.inf)))
+            raise InputError(
+                f": node {surface[behind]} is {-height[behind]:.3g} m behind it at the start: move "
+                "the plane, or turn its normal to the side of the sheet",
+                f"contact.planes[{i}]",
+            )
+    body: Any = case.body
+    energy = body.contact(body.dofs(u))[0]
+    if not np.isfinite(energy):
+        raise InputError(
+            ": at the start panels meet, or fold onto themselves: start from a state in which "
+            "they are apart, as with crease_rest above 0 and below 360 degrees",
+            "contact",
+        )
+    if not u.any() and energy > 0.0 and not case.contact.planes:
+        warnings.warn(
+            "contact: at rest panels are nearer to each other than the sheet is thick; they will "
+            f"be pushed apart with an energy of {energy:.3g} J",
+            FoldynWarning,
+            stacklevel=4,
+        )
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
@@ -116,7 +163,7 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
     if case.rayleigh.beta == 0.0 or case.rayleigh.state != "start":
         return
     free = np.asarray(case.free_dofs)
-    body = case.body
+    body = case.elastic_body
     whole = case.constraints.matrix(body.tangent(body.dofs(u)))
     matrix = sparse.csc_array(whole[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
@@ -136,8 +183,14 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
         )
 
 
-def begin(case: Case, u: NDArray, v: NDArray, plan: StepPlan, packed: Packed) -> Course:
-    """State of the integrators at the start of a motion with displacement u and velocity v."""
+def begin(
+    case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None, plan: StepPlan,
+    packed: Packed,
+) -> Course:  # fmt: skip
+    """State of the integrators at the start of a motion with displacement u and velocity v.
+
+    remembered : that of hinges with memory, see `Memory.start`.
+    """
     body, system, mass, callbacks, by = packed
     s = scratch(system)
     place(system, np.zeros_like(u), np.zeros_like(v), plan.start, s)
@@ -169,6 +222,10 @@ def begin(case: Case, u: NDArray, v: NDArray, plan: StepPlan, packed: Packed) ->
             turn(body.model, system.actuators, s.factor)
         push = following_force(system.following, inward.ravel(), s.factor)
         inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
+    if body.memory is not None:
+        there = by.inward(u)
+        there.ravel()[body.hidden] = inward.ravel()[body.hidden]
+        body.memory.start(there, remembered)
     return Course(
         u=inward,
         v=by.inward(w),

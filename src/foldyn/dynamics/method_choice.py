@@ -17,7 +17,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.dynamics.methods import METHODS
+from foldyn.dynamics.methods import METHODS, suited
 from foldyn.dynamics.modal_damping import ModalRows
 from foldyn.dynamics.timing import DEFAULT_FRACTION, histories
 from foldyn.mechanics.following import following_force
@@ -41,12 +41,18 @@ def choose(
     modal is the modal damping of the motion.
     """
     conserved = not case.damped and not any(histories(case))
-    conserved = conserved and case.body.has_discrete_gradient
+    conserved = conserved and case.body.has_discrete_gradient and not case.remembering
     implicit = "energy_momentum" if conserved else "generalized_alpha"
+    if case.contact is not None and case.remembering:
+        return suited("rk4", case).name, "explicit: contact, and laws with memory"
+    if case.contact is not None:
+        return suited("dormand_prince", case).name, "explicit: its error resolves impacts"
     if massless := case.structure.massless:
         return "generalized_alpha", f"implicit: {massless} have no mass"
     if (case.mass.diagonal() <= 0.0)[~case.constraints.determined.all(axis=1)].any():
         return implicit, "implicit: nodes without mass have no acceleration"
+    if case.remembering and tolerance is not None:
+        return implicit, "implicit: explicit steps that vary do not take laws with memory"
     omega = frequency(case, u, v, duration)
     lasting = conserved and duration * omega > 2.0 * math.pi * LONG
     explicit = "central_difference" if lasting else "rk4"
@@ -107,7 +113,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     the angular velocity of its rigid part. Hinges count with at least their nominal stiffness.
     """
     structure, free = case.structure, np.asarray(case.free_dofs)
-    stiffness = case.body.tangent(u, 1.0)
+    stiffness = case.elastic_body.tangent(u, 1.0)
     ties = case.constraints
     force = ties.force(_applied(case, u) - stiffness @ _imposed(case))
     k = ties.matrix(stiffness)[free][:, free]
@@ -155,7 +161,7 @@ def vibrating_share(
 
 def _applied(case: Case, u: NDArray) -> NDArray:
     """Forces (3n,) at u that loads and actuated folds exert beside the internal ones, N."""
-    body = case.body
+    body = case.elastic_body
     force = -body.internal(u)
     for load, _ in case.load_terms:
         force += load.ravel()
@@ -180,7 +186,7 @@ def _imposed(case: Case) -> NDArray:
 
 def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:
     """Whether forces at the start set the structure in motion at once."""
-    internal = case.body.internal(u).reshape(u.shape)
+    internal = case.elastic_body.internal(u).reshape(u.shape)
     force, size = -internal, float(np.abs(internal[case.fixed]).max(initial=0.0))
     for load, history in case.load_terms:
         force = force + history(start) * load

@@ -67,20 +67,25 @@ class Compiled:
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
 
     def facts(self) -> dict[str, Any]:
-        """Statistics of its own, for the result's attributes: none."""
-        return {}
+        """Statistics of its own, for the result's attributes: what contact has cost."""
+        kept = getattr(self._works[0], "memory", None)
+        if kept is None:
+            return {}
+        shortest = float(kept.facts.shortest)
+        return {"contact_lists": int(kept.counts.lists), "shortest_contact_step": shortest}
 
 
 def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, moving
-    supports, actuated folds, loads that depend on the displacement, dampers, the substitutions of a
-    consistent mass matrix.
+    supports, actuated folds, loads that depend on the displacement, dampers, contact, the
+    substitutions of a consistent mass matrix.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
     alone = system.moves or system.turns or system.follows or called or system.damping.follows
+    alone = alone or system.touches
     return 1 if alone or not packed.mass.lumped else packed.body.threads
 
 
@@ -106,8 +111,12 @@ class Integrator(NamedTuple):
         Of an implicit method: its `Scheme` from a case and a course.
     massless : bool
         Whether it takes dofs without mass beside the displacements, as those of a shell.
+    remembers : bool
+        Whether it takes laws with memory.
     conserving : bool
         Whether it needs forces with a discrete gradient, which not every model has.
+    contact : bool
+        Whether it takes contact.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
     """
@@ -120,7 +129,9 @@ class Integrator(NamedTuple):
     adaptive: bool = False
     scheme: Callable[..., Any] | None = None
     massless: bool = False
+    remembers: bool = True
     conserving: bool = False
+    contact: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
@@ -152,7 +163,9 @@ class Integrator(NamedTuple):
 def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
     """The integrator of a file, which has its name."""
     name = module.__name__.rpartition(".")[2]
-    return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
+    return Integrator(
+        name, module.ORDER, module.advance, module.growth, evaluations, contact=True, **traits
+    )
 
 
 def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any) -> Integrator:
@@ -164,13 +177,17 @@ METHODS: Mapping[str, Integrator] = {
     for method in (
         _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
         _explicit(central_difference, 1),
-        _explicit(dormand_prince, 6, adaptive=True),
+        _explicit(dormand_prince, 6, adaptive=True, remembers=False),
         _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
         _implicit(
             "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
         ),
         _implicit(
-            "energy_momentum", energy_momentum, energy_momentum.EnergyMomentum, conserving=True
+            "energy_momentum",
+            energy_momentum,
+            energy_momentum.EnergyMomentum,
+            conserving=True,
+            remembers=False,
         ),
     )
 }
@@ -189,7 +206,8 @@ def suited(name: str, case: Case) -> Integrator:
     if lacking := _lacking(method, case):
         fit = ", ".join(other.name for other in METHODS.values() if not _lacking(other, case))
         raise InputError(
-            f" = {name!r}: {lacking}, which this method needs; choose one of {fit}", "method"
+            f" = {name!r}: {lacking}; choose {f'one of {fit}' if fit else 'another model'}",
+            "method",
         )
     return method
 
@@ -203,10 +221,18 @@ def with_mass(method: Integrator, case: Case) -> Case:
 def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
+    if case.contact is not None and not method.contact:
+        return "this method does not take contact yet"
     if structure.massless and structure.condensed is None and not method.massless:
-        return f"{structure.massless} have no mass"
+        return f"{structure.massless} have no mass, which this method needs"
     if method.conserving and not case.body.has_discrete_gradient:
-        return "the forces of this structure have no discrete gradient"
+        return "the forces of this structure have no discrete gradient, which this method needs"
+    if case.remembering and not method.remembers:
+        law = case.remembering[0].law.name
+        return (
+            f"the law {law!r} has a memory, and no forces that depend on the state alone, which "
+            "this method needs"
+        )
     return ""
 
 

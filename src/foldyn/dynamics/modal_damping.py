@@ -88,7 +88,7 @@ def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
     InputError
         The state is unstable; there are not as many modes.
     """
-    damping, body = case.modal_damping, case.body
+    damping, body = case.modal_damping, case.elastic_body
     if damping is None:
         return ModalRows(np.zeros((0, body.size)), 0.0, 0)
     state = start if damping.state == "start" else None
@@ -102,7 +102,7 @@ def modal_rows(case: Case, start: NDArray | None = None) -> ModalRows:
 def mass_of(case: Case) -> sparse.csr_array:
     """Mass (m, m) of all dofs of a case: that of its nodes."""
     mass = sparse.csr_array(sparse.kron(case.mass, sparse.eye_array(3), format="csr"))
-    mass.resize((case.body.size, case.body.size))
+    mass.resize((case.elastic_body.size, case.elastic_body.size))
     return mass
 
 
@@ -114,7 +114,7 @@ def rows_of(
 
     Dofs behind those of the case's body are free.
     """
-    ties, body = case.constraints, case.body
+    ties, body = case.constraints, case.elastic_body
     more = np.arange(body.size, stiffness.shape[0])
     free = np.concatenate([case.free_dofs, body.hidden, more])
     mass, stiffness = ties.matrix(mass), ties.matrix(stiffness)

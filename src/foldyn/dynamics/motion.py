@@ -59,7 +59,8 @@ class Motion:
 
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
-        state: tuple[NDArray, NDArray], packed: Packed, sampler: Sampler, reason: str = "",
+        state: tuple[NDArray, NDArray, NDArray | str | None], packed: Packed, sampler: Sampler,
+        reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
@@ -99,13 +100,19 @@ class Motion:
             warnings.warn(doubts, FoldynWarning, stacklevel=3)
         return self._written()
 
+    @property
+    def _branches(self) -> int:
+        """Number of the branches of laws with memory."""
+        memory = self._packed.body.memory
+        return 0 if memory is None else len(memory.own.state)
+
     def _start(self, count: int) -> None:
         """Go back to the start, with room for `count` samples."""
         structure = self.case.structure
         self._course = begin(self.case, *self._state, self.plan, self._packed)
         self._out = samples(
             count, len(structure.nodes), len(self.case.reaction_dofs),
-            len(audited(self.case.energy_groups)),
+            len(audited(self.case.energy_groups)), self._branches,
         )  # fmt: skip
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
@@ -224,6 +231,13 @@ class Motion:
         if code == Outcome.PENETRATION:
             j, k, i, l = (int(order[v]) if 0 <= v < len(order) else None for v in hinges[hinge])  # noqa: E741
             wings = f"wings {i}, {l}" if l is not None else f"wing {i}, the edge is clamped"
+            if self.case.contact is not None:
+                self._stop(
+                    f"{moment} contact was overrun: the dihedral about nodes {j}-{k} ({wings}) "
+                    'jumped by more than pi; use method = "dormand_prince", or a larger '
+                    "contact.stiffness",
+                    PenetrationError,
+                )
             self._stop(
                 f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} ({wings}) "
                 f"jumped by more than pi; {self._apart(hinge)}",
@@ -268,7 +282,7 @@ class Motion:
         each = IMPLICIT_WORK if self.method.implicit else 1
         threads = self._engine.threads if self._engine else 1
         work = each * int(self._course.tally.evaluations) / threads
-        few = FEW // max(1, len(self.case.structure.triangles))
+        few = FEW // max(1, len(getattr(self.case.structure, "triangles", ())))
         looks = max(1, few, int(work / PER_LOOK))
         stride = -(-max(1, self.stored) // looks)
         return crossings_of(self.case, self._written().displacement, stride)
@@ -282,6 +296,7 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), self._sampler.columns(self.stored),
+            out.memory if self._branches else None,
         )  # fmt: skip
         return crossings.recorded(result)
 

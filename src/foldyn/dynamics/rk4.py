@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.dynamics.course import Outcome, observe, tell
+from foldyn.dynamics.course import Outcome, observe, share, tell
 from foldyn.dynamics.stability import roots
-from foldyn.dynamics.system import acceleration
+from foldyn.dynamics.system import acceleration, longest_step
 from foldyn.jit.compiled import shared
 from foldyn.jit.intrinsics import borrowed, flat
+from foldyn.mechanics.kernels import elapse
 
 ORDER = 4
 
@@ -32,7 +33,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    dt, team = plan.dt, work.team
+    team = work.team
     low, high = 3 * work.strips.own[0], 3 * work.strips.own[1]
     stage_u, stage_v, a = s.stage[0], s.stage[1], s.stage[2]
     u, v = flat(course.u)[low:high], flat(course.v)[low:high]
@@ -44,37 +45,53 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     end = min(begun + stretch, plan.steps)
     tell(team, 0.0, 0.0, 0)
     for step in range(begun, end + 1):
-        now = plan.start + step * dt
-        work_in, work_out, wrong = 0.0, 0.0, 0
-        for stage in range(4):
-            t = now + 0.5 * ((stage + 1) // 2) * dt
-            power_in, power_out = acceleration(model, system, mass, stage_u, stage_v, t, a, work, s)
-            weight = 2.0 if 0 < stage < 3 else 1.0
-            work_in += weight * power_in
-            work_out += weight * power_out
-            ahead = 0.5 * dt if stage < 2 else dt
-            if stage == 0:
-                outcome, hinge = observe(model, system, mass, course, a, step, plan, out, work, s)
-                if outcome != Outcome.DONE or step == end:
-                    return outcome, hinge
-                for i in range(u.size):
-                    du[i], dv[i] = vt[i], fa[i]
-                    ut[i] = u[i] + ahead * vt[i]
-                    vt[i] = v[i] + ahead * fa[i]
-            elif stage < 3:
-                for i in range(u.size):
-                    du[i] += 2.0 * vt[i]
-                    dv[i] += 2.0 * fa[i]
-                    ut[i] = u[i] + ahead * vt[i]
-                    vt[i] = v[i] + ahead * fa[i]
-            else:
-                for i in range(u.size):
-                    u[i] += dt / 6.0 * (du[i] + vt[i])
-                    v[i] += dt / 6.0 * (dv[i] + fa[i])
-                    wrong += not abs(v[i]) < np.inf
-                for i in range(u.size):
-                    ut[i], vt[i] = u[i], v[i]
-        tell(team, dt / 6.0 * work_in, dt / 6.0 * work_out, wrong)
-        if team.number == 0:
-            course.tally.evaluations += 4
+        work_in, work_out, wrong, left = 0.0, 0.0, 0, plan.dt
+        while left > 0.0:  # once, unless contact asks for shorter steps
+            first = left == plan.dt
+            now = plan.start + step * plan.dt + (plan.dt - left)
+            part_in, part_out, dt = 0.0, 0.0, left
+            for stage in range(4):
+                since = 0.5 * ((stage + 1) // 2) * dt
+                t = now + since
+                if stage > 0:
+                    elapse(model, plan.dt - left + since)
+                power_in, power_out = acceleration(
+                    model, system, mass, stage_u, stage_v, t, a, work, s
+                )
+                weight = 2.0 if 0 < stage < 3 else 1.0
+                part_in += weight * power_in
+                part_out += weight * power_out
+                if stage == 0:
+                    if first:
+                        outcome, hinge = observe(
+                            model, system, mass, course, a, step, plan, out, work, s
+                        )
+                        if outcome != Outcome.DONE or step == end:
+                            return outcome, hinge
+                    dt = share(longest_step(model, system, course.u, course.v, left, work, s), left)
+                ahead = 0.5 * dt if stage < 2 else dt
+                if stage == 0:
+                    for i in range(u.size):
+                        du[i], dv[i] = vt[i], fa[i]
+                        ut[i] = u[i] + ahead * vt[i]
+                        vt[i] = v[i] + ahead * fa[i]
+                elif stage < 3:
+                    for i in range(u.size):
+                        du[i] += 2.0 * vt[i]
+                        dv[i] += 2.0 * fa[i]
+                        ut[i] = u[i] + ahead * vt[i]
+                        vt[i] = v[i] + ahead * fa[i]
+                else:
+                    for i in range(u.size):
+                        u[i] += dt / 6.0 * (du[i] + vt[i])
+                        v[i] += dt / 6.0 * (dv[i] + fa[i])
+                        wrong += not abs(v[i]) < np.inf
+                    for i in range(u.size):
+                        ut[i], vt[i] = u[i], v[i]
+            work_in += dt / 6.0 * part_in
+            work_out += dt / 6.0 * part_out
+            left = 0.0 if dt == left or wrong > 0 else left - dt
+            if team.number == 0:
+                course.tally.evaluations += 4
+        tell(team, work_in, work_out, wrong)
     return Outcome.DONE, -1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ class Sampler:
         State at the start, at which each function is tried.
     start : float
         Time there, s.
+    own : mapping of str to Quantity
+        What is sampled beside these.
 
     Raises
     ------
@@ -40,15 +43,19 @@ class Sampler:
         array of the dimensions that it names.
     """
 
-    def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
+    def __init__(
+        self, case: Case, given: Any, u: NDArray, v: NDArray, start: float,
+        own: Mapping[str, Quantity] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
         if not isinstance(given, Mapping):
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
         structure = case.structure
-        taken = {*TAKEN, *case.energy_groups}
+        taken = {*TAKEN, *case.energy_groups, *own}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
-        for name, what in given.items():
-            if not isinstance(name, str) or not name.isidentifier() or name in taken:
+        for name, what in {**given, **own}.items():
+            free = isinstance(name, str) and name.isidentifier() and name not in taken
+            if name in given and not free:
                 raise InputError(f": {name!r} is not free; choose another name", "sample")
             quantity = what if isinstance(what, Quantity) else Quantity(function=what)
             try:

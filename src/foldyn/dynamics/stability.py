@@ -18,6 +18,7 @@ from scipy.sparse import linalg
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics.dampers import dampers
+from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import ComputationError
 
@@ -78,9 +79,13 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     """Largest angular frequency (rad/s) of a case about displacement u (n, 3), rest by default.
 
     Hinges count with at least their nominal stiffness, so that superlinear bends, which have
-    none at rest, cannot make the answer too small.
+    none at rest, cannot make the answer too small. Laws with memory count with what they resist at
+    once.
     """
-    tangent = case.body.tangent(_state(case, u), 1.0)
+    tangent = case.elastic_body.tangent(_state(case, u), 1.0)
+    added = instant_stiffness(case, _state(case, u))
+    if added is not None:
+        tangent = sparse.csr_array(tangent + added)
     return float(np.sqrt(max(_largest_quotient(case, tangent), 0.0)))
 
 

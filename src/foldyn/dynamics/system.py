@@ -29,21 +29,28 @@ from foldyn.dynamics.damping import (
     drag_power,
     has_dampers,
 )
+from foldyn.dynamics.hereditary import with_memory
 from foldyn.dynamics.inertia import (
     Inertia,
     inertia,
     kinetic_energy,
+    lightness,
     moving_energy,
     substitute,
     times_mass,
 )
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
-from foldyn.dynamics.ties import Ties, add_reactions, ties_of
+from foldyn.dynamics.ties import Ties, ties_of
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.body import Body, Numbering, renumbered
 from foldyn.mechanics.following import Following, joined, push_following
-from foldyn.mechanics.kernels import energies_of, force_of
+from foldyn.mechanics.kernels import (
+    contact_limit,
+    contact_powers,
+    force_of,
+    place_obstacles,
+)
 from foldyn.mechanics.threads import wait
 
 
@@ -62,6 +69,8 @@ class System(NamedTuple):
     moves: bool  # supports that move,
     turns: bool  # rest angles that change
     follows: bool  # loads that depend on the displacement
+    touches: bool  # contact
+    presses: bool  # obstacles that move
     rows: int  # of arrays: n, and those of the dofs beside displacements
     energies: int  # groups of strain energy
     order: NDArray  # (n,) node number of each place in memory
@@ -74,6 +83,7 @@ class System(NamedTuple):
     actuators: Actuators
     following: Following
     ties: Ties
+    lightness: NDArray  # (n,) 1 / mass of the nodes with contact, else (0,), 1/kg
 
 
 class Scratch(NamedTuple):
@@ -125,15 +135,16 @@ def pack(
     start : displacement (n, 3) at the start, where damping may take its stiffness; rest by default.
     modal : the modal damping of a motion from there, if it is known.
     """
-    body, by = renumbered(case.body)
+    histories: list[History] = []
+    forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
+    others = (*case.base_terms, *case.rest_terms, *case.obstacle_terms)
+    for _, history in (*forces, *supports, *others):
+        if history not in histories:
+            histories.append(history)
+    body, by = renumbered(_driven(case, histories))
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties)
-    histories: list[History] = []
-    forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
-    for _, history in (*forces, *supports, *case.base_terms, *case.rest_terms):
-        if history not in histories:
-            histories.append(history)
     moves = [
         (follow(mass, by.inward(shape)), history)
         for shape, history in (*case.imposed_terms, *case.base_terms)
@@ -144,11 +155,14 @@ def pack(
     callbacks = Callbacks()
     turns = _entries(case.rest_terms, histories)
     body, turned = actuators(body, *turns)
+    body = with_memory(case, body, by)
     system = System(
         varies=bool(histories),
         moves=bool(moves),
         turns=len(turned.hinge) > 0,
         follows=following.acts,
+        touches=case.contact is not None,
+        presses=bool(case.obstacle_terms),
         rows=by.rows,
         energies=len(body.energy_groups),
         order=by.order,
@@ -161,8 +175,18 @@ def pack(
         actuators=turned,
         following=following,
         ties=ties,
+        lightness=lightness(mass) if case.contact is not None else np.zeros(0),
     )
     return Packed(body, system, mass, callbacks, by)
+
+
+def _driven(case: Case, histories: list[History]) -> Body:
+    """The body of a case, its obstacles driven by these histories."""
+    body: Any = case.body
+    if not case.obstacle_terms:
+        return body
+    rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
+    return body.driven(rows)
 
 
 def _entries(terms, histories) -> Entries:
@@ -273,19 +297,22 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     """
     first, last = 3 * work.strips.own[0], 3 * work.strips.own[1]
     if system.varies and t != s.time[0]:  # two stages of a step may share their time
-        evaluate(system.waves, t, system.moves or system.turns, s.factor)
+        derive = system.moves or system.turns or system.presses
+        evaluate(system.waves, t, derive, s.factor)
         s.time[0] = t
     if system.turns:
         turn(model, system.actuators, s.factor)
     if system.moves:
         carry(system.moved, s.factor, 0, q, s.displacement)
         carry(system.moved, s.factor, 1, w, s.velocity)
+    if system.presses:
+        place_obstacles(model, s.factor, work)
     u = s.displacement if system.moves else q
     v = s.velocity if system.moves else w
     wait(work.team)  # for q and w of the others
     force_of(model, u, s.force, work)
     force, speed = flat(s.force), flat(v)
-    power_in, power_out = 0.0, 0.0
+    power_in, power_out = contact_powers(model, v, work)
     loads, damping = system.loads, system.damping
     for k in range(s.loads[0], s.loads[1]):
         dof = loads.dof[k]
@@ -319,47 +346,20 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
     return power_in, power_out
 
 
+@inner_scalar
+def longest_step(model, system, q, w, dt, work, s):
+    """The longest step (s), at most dt, that contact allows: after `acceleration` at q and w.
+
+    Once before each step, where the last one has ended.
+    """
+    if not system.touches:
+        return dt
+    u = s.displacement if system.moves else q
+    v = s.velocity if system.moves else w
+    return contact_limit(model, u, v, dt, system.lightness, work)
+
+
 @kernel
 def accelerate(model, system, mass, q, w, t, out, work, s):
     """See `acceleration`: for Python."""
     return acceleration(model, system, mass, q, w, t, out, work, s)
-
-
-@inner
-def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity, reaction, energy):
-    """Write one sample after `acceleration`.
-
-    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
-    gets the strain energies, the kinetic energy, what was dissipated and the work.
-    """
-    carry(system.moved, s.factor, 0, q, s.displacement)
-    carry(system.moved, s.factor, 1, w, s.velocity)
-    carry(system.moved, s.factor, 2, a, s.moving)
-    for i in range(system.order.size):
-        for c in range(3):
-            displacement[system.order[i], c] = s.displacement[i, c]
-            velocity[system.order[i], c] = s.velocity[i, c]
-    product, force = flat(s.product), flat(s.force)
-    times_mass(mass, s.moving, s.product)
-    tied = system.ties.slave.size > 0
-    if tied:
-        reaction[:] = 0.0
-        add_reactions(system.ties.reactions, product, 1.0, reaction)
-        add_reactions(system.ties.reactions, force, 1.0, reaction)
-    else:
-        for k in range(system.supported.size):
-            reaction[k] = product[system.supported[k]] + force[system.supported[k]]
-    groups = s.energy.size
-    energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
-    times_mass(mass, s.velocity, s.product)
-    if tied:
-        add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
-    else:
-        for k in range(system.supported.size):
-            reaction[k] += drag(system.damping, product[system.supported[k]])
-    energies_of(model, s.displacement, work, s.energy)
-    for k in range(groups):
-        energy[k] = s.energy[k]
-    energy[groups + 1] = tally.dissipated
-    # what brought the moving supports to their speed belongs to the work: it may come in jolts
-    energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)

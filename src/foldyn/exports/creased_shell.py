@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.shell_of import check_reduced, shell_of
+from foldyn.materials import MemoryLaw
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
@@ -222,6 +223,8 @@ def fold_slopes(structure: Discretized) -> NDArray:
         Folds that are not linear about rest.
     """
     law, rest = structure.fold_law, structure.fold_rest
+    if isinstance(law, MemoryLaw):
+        raise InputError(f" = {law}: springs have no memory; take its elastic part", "fold_law")
     slope, moment = law.slope(rest, rest), law.moment(rest, rest)
     if not (slope > 0.0).all() or np.abs(moment).max(initial=0.0) > 0.0:
         raise InputError(
@@ -278,6 +281,7 @@ def _check(case: Case) -> None:
         (case.constraints, "supports", "hold oblique directions or tie nodes; hold axes"),
         (case.springs is not None, "supports", "have springs; leave them out"),
         (case.following_terms, "loads", "follow the sheet or come from temperature; give forces"),
+        (case.contact, "contact", "leave it out: decks have no contact"),
         (case.rest_terms, "loads", "fold creases; give the folded pattern, and forces"),
     )
     for is_wrong, field, text in wrong:

@@ -136,6 +136,8 @@ def _cell_fields(mesh: Mesh, known: Mapping[str, Field]) -> dict[str, NDArray]:
     """Fields of cells (samples, cells), nan where a cell has none."""
     out = {}
     for name, field in known.items():
+        if field.on == "node":
+            continue
         numbers = getattr(mesh, field.on)
         values = np.full((len(field.values), len(numbers)), np.nan, np.float32)
         values[:, numbers >= 0] = field.values[:, numbers[numbers >= 0]]

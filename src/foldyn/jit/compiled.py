@@ -60,10 +60,8 @@ def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
     """
     # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
     # of a branch in every loop
-    compiled = njit(
-        error_model="numpy", pipeline_class=Alone, no_cpython_wrapper=inner,
-        no_cfunc_wrapper=inner, **options,
-    )  # fmt: skip
+    options |= {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
+    compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher: Any = compiled(function)

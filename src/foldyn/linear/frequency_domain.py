@@ -62,8 +62,10 @@ def direct(
 
 
 def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
-    """K - w^2 M + i w C at an angular frequency (rad/s)."""
+    """K - w^2 M + i w C at an angular frequency (rad/s), with the complex stiffness of memories."""
     undamped = system.stiffness - omega**2 * system.mass
+    if system.branches is not None:
+        undamped = undamped + system.branches.stiffness(1j * omega)
     return sparse.csc_array(undamped + 1j * omega * system.damping)
 
 
@@ -139,12 +141,14 @@ def modal(
         if options.static_correction and count < pencil.finite:
             left = _residual(pencil, modes, term.shape, load)
         parts.append((load, left, term.factor))
-    noise = pencil.noise(modes.shapes)
+    noise, memory = pencil.noise(modes.shapes), None
     response = np.zeros((len(frequency), pencil.size), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
+        if system.branches is not None:
+            memory = system.branches.between(modes.shapes, 1j * omega)
         for load, left, factor in parts:
-            q = _amplitudes(modes.values, noise, damping, omega, load)
+            q = _amplitudes(modes.values, noise, damping, omega, load, memory)
             response[k] += (modes.shapes @ q + left) * factor(omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
@@ -153,15 +157,21 @@ def modal(
 
 
 def _amplitudes(
-    values: NDArray, noise: NDArray, damping: NDArray, omega: float, load: NDArray
-) -> NDArray:
-    """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values."""
+    values: NDArray, noise: NDArray, damping: NDArray, omega: float, load: NDArray,
+    memory: NDArray | None,
+) -> NDArray:  # fmt: skip
+    """Modal amplitudes at an angular frequency (rad/s); `noise` is the rounding of the values.
+
+    memory : complex stiffness of laws with memory between the modes there.
+    """
     own = damping.diagonal()
     detuned = values - omega**2
     scale = np.sqrt(np.abs(np.outer(own, own)))
-    if (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
+    if memory is not None or (np.abs(damping - np.diag(own)) > DIAGONAL * scale.max()).any():
         try:
-            return np.linalg.solve(np.diag(detuned) + 1j * omega * damping, load.astype(complex))
+            matrix = np.diag(detuned) + 1j * omega * damping
+            matrix = matrix if memory is None else matrix + memory
+            return np.linalg.solve(matrix, load.astype(complex))
         except np.linalg.LinAlgError:
             return np.full(len(load), np.nan, complex)
     resonant = (np.abs(detuned) <= noise) & (omega * own == 0.0)

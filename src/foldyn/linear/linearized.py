@@ -31,10 +31,12 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, State
+from foldyn.cases.contact import refuse_contact
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows, rows_of, soft_slopes
 from foldyn.errors import FoldynWarning
+from foldyn.linear.hereditary import Branches, branches_of
 from foldyn.linear.internal_modes import Amplitudes, amplitudes, check_internal
 from foldyn.linear.operating_point import operating_point
 from foldyn.materials import Superlinear
@@ -86,6 +88,8 @@ class Linearized:
         Internal amplitudes of each panel.
     inner : Amplitudes
         All of them.
+    branches : Branches or None
+        Those of laws with memory, whose stiffness depends on the frequency; `stiffness` is without.
     """
 
     case: Case
@@ -103,6 +107,7 @@ class Linearized:
     unbalanced: float
     internal: int
     inner: Amplitudes = field(repr=False)
+    branches: Branches | None = field(default=None, repr=False)
 
     def expanded(self, motions: NDArray) -> NDArray:
         """Displacements (3n, k) of all nodes in motions (nf, k) of the free dofs."""
@@ -166,6 +171,7 @@ def linearize(
         The state is no equilibrium; loads do not act at rest; hinges have no slope; the stiffness
         of the loads is not symmetric.
     """
+    refuse_contact(case.contact, "modes and responses do")
     amplitude = None
     if secant is not None:
         amplitude = math.radians(number("secant", secant, above=0.0, most=180.0, unit="degrees"))
@@ -213,6 +219,7 @@ def linearize(
         unbalanced=point.balance.residual,
         internal=internal,
         inner=inner,
+        branches=branches_of(case, point.dofs, free, stiffness.shape[0]),
     )
 
 

@@ -22,6 +22,7 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.dynamics.modal_damping import mass_of
 from foldyn.errors import FoldynWarning
+from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 COPIES = 4  # of the shapes, while they are found and stored
 RIGID = 1.0 - 1e-6  # share of a shape in the space of rigid motions from which it is one
 ROUNDING = 1e3 * EPS  # of |K| |r|: what counts as no force on a rigid motion
+TURN = 2.0 * np.pi
+TWINS = 1e-8  # relative difference of eigenvalues that are one
 INDEPENDENT = 1e-6  # of a motion's size that must be left of it after those before are taken out
 
 
@@ -140,13 +143,15 @@ def modes(
 def _variables(
     linear: Linearized, spectrum: Spectrum, space: NDArray, along: NDArray
 ) -> dict[str, Any]:
-    values, shapes = spectrum.values, oriented(spectrum.shapes)
+    values, shapes, remembered = spectrum.values, oriented(spectrum.shapes), 0.0
+    if linear.branches is not None:
+        values, shapes, remembered = _remembered(linear, linear.branches, values, shapes)
     with np.errstate(invalid="ignore"):
         omega = np.sqrt(values)
     modal = np.einsum("ik,ik->k", shapes, linear.damping @ shapes)
     modal = modal + ((linear.modal @ shapes) ** 2).sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(omega > 0.0, modal / (2.0 * omega), np.nan)
+        ratio = np.where(omega > 0.0, modal / (2.0 * omega) + remembered, np.nan)
     share = rigid_share(linear, space, shapes)
     factors = shapes.T @ (linear.mass @ along)
     full = linear.expanded(shapes).T
@@ -162,6 +167,34 @@ def _variables(
         "effective_mass": factors**2,
         "displacement": linear.displacement,
     }
+
+
+def _remembered(
+    linear: Linearized, branches: Branches, values: NDArray, shapes: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Eigenvalues |s|^2, shapes in phase, and damping ratios of modes with laws that remember."""
+    values, shapes, ratio = values.copy(), shapes.copy(), np.zeros(len(values))
+    for k in np.flatnonzero(values > 0.0):
+        s, x = damped_mode(linear.stiffness, linear.mass, branches, values[k], shapes[:, k])
+        values[k], ratio[k] = abs(s) ** 2, -s.real / abs(s)
+        size = np.sqrt(x.real @ (linear.mass @ x.real))
+        shapes[:, k] = x.real / size
+    order = np.argsort(values, kind="stable")
+    _warn_of_twins(linear, values[order], shapes[:, order])
+    return values[order], oriented(shapes[:, order]), ratio[order]
+
+
+def _warn_of_twins(linear: Linearized, values: NDArray, shapes: NDArray) -> None:
+    """Warn of modes that have become one, in whose place another is missing."""
+    for k in range(1, len(values)):
+        near = abs(values[k] - values[k - 1]) <= TWINS * abs(values[k])
+        if near and abs(shapes[:, k] @ (linear.mass @ shapes[:, k - 1])) > RIGID:
+            warnings.warn(
+                f"the memory of the creases makes two modes one ({np.sqrt(values[k]) / TURN:.4g} "
+                "Hz): another one near it is missing; frequency responses are not concerned",
+                FoldynWarning,
+                stacklevel=4,
+            )
 
 
 def _internal(linear: Linearized, shapes: NDArray) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
-from foldyn.statics.origami import drives, is_actuated
+from foldyn.statics.origami import AT_REST, REFUSED, drives, is_actuated
 from foldyn.statics.problem import Balance, balance
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import check_movable, displacement_of
@@ -98,7 +98,8 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     which factor they act in it: each may have its own, the one that leaves the least residual.
     Loads that depend on the displacement act by the factor of actuated folds.
     """
-    problem = OrigamiProblem(case, (), displacement)
+    flow = AT_REST if kind == "rest" else REFUSED
+    problem = OrigamiProblem(case, (), displacement, flow=flow)
     body = problem.actuation.body(factor)
     u, free = problem.dofs(problem.state(displacement, factor)), problem.free
     residual = problem.projected(body.internal(u) - problem.following_force(u, factor))

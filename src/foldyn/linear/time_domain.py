@@ -128,11 +128,15 @@ class Rig:
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
             dt = every / math.ceil(every / dt * (1.0 - 1e-12))
-        time, displacement, velocity, _, _ = prepare(
+        time, displacement, velocity, _, _, memory = prepare(
             self.driven(history), duration, self.integrator, dt, every,
             initial or State(self.state), tolerance=tolerance, start=start,
         ).samples(progress)  # fmt: skip
-        return time, displacement - self.state, State(displacement[-1], velocity[-1])
+        return (
+            time,
+            displacement - self.state,
+            State(displacement[-1], velocity[-1], memory[-1] if memory.size else None),
+        )
 
 
 def _moves_along(load: Load, case: Case) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
 from typing import Any
 
 import foldyn.jit
@@ -10,10 +11,14 @@ import foldyn.materials.switch  # noqa: F401 - gives laws their functions
 from foldyn.errors import InputError
 from foldyn.materials.custom import CustomBarLaw, CustomHingeLaw
 from foldyn.materials.enhanced_linear import EnhancedLinear
+from foldyn.materials.eyring import Eyring
 from foldyn.materials.law import BarLaw, HingeLaw
 from foldyn.materials.linear import LinearBar, LinearHinge
+from foldyn.materials.memory_law import MemoryLaw
 from foldyn.materials.ogden import Ogden
+from foldyn.materials.plastic import Plastic
 from foldyn.materials.plate_superlinear import PlateSuperlinear
+from foldyn.materials.prony import Prony
 from foldyn.materials.superlinear import Superlinear
 
 __all__ = [
@@ -23,11 +28,15 @@ __all__ = [
     "CustomBarLaw",
     "CustomHingeLaw",
     "EnhancedLinear",
+    "Eyring",
     "HingeLaw",
     "LinearBar",
     "LinearHinge",
+    "MemoryLaw",
     "Ogden",
+    "Plastic",
     "PlateSuperlinear",
+    "Prony",
     "Superlinear",
     "bar_law",
     "hinge_law",
@@ -39,6 +48,9 @@ HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
     "superlinear": Superlinear,
     "enhanced": EnhancedLinear,
     "plate_superlinear": PlateSuperlinear,
+    "prony": Prony,
+    "plastic": Plastic,
+    "eyring": Eyring,
 }
 
 
@@ -54,10 +66,25 @@ def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
 
 def _law(spec: Any, laws: Mapping[str, Any], base: type[BarLaw | HingeLaw], field: str) -> Any:
     if isinstance(spec, str) and spec in laws:
-        spec = laws[spec]()
+        kind = laws[spec]
+        missing = [item.name for item in fields(kind) if _required(item)]
+        if missing:
+            raise InputError(
+                f' = "{spec}": the law needs {" and ".join(missing)}; give a '
+                f"{kind.__name__}({missing[0]}=...), or a table with kind and {missing[0]}",
+                field,
+            )
+        spec = kind()
     if not isinstance(spec, base):
         raise InputError(
             f" = {spec!r}: choose one of {', '.join(laws)} or give a {base.__name__} object", field
         )
     spec.check(field)
     return spec
+
+
+def _required(item: Field) -> bool:
+    return item.init and item.default is MISSING and item.default_factory is MISSING
+
+
+MemoryLaw.lookup = staticmethod(hinge_law)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.materials import HingeLaw
 from foldyn.mechanics.attached import (
     Attached,
     AttachedWork,
@@ -35,14 +34,13 @@ from foldyn.mechanics.block_matrix import (
 from foldyn.mechanics.body import (
     Blocks,
     Body,
-    FoldHinges,
-    SoftHinges,
     Unstrained,
     largest_turn,
     unit_rows,
 )
 from foldyn.mechanics.model import ranks
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
+from foldyn.mechanics.wrapped_body import WrappedBody
 
 GROUP = "strain_springs"
 
@@ -55,7 +53,7 @@ def attached(body: Body, clamps: Clamps | None = None, springs: Springs | None =
     return AttachedBody(inner, clamps or no_clamps(), springs or no_springs())
 
 
-class AttachedBody(Body):
+class AttachedBody(WrappedBody):
     """A body with springs and clamped edges; see `mechanics.body.Body`.
 
     Parameters
@@ -66,31 +64,19 @@ class AttachedBody(Body):
     """
 
     def __init__(self, inner: Body, clamps: Clamps, springs: Springs) -> None:
-        self.inner, self.clamps, self.springs = inner, clamps, springs
-        self.size, self.rows, self.hidden = inner.size, inner.rows, inner.hidden
+        super().__init__(inner)
+        self.clamps, self.springs = clamps, springs
         sprung = len(springs.stiffness) + len(springs.axial_stiffness) > 0
         self.energy_groups = (*inner.energy_groups, *([GROUP] if sprung else []))
         self.model = Attached(inner.model, clamps, springs, len(inner.energy_groups))
 
-    def _with(self, inner: Body, clamps: Clamps | None = None) -> AttachedBody:
-        return AttachedBody(inner, self.clamps if clamps is None else clamps, self.springs)
-
-    def _nodal(self, q: NDArray) -> NDArray:
-        """Displacements (n, 3) of the nodes."""
-        nodes = self.size - len(self.hidden)
-        return np.ascontiguousarray(q, float).reshape(-1)[:nodes].reshape(-1, 3)
-
-    def _added(self, force: NDArray) -> NDArray:
-        """A vector (m,) of forces on nodes (n, 3)."""
-        return np.concatenate([force.ravel(), np.zeros(len(self.hidden))])
-
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """See `Body`."""
-        return self.inner.dofs(displacement, push)
+    def around(self, inner: Body) -> AttachedBody:
+        """See `WrappedBody`."""
+        return AttachedBody(inner, self.clamps, self.springs)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
-        u, inner = self._nodal(q), self.inner.energies(q)
+        u, inner = self.nodal(q), self.inner.energies(q)
         out = np.concatenate([inner, np.zeros(len(self.energy_groups) - len(inner))])
         if len(self.clamps.rest):
             out[self.clamps.group] += clamp_energy(self.clamps, u)
@@ -99,18 +85,18 @@ class AttachedBody(Body):
 
     def internal(self, q: NDArray, work: AttachedWork | None = None) -> NDArray:
         """See `Body`."""
-        u = self._nodal(q)
+        u = self.nodal(q)
         force, angle = np.zeros_like(u), np.empty(len(self.clamps.rest))
         add_clamp_forces(self.clamps, u, force, angle)
         add_spring_forces(self.springs, u, force)
-        return self.inner.internal(q, work.inner if work else None) + self._added(force)
+        return self.inner.internal(q, work.inner if work else None) + self.added(force)
 
     def hinge_forces(self, q: NDArray, work: AttachedWork | None = None) -> NDArray:
         """See `Body`."""
-        u = self._nodal(q)
+        u = self.nodal(q)
         force, angle = np.zeros_like(u), np.empty(len(self.clamps.rest))
         add_clamp_forces(self.clamps, u, force, angle)
-        return self.inner.hinge_forces(q, work.inner if work else None) + self._added(force)
+        return self.inner.hinge_forces(q, work.inner if work else None) + self.added(force)
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `Body`."""
@@ -140,14 +126,14 @@ class AttachedBody(Body):
         loose : without the forces of axial springs.
         """
         springs = blocks_of_ends(self._ends, self._springs_at(q, loose))
-        clamps = clamp_blocks(self.clamps, self._nodal(q)).reshape(-1, 3, 3)
+        clamps = clamp_blocks(self.clamps, self.nodal(q)).reshape(-1, 3, 3)
         return np.concatenate([springs, clamps])
 
     def _springs_at(self, q: NDArray, loose: bool) -> NDArray:
         """Stiffness (s, 3, 3), N/m, of all springs against motions of one end."""
         stiffness, direction = self.springs.stiffness, self.springs.direction
         along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
-        return np.concatenate([along, axial_blocks(self.springs, self._nodal(q), loose)])
+        return np.concatenate([along, axial_blocks(self.springs, self.nodal(q), loose)])
 
     def _plus(self, matrix: sparse.csr_array, blocks: NDArray) -> sparse.csr_array:
         """A matrix (m, m) with blocks of `pairs` added to it."""
@@ -165,23 +151,19 @@ class AttachedBody(Body):
     # ------------------------------------------------------------------ measures
     def angles(self, q: NDArray) -> NDArray:
         """See `Body`: those of the model, then of the clamps."""
-        own = clamp_angles(self.clamps, self._nodal(q))[0]
+        own = clamp_angles(self.clamps, self.nodal(q))[0]
         return np.concatenate([self.inner.angles(q), own])
 
     def turn(self, q: NDArray, other: NDArray) -> float:
         """See `Body`."""
-        before, after = (clamp_angles(self.clamps, self._nodal(state))[0] for state in (q, other))
+        before, after = (clamp_angles(self.clamps, self.nodal(state))[0] for state in (q, other))
         return largest_turn(self.inner.turn(q, other), before, after)
 
     def scale(self) -> NDArray:
         """See `Body`; axial springs count as bars do."""
         nodal, springs = np.zeros((self.size - len(self.hidden)) // 3), self.springs
         np.add.at(nodal, springs.axial_ends, (springs.axial_stiffness * springs.length)[:, None])
-        return self.inner.scale() + self._added(np.repeat(nodal, 3))
-
-    def longest(self) -> float:
-        """See `Body`."""
-        return self.inner.longest()
+        return self.inner.scale() + self.added(np.repeat(nodal, 3))
 
     def holds(self, q: NDArray) -> sparse.csr_array:
         """See `Body`: directed springs along their directions, clamps as they turn."""
@@ -189,48 +171,13 @@ class AttachedBody(Body):
         grounded = ends[:, 1:] < 0
         entries = np.concatenate([direction, np.where(grounded, 0.0, -direction)], axis=1)
         springs = unit_rows(np.where(grounded, ends[:, :1], ends), entries, self.size)
-        turns = clamp_angles(self.clamps, self._nodal(q))[1]
+        turns = clamp_angles(self.clamps, self.nodal(q))[1]
         clamps = unit_rows(self.clamps.nodes, turns, self.size)
         return sparse.csr_array(sparse.vstack([self.inner.holds(q), springs, clamps]))
 
     def turning_moments(self) -> float:
         """See `Body`."""
         return self.inner.turning_moments() + float(self.clamps.stiffness.sum())
-
-    def soft_hinges(self, q: NDArray) -> SoftHinges:
-        """See `Body`."""
-        return self.inner.soft_hinges(q)
-
-    def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
-        """See `Body`."""
-        return self.inner.soft_tangent(q, slope)
-
-    # ------------------------------------------------------------------ rest angles
-    @property
-    def rest_angles(self) -> NDArray:
-        """See `Body`."""
-        return self.inner.rest_angles
-
-    def rest_law(self, number: int) -> HingeLaw:
-        """See `Body`."""
-        return self.inner.rest_law(number)
-
-    def fold_hinges(self) -> FoldHinges:
-        """See `Body`."""
-        return self.inner.fold_hinges()
-
-    def folded(self, rest: NDArray) -> AttachedBody:
-        """See `Body`."""
-        return self._with(self.inner.folded(rest))
-
-    def actuated(self, numbers: NDArray) -> tuple[AttachedBody, NDArray, NDArray]:
-        """See `Body`."""
-        inner, rows, place = self.inner.actuated(numbers)
-        return self._with(inner), rows, place
-
-    def turned(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
-        return self.inner.turned()
 
     # ------------------------------------------------------------------ other bodies
     def renumbered(self) -> tuple[AttachedBody, NDArray]:
@@ -245,8 +192,8 @@ class AttachedBody(Body):
 
     def nominal(self, q: NDArray) -> AttachedBody:
         """See `Body`."""
-        angle = clamp_angles(self.clamps, self._nodal(q))[0]
-        return self._with(self.inner.nominal(q), self.clamps._replace(rest=angle))
+        angle = clamp_angles(self.clamps, self.nodal(q))[0]
+        return AttachedBody(self.inner.nominal(q), self.clamps._replace(rest=angle), self.springs)
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `Body`."""
@@ -264,7 +211,7 @@ class AttachedBody(Body):
 
     def _lines(self, q: NDArray) -> NDArray:
         """Unit vectors (s, 3) along all springs; zero for those that pull in all directions."""
-        ends, springs, u = self.springs.axial_ends, self.springs, self._nodal(q)
+        ends, springs, u = self.springs.axial_ends, self.springs, self.nodal(q)
         apart = springs.vector + u[ends[:, 1]] - u[ends[:, 0]]
         apart[springs.stretch == springs.length] = 0.0
         length = np.linalg.norm(apart, axis=1, keepdims=True)
@@ -272,7 +219,7 @@ class AttachedBody(Body):
 
     def _stretch(self, bars: Any, lines: NDArray, motion: NDArray) -> float:
         """As `Unstrained.stretch`: the larger of bars' and springs', along lines (s, 3)."""
-        ends, u, springs = self._ends, self._nodal(motion), self.springs
+        ends, u, springs = self._ends, self.nodal(motion), self.springs
         first, second = u[ends[:, 0]], np.where(ends[:, 1:] < 0, 0.0, u[ends[:, 1]])
         stiffness = np.concatenate([springs.stiffness, springs.axial_stiffness])
         apart, most = first - second, np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1)

@@ -50,6 +50,8 @@ class Unstrained(NamedTuple):
 class FoldHinges(NamedTuple):
     """Hinges of the folds, k of them: a fold may have several in a row, each of them a part of it.
 
+    The bends of a model of hinges are described likewise, each as a fold of one hinge.
+
     The angle by which a hinge folds is its dihedral, less `per_hidden` times its hidden dofs.
     """
 
@@ -58,6 +60,8 @@ class FoldHinges(NamedTuple):
     corners: NDArray  # (k, 4, 3) where they are at rest, m
     hidden: NDArray  # (k, 2) dofs; -1 without them
     per_hidden: float  # rad/m
+    rest: NDArray  # (k,) rad
+    stiffness: NDArray  # (k,) N m/rad
 
     @property
     def length(self) -> NDArray:
@@ -74,7 +78,8 @@ class FoldHinges(NamedTuple):
 def no_fold_hinges() -> FoldHinges:
     """None."""
     nodes, hidden = np.zeros((0, 4), np.int64), np.zeros((0, 2), np.int64)
-    return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0)
+    empty = np.zeros(0)
+    return FoldHinges(nodes[:, 0], nodes, np.zeros((0, 4, 3)), hidden, 0.0, empty, empty)
 
 
 class Blocks(Protocol):
@@ -126,6 +131,8 @@ class Body(ABC):
         Names of the parts of the energy.
     has_discrete_gradient : bool
         Whether the kernels of `dynamics.energy_momentum` take its model.
+    memory : Memory or None
+        State of hinges with memory (`mechanics.inelastic_body`), which changes in place.
     """
 
     model: Any
@@ -134,6 +141,7 @@ class Body(ABC):
     hidden: NDArray = np.zeros(0, np.int64)
     energy_groups: tuple[str, ...]
     has_discrete_gradient: ClassVar[bool] = False
+    memory: Any = None
 
     # ------------------------------------------------------------------ mechanics
     def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
@@ -221,6 +229,10 @@ class Body(ABC):
 
     def fold_hinges(self) -> FoldHinges:
         """Hinges of the folds, of which every fold has one at least."""
+        return no_fold_hinges()
+
+    def bend_hinges(self) -> FoldHinges:
+        """Hinges within panels, for models that bend by hinges."""
         return no_fold_hinges()
 
     def folded(self, rest: NDArray) -> Body:

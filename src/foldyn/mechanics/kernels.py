@@ -16,6 +16,8 @@ from foldyn.mechanics.energy import strain_energies
 from foldyn.mechanics.force import internal_force
 from foldyn.mechanics.model import BarsHinges
 
+CONTACT = "contact"  # field of models with contact
+
 
 class Whole(NamedTuple):
     """The share of a thread that works alone, in place of `Strips`: everything."""
@@ -41,6 +43,71 @@ def folds_of(model: Any) -> Any:
     raise NotImplementedError
 
 
+# ------------------------------------------------------------------ memory
+def elapse(model: Any, time: Any) -> Any:
+    """Tell a model with memory how long (s) after the last accepted step it is evaluated next."""
+    raise NotImplementedError
+
+
+def commit(model: Any) -> Any:
+    """Tell it that the step has been accepted that ends where it was evaluated last."""
+    raise NotImplementedError
+
+
+def lost_of(model: Any) -> Any:
+    """Energy (J) that its laws have dissipated up to where it was evaluated last."""
+    raise NotImplementedError
+
+
+def recall(model: Any, out: Any) -> Any:
+    """Write the state of its branches (b, 2) there to `out`."""
+    raise NotImplementedError
+
+
+# ------------------------------------------------------------------ contact
+# What models without contact have is here, too: nothing. Models with contact have a field of that
+# name; those with memory ask the model within.
+def place_obstacles(model: Any, factor: Any, work: Any) -> Any:
+    """Put moving obstacles where the factors (h, 3) of histories and their derivatives say."""
+    raise NotImplementedError
+
+
+def contact_powers(model: Any, v: Any, work: Any) -> Any:
+    """Power (W) of moving obstacles on nodes with velocities v, and of friction: after a force."""
+    raise NotImplementedError
+
+
+def contact_limit(model: Any, u: Any, v: Any, dt: Any, lightness: Any, work: Any) -> Any:
+    """The longest step (s), at most dt, in which nothing is overrun that touches.
+
+    To be called before each step, after the force where the last one ended.
+
+    lightness : (n,) 1 / mass of the nodes, 1/kg.
+    """
+    raise NotImplementedError
+
+
+@overload(place_obstacles, inline="always")
+def _no_obstacles(model, factor, work):
+    if CONTACT in model.fields or remembers(model):
+        return None
+    return lambda model, factor, work: None
+
+
+@overload(contact_powers, inline="always")
+def _no_powers(model, v, work):
+    if CONTACT in model.fields or remembers(model):
+        return None
+    return lambda model, v, work: (0.0, 0.0)
+
+
+@overload(contact_limit, inline="always")
+def _no_limit(model, u, v, dt, lightness, work):
+    if CONTACT in model.fields or remembers(model):
+        return None
+    return lambda model, u, v, dt, lightness, work: dt
+
+
 @overload(force_of, inline="always")
 def _force(model, u, force, work):
     if model.instance_class is BarsHinges:
@@ -60,3 +127,28 @@ def _folds(model):
     if model.instance_class is BarsHinges:
         return lambda model: (model.hinge_rest, model.hinge_parameters, model.hinge_stiffness)
     return None
+
+
+def remembers(model: Any) -> bool:
+    """Whether a model, given by its type, has laws with memory; those have overloads beside it."""
+    return hasattr(model.instance_class, "hinges_with_memory")
+
+
+@overload(elapse, inline="always")
+def _elapse(model, time):
+    return None if remembers(model) else lambda model, time: None
+
+
+@overload(commit, inline="always")
+def _commit(model):
+    return None if remembers(model) else lambda model: None
+
+
+@overload(lost_of, inline="always")
+def _lost(model):
+    return None if remembers(model) else lambda model: 0.0
+
+
+@overload(recall, inline="always")
+def _recall(model, out):
+    return None if remembers(model) else lambda model, out: None

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.dihedral import dihedral_gradient
 
@@ -62,11 +62,10 @@ def viscous(
     hinge_coefficient : (h,)
         N m s/rad.
     """
-    axes, p, h = np.arange(3), len(pairs), len(hinges)
+    p, h = len(pairs), len(hinges)
     dofs = np.zeros((p + h, WIDTH), np.int64)
-    dofs[:p, :6] = (3 * pairs[:, :, None] + axes).reshape(p, 6)
-    dofs[p:, :12] = (3 * hinges[:, :, None] + axes).reshape(h, 12)
-    dofs[p:, 12:] = np.maximum(hidden, 0)
+    dofs[:p, :6] = (3 * pairs[:, :, None] + np.arange(3)).reshape(p, 6)
+    dofs[p:] = hinge_dofs(hinges, hidden)
     return Viscous(
         dofs=dofs,
         axial=np.array(axial, float).reshape(p, 3),
@@ -75,6 +74,32 @@ def viscous(
         coefficient=np.concatenate([axial_coefficient, hinge_coefficient]).astype(float),
         gradient=np.zeros(WIDTH),
     )
+
+
+def hinge_dofs(hinges: NDArray, hidden: NDArray) -> NDArray:
+    """Dofs (h, 14) of hinges, rows of nodes (h, 4), with two hidden dofs (h, 2) or -1."""
+    dofs = np.zeros((len(hinges), WIDTH), np.int64)
+    dofs[:, :12] = (3 * hinges[:, :, None] + np.arange(3)).reshape(-1, 12)
+    dofs[:, 12:] = np.maximum(hidden, 0)
+    return dofs
+
+
+@scalar
+def hinge_gradient(x, dofs, per_hidden, moved, out):
+    """Angle (rad) of a hinge at flat displacements, and its gradient to `out` (14,).
+
+    x : (4, 3) rest positions of its nodes, m; dofs, per_hidden : see `Viscous`.
+    """
+    found = dihedral_gradient(
+        x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
+        x[1, 0] + moved[dofs[3]], x[1, 1] + moved[dofs[4]], x[1, 2] + moved[dofs[5]],
+        x[2, 0] + moved[dofs[6]], x[2, 1] + moved[dofs[7]], x[2, 2] + moved[dofs[8]],
+        x[3, 0] + moved[dofs[9]], x[3, 1] + moved[dofs[10]], x[3, 2] + moved[dofs[11]],
+    )  # fmt: skip
+    for c in range(12):
+        out[c] = found[1 + c]
+    out[12] = out[13] = -per_hidden
+    return found[0] - per_hidden * (moved[dofs[12]] + moved[dofs[13]])
 
 
 @kernel
@@ -93,16 +118,7 @@ def _gradient(elements, moved, e, out):
             out[3 + c] /= length
             out[c] = -out[3 + c]
         return
-    x = elements.corners[e - p]
-    found = dihedral_gradient(
-        x[0, 0] + moved[dofs[0]], x[0, 1] + moved[dofs[1]], x[0, 2] + moved[dofs[2]],
-        x[1, 0] + moved[dofs[3]], x[1, 1] + moved[dofs[4]], x[1, 2] + moved[dofs[5]],
-        x[2, 0] + moved[dofs[6]], x[2, 1] + moved[dofs[7]], x[2, 2] + moved[dofs[8]],
-        x[3, 0] + moved[dofs[9]], x[3, 1] + moved[dofs[10]], x[3, 2] + moved[dofs[11]],
-    )  # fmt: skip
-    for c in range(12):
-        out[c] = found[1 + c]
-    out[12] = out[13] = -elements.per_hidden[e - p]
+    hinge_gradient(elements.corners[e - p], dofs, elements.per_hidden[e - p], moved, out)
 
 
 @kernel

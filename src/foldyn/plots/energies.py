@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
 from foldyn.mechanics.attached_body import GROUP
+from foldyn.mechanics.contact.body import GROUP as CONTACT
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
 from foldyn.plots.readings import STRAIN, energy_shares, parts_of, stacked
@@ -24,6 +25,7 @@ COLORS: Mapping[str, str] = {
     "strain_bending": style.PURPLE,
     "strain_folds": style.GREEN,
     GROUP: style.SKY,
+    CONTACT: style.BLUE,
 }
 
 

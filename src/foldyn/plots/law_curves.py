@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.materials.memory_law import memory_of
 from foldyn.shells import Shell
 from foldyn.structures import Structure
 from foldyn.structures.discretized import HingeKind
@@ -81,6 +82,8 @@ def _hinges(hinges: HingeKind) -> LawFrame:
     hidden = len(groups) - MOST_CURVES
     note = f"{hidden} other pairs of k and rest not shown" if hidden > 0 else ""
     title = f"{kind}s: {hinges.law.name}"
+    if law := memory_of(hinges.law):
+        title += f" (its elastic part, {law.elastic.name})"
     return LawFrame(title, "dihedral (degrees)", "moment (N m)", curves, 1.08 * reach, note)
 
 

@@ -13,6 +13,7 @@ from foldyn.cases.directions import signed
 from foldyn.errors import InputError
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.mechanics.attached_body import GROUP
+from foldyn.mechanics.contact.body import GROUP as CONTACT
 from foldyn.plots.along import AXES, check_path, evenly, farthest
 from foldyn.results.quantities import RESPONSES
 from foldyn.shells.body import GROUPS as OF_SHELLS
@@ -25,6 +26,7 @@ STRAIN: Mapping[str, str] = {
     "strain_bending": "bending",
     "strain_folds": "folds",
     GROUP: "springs",
+    CONTACT: "contact",
 }
 """Names of strain energies, stacked in this order from the bottom up: folds on top."""
 MOST_MODES = 12
@@ -92,7 +94,7 @@ def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
 def parts_of(result: xr.Dataset) -> tuple[str, ...]:
     """Parts of the strain energy of a result, in the order of its structure."""
     own = OF_SHELLS if set(OF_SHELLS) <= set(result.data_vars) else OF_BARS_AND_HINGES
-    return (*own, *([GROUP] if GROUP in result else []))
+    return (*own, *(group for group in (GROUP, CONTACT) if group in result))
 
 
 def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:

@@ -80,8 +80,8 @@ def crossings_of(case: Case, displacement: NDArray, stride: int = 1) -> Crossing
         those between the first such sample and the one before it.
     """
     structure, count = case.structure, len(displacement)
-    pattern, panels = structure.pattern, structure.triangle_panel
-    if not len(panels) or (pattern is not None and pattern.boards is not None):
+    panels = getattr(structure, "triangle_panel", np.zeros(0, int))  # models of nets have none
+    if not len(panels) or (structure.pattern is not None and structure.pattern.boards is not None):
         return _found({}, 1)
     many = int(panels.max()) + 1
 

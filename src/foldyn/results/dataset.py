@@ -67,6 +67,7 @@ def trajectory_dataset(
     energies: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
     sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
+    memory: ArrayLike | None = None,
 ) -> xr.Dataset:
     """Dataset of a motion, which carries its own case.
 
@@ -87,6 +88,8 @@ def trajectory_dataset(
         stage times t_n and t_n + dt/2 at which functions of time are sampled.
     sampled : mapping of str to (Quantity, array_like of shape (nt, ...)), optional
         What the user has added.
+    memory : array_like, shape (nt, b, 2), optional
+        State of the branches of laws with memory.
 
     Returns
     -------
@@ -102,6 +105,8 @@ def trajectory_dataset(
     added = sampled or {}
     known = {**MOTION, **energies_of(case), **{name: own for name, (own, _) in added.items()}}
     values = {"displacement": displacement, "reaction": reaction, "velocity": velocity, **energies}
+    if memory is not None:
+        values["memory"] = memory
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
     histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads))
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)

@@ -37,7 +37,9 @@ class Quantity(NamedTuple):
 
 
 PLACE = ("node", "axis")
+BRANCH = ("branch", "variable")
 
+MEMORY = Quantity("rad", "state of the branches of laws with memory", BRANCH)
 STATE = {
     "displacement": Quantity("m", "displacement from the rest position", PLACE),
     "reaction": Quantity("N", "force of the support", ("support",)),
@@ -47,6 +49,7 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "kinetic": Quantity("J", "kinetic energy"),
     "dissipated": Quantity("J", "energy dissipated by damping since the start"),
     "work": Quantity("J", "work of the loads since the start"),
+    "memory": MEMORY,
 }
 PATH: Mapping[str, Quantity] = STATE | {
     "work": Quantity("J", "work of loads, supports and actuators since the first point"),
@@ -54,6 +57,8 @@ PATH: Mapping[str, Quantity] = STATE | {
     "point": Quantity(text="kind of the point"),
     "iterations": Quantity(text="Newton iterations"),
     "residual": Quantity(text="residual as a fraction of the forces at play"),
+    "memory": MEMORY,
+    "dissipated": Quantity("J", "energy dissipated by creases since the first point"),
 }
 FOLDING: Mapping[str, Quantity] = {
     "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),

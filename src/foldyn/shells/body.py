@@ -199,7 +199,10 @@ class ShellBody(Body):
         model = self.model
         nodes = model.hinges[model.piece_hinge]
         hidden = self._nodal + model.piece_rotations
-        return FoldHinges(self._crease, nodes, model.rest[nodes], hidden, model.per_reach)
+        return FoldHinges(
+            self._crease, nodes, model.rest[nodes], hidden, model.per_reach, model.piece_rest,
+            model.piece_stiffness,
+        )  # fmt: skip
 
     def folded(self, rest: NDArray) -> ShellBody:
         """See `Body`."""

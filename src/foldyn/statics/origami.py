@@ -12,13 +12,19 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Actuate, Case
+from foldyn.cases.contact import refuse_contact
 from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import InputError
+from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import following_force, following_tangent, joined
+from foldyn.mechanics.inelastic_body import InelasticBody
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
+from foldyn.structures.remembering import Remembering
+from foldyn.structures.remembering import memory as memory_of
 
+REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
 PROBE = 1e-4  # change of the load factor that gives derivatives of what is not linear in it
 
 AdaptiveLoad = Callable[[NDArray, float], NDArray]
@@ -65,6 +71,11 @@ class OrigamiProblem:
         of the tangent.
     inertia_relief : bool
         Balance the loads of a free body by its inertia.
+    flow : {"refused", "followed", "at rest"}
+        What to do with creases that yield or creep: a path of the right kind follows those that
+        yield; at rest nothing has flowed.
+    memory : ndarray of shape (b, 2) or "fresh", optional
+        Their state where it begins; see `cases.State`.
 
     Attributes
     ----------
@@ -85,10 +96,16 @@ class OrigamiProblem:
     def __init__(
         self, case: Case, constant: Sequence[int] = (), rest: NDArray | None = None,
         adaptive_load: AdaptiveLoad | None = None, inertia_relief: bool = False,
+        flow: str = REFUSED, memory: NDArray | str | None = None,
     ) -> None:  # fmt: skip
+        refuse_contact(case.contact, "paths of equilibria do")
+        self._flows = _flows(case, flow)
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
         body = case.body
+        if self._flows and flow == FOLLOWED:
+            body = InelasticBody(body, memory_of(self._flows, body))
+        self._memory = body.memory
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
         self._work, self._ties = body.workspaces(1)[0], case.constraints
         self._shape = structure.nodes.shape
@@ -99,6 +116,8 @@ class OrigamiProblem:
         self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
         at_rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
         self._rest = self._ties.coordinates(at_rest)
+        if self._memory is not None:
+            self._memory.start(at_rest, memory)
         self._constant = self._extended(_total(steady.load_terms, self._shape))
         self._growing = self._extended(_total(growing.load_terms, self._shape))
         self.constant = self._ties.force(self._constant)
@@ -218,6 +237,28 @@ class OrigamiProblem:
         external = self._external(u, factor)
         return max(float(np.linalg.norm(hinges)), float(np.linalg.norm(external)))
 
+    def keep(self, u: NDArray) -> Any:
+        """Accept a state (m,), where creases have yielded; returns what `recall` takes."""
+        if self._memory is None:
+            return None
+        self.actuation.body(0.0).energies(self.dofs(u))
+        self._memory.commit()
+        return self._memory.snapshot()
+
+    def recall(self, kept: Any) -> None:
+        """Go back to an accepted state."""
+        if kept is not None and self._memory is not None:
+            self._memory.recall(kept)
+
+    def memory(self, kept: Any) -> NDArray:
+        """State (b, 2) of all branches of the case there, those that relax relaxed."""
+        state = np.zeros((sum(part.count for part in self.case.remembering), VARIABLES))
+        if kept is not None:
+            flows = [not part.law.relaxes for part in self.case.remembering]
+            own = np.repeat(flows, [part.count for part in self.case.remembering])
+            state[own] = kept[1]
+        return state
+
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
         return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
@@ -232,6 +273,36 @@ class OrigamiProblem:
             return 0.0
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
         return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
+
+
+def _flows(case: Case, flow: str) -> tuple[Remembering, ...]:
+    """Laws with memory whose moments do not relax to those of an elastic law.
+
+    Raises
+    ------
+    InputError
+        There are such, and the solver cannot have them.
+    """
+    parts = tuple(part for part in case.remembering if not part.law.relaxes)
+    for part in parts:
+        name, field = part.law.name, f"{part.kind}_law"
+        if flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
+            continue
+        if part.law.rate_dependent:
+            raise InputError(
+                f" = {name!r}: creep goes on for ever, and the steps of a path say nothing of "
+                "time; simulate the motion, or take an elastic law",
+                field,
+            )
+        raise InputError(
+            f" = {name!r}: yields, so that its equilibria depend on the way there; fd.simulate "
+            'takes it, and paths of the methods "newton" and "displacement"; elsewhere take an '
+            "elastic law",
+            field,
+        )
+    if parts:
+        case.check_flow()
+    return parts
 
 
 def _factors(steady: float, growing: float) -> NDArray:

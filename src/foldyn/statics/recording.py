@@ -188,8 +188,8 @@ def _dataset(
         warnings.warn(message, FoldynWarning, stacklevel=5)
     if message := _asymmetry_warning(points[-1], problem):
         warnings.warn(message, FoldynWarning, stacklevel=5)
-    residuals = [problem.residual(p.u, p.factor) for p in points]
-    energies = np.array([problem.energies(p.u, p.factor) for p in points])
+    recorded = [_recorded(problem, point) for point in points]
+    residuals, energies, reactions = ([r[k] for r in recorded] for k in range(3))
     displacement = np.array([problem.displacement(p.u) for p in points])
     crossings = crossings_of(problem.case, displacement)
     if len(crossings.first):
@@ -201,9 +201,9 @@ def _dataset(
         problem.case,
         [p.factor for p in points],
         displacement,
-        np.reshape([problem.reactions(p.u, p.factor) for p in points], (len(points), -1)),
+        np.reshape(reactions, (len(points), -1)),
         {
-            **dict(zip(problem.groups, energies.T, strict=True)),
+            **dict(zip(problem.groups, np.transpose(energies), strict=True)),
             "work": _work(problem, points, residuals),
         },
         {
@@ -211,6 +211,7 @@ def _dataset(
             "point": [p.kind for p in points],
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
+            **_memory(problem, points),
         },
         {
             **facts,
@@ -225,6 +226,21 @@ def _dataset(
         (own,) if adaptive else (),
     )
     return crossings.recorded(result)
+
+
+def _recorded(problem: OrigamiProblem, point: Point) -> tuple[NDArray, NDArray, NDArray]:
+    """Residual (m,), energies by groups and reactions at a point, what has yielded as it was."""
+    problem.recall(point.memory)
+    at = point.u, point.factor
+    return problem.residual(*at), problem.energies(*at), problem.reactions(*at)
+
+
+def _memory(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
+    """States of the branches of laws with memory, and what they have dissipated, J."""
+    if not problem.case.remembering:
+        return {}
+    lost = [0.0 if point.memory is None else point.memory[2][0] for point in points]
+    return {"memory": [problem.memory(point.memory) for point in points], "dissipated": lost}
 
 
 def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:

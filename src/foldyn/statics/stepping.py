@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,8 @@ class Point:
         Negative eigenvalues of the tangent on the free dofs; -1 if they were not counted.
     kind : str
         "regular", "limit" or "bifurcation".
+    memory
+        Of a problem whose parts yield, what its `recall` takes.
     """
 
     u: NDArray
@@ -65,6 +67,7 @@ class Point:
     residual: float
     negative: int = -1
     kind: str = "regular"
+    memory: Any = None
 
 
 class Station(NamedTuple):
@@ -93,6 +96,15 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
     relative = attempt.balance.relative
     point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
     return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
+
+
+def kept(problem: Problem, station: Station) -> Station:
+    """The station with what has yielded on the way to it; the problem goes on from there."""
+    keep = getattr(problem, "keep", None)  # problems that forget have none
+    memory = keep(station.point.u) if keep else None
+    if memory is None:
+        return station
+    return station._replace(point=replace(station.point, memory=memory))
 
 
 def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
@@ -139,7 +151,7 @@ def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool
                 continue
             if attempt.iterations <= 2 * solver.settings.target:
                 step = max(step, min(2.0 * length, whole))
-            station = arrive(solver, attempt)
+            station = kept(solver.problem, arrive(solver, attempt))
             if between or target == goal:
                 yield station
 
@@ -184,6 +196,11 @@ class Released:
     def reference(self, u: NDArray, factor: float) -> float:
         """Forces at play in the problem."""
         return self.problem.reference(u, self.factor)
+
+    def keep(self, u: NDArray) -> Any:
+        """Accept a state in the problem."""
+        keep = getattr(self.problem, "keep", None)
+        return keep(u) if keep else None
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Turn in the problem."""

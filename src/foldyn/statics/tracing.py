@@ -12,13 +12,21 @@ from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
 from foldyn.cases.ties import check_tied
 from foldyn.errors import InputError
+from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.newton import Settings, Solver
-from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
+from foldyn.statics.origami import (
+    FOLLOWED,
+    REFUSED,
+    AdaptiveLoad,
+    OrigamiProblem,
+    drives,
+    is_actuated,
+)
 from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
 from foldyn.statics.recording import record
-from foldyn.statics.stepping import Point, Walk, settle, walk
+from foldyn.statics.stepping import Point, Walk, kept, settle, walk
 from foldyn.values import choice, indices, show, whole
 
 if TYPE_CHECKING:
@@ -132,7 +140,11 @@ def trace(
     if not isinstance(inertia_relief, bool):
         raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
     check_fill(case.structure.fill, case.body.size)
-    problem = OrigamiProblem(case, steady, displacement, adaptive_load, inertia_relief)
+    problem = OrigamiProblem(
+        case, steady, displacement, adaptive_load, inertia_relief,
+        flow=REFUSED if plan.method.rule is not None else FOLLOWED,
+        memory=_flowed(case, initial),
+    )  # fmt: skip
     _check_start(problem)
     _check_actuation(problem, plan)
     refuse_mechanisms(problem)
@@ -148,13 +160,29 @@ def trace(
     }
 
     def stations() -> Walk:
-        first = settle(solver, problem.start(), 0.0 if initial is None else plan.begin)
+        start = settle(solver, problem.start(), 0.0 if initial is None else plan.begin)
+        first = kept(problem, start)
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
         yield first
         yield from along(solver, first, plan, on_nodes(until, problem))
 
     return record(stations(), progress, solver, problem, facts, adaptive_load is not None)
+
+
+def _flowed(case: Case, initial: State | None) -> NDArray | str | None:
+    """State in which creases that yield begin, of that of all branches (b, 2)."""
+    given = None if initial is None else initial.memory
+    if given is None or isinstance(given, str):
+        return given
+    state, parts = np.array(given, float), case.remembering
+    count = sum(part.count for part in parts)
+    if state.shape != (count, VARIABLES):
+        raise InputError(
+            f"initial: memory of shape {state.shape}: the case has {(count, VARIABLES)}, branches "
+            "and variables; take the state of a result of the same case"
+        )
+    return state[np.repeat([not part.law.relaxes for part in parts], [p.count for p in parts])]
 
 
 def on_nodes(

@@ -167,9 +167,19 @@ class BarsHingesBody(Body):
 
     def fold_hinges(self) -> FoldHinges:
         """See `Body`: one of each."""
-        nodes = self.model.hinges[self._turning[: self._laws[0][1]]].astype(np.int64)
-        none = np.full((len(nodes), 2), -1)
-        return FoldHinges(np.arange(len(nodes)), nodes, self.model.rest[nodes], none, 0.0)
+        return self._hinges_at(self._turning[: self._laws[0][1]])
+
+    def bend_hinges(self) -> FoldHinges:
+        """See `Body`."""
+        return self._hinges_at(self._turning[self._laws[0][1] :])
+
+    def _hinges_at(self, rows: NDArray) -> FoldHinges:
+        model = self.model
+        nodes, none = model.hinges[rows].astype(np.int64), np.full((len(rows), 2), -1)
+        return FoldHinges(
+            np.arange(len(rows)), nodes, model.rest[nodes], none, 0.0, model.hinge_rest[rows],
+            model.hinge_stiffness[rows],
+        )  # fmt: skip
 
     def folded(self, rest: NDArray) -> BarsHingesBody:
         """See `Body`."""

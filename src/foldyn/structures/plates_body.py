@@ -183,7 +183,10 @@ class BarsPlatesBody(Body):
             self.model.fold_rotations >= 0, self._nodal + self.model.fold_rotations, -1
         )
         corners = self.model.bars.rest[nodes]
-        return FoldHinges(np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach)
+        return FoldHinges(
+            np.arange(len(nodes)), nodes, corners, hidden, self.model.per_reach,
+            self.model.fold_rest, self.model.fold_stiffness,
+        )  # fmt: skip
 
     def folded(self, rest: NDArray) -> BarsPlatesBody:
         """See `Body`."""

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from foldyn.cases import Case
 from foldyn.cases.loaded import SomeLoads
+from foldyn.dynamics.touch import CONTACT_FORCE
 from foldyn.mechanics import angles
 from foldyn.structures import Structure
 from foldyn.structures.mesh import double_areas
@@ -32,9 +33,13 @@ class Field(NamedTuple):
 def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     """Fields of a motion or path with displacements (samples, n, 3), by name; shells have none.
 
+    Moments and energies are left out where laws have memory: their angles do not tell them.
     Speeds are not among them: the page takes them from displacements.
     """
     structure, out = case.structure, {}
+    if CONTACT_FORCE in result:
+        touch = result[CONTACT_FORCE].values
+        out["contact"] = Field("force of contact", "N", "node", touch, False)
     if not isinstance(structure, Structure):
         return out
     strain = bar_strain(structure, displacement)
@@ -42,7 +47,9 @@ def fields(case: Case, result: Any, displacement: NDArray) -> dict[str, Field]:
     folds = hinge_angles(structure, structure.folds, displacement)
     turn = np.degrees(folds - structure.fold_rest)
     out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
-    if structure.edge_plates is None:  # whose folds turn less than the panels beside them
+    if (
+        structure.edge_plates is None and not case.remembering
+    ):  # whose folds turn less than the panels beside them
         angles = np.hstack([folds, hinge_angles(structure, structure.bends, displacement)])
         rest = rest_angles(case, result, len(displacement))
         own = slice(len(structure.folds))

@@ -103,6 +103,8 @@ class Implicit:
         if self._packed.system.varies and not plan.steps:
             self._horizon = self._impulse_lasts()
         self._newton.prepare(plan.dt, plan.start)
+        if self._packed.body.memory is not None:
+            self._packed.body.memory.still()
         return self._sample(plan.start, out)
 
     def _impulse_lasts(self) -> float:
@@ -237,6 +239,8 @@ class Implicit:
         course.tally.dissipated += lost
         course.angle[:] = scheme.work.angle
         scheme.accept(h)
+        if self._packed.body.memory is not None:
+            self._packed.body.memory.commit()
         if jump is not None:
             scheme.begin(max(end, jump))
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
 from foldyn.analyses.reading import case_of_document, read_document, validated
+from foldyn.cases import Case
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
@@ -229,12 +230,25 @@ def _result(case_file: CaseFile, members: Sequence[Measurement]) -> Any:
         if case_file.analysis.kind == "dynamics":
             return case_file.computation(**_steady(case_file)).result()
         case, given = case_file.case(), case_file.analysis.arguments
-        factors = np.unique(np.concatenate([one.factors(case) for one in members]))
-        path = [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
+        path = _path(case, members)
         settings = replace(given["settings"], stability=False)
         return case_file.computation(
             method="newton", load_factors=path, first_step=None, until=None, settings=settings
         ).result()
+
+
+def _path(case: Case, members: Sequence[Measurement]) -> list[float]:
+    """Load factors at which a case is measured; in the order of a test in which creases yield."""
+    given = [one.factors(case) for one in members]
+    if all(part.law.relaxes for part in case.remembering):
+        factors = np.unique(np.concatenate(given))
+        return [*factors[factors < 0.0][::-1], *factors[factors >= 0.0]]
+    if any(not np.array_equal(one, given[0]) for one in given[1:]):
+        raise InputError(
+            "data: creases that yield depend on the way, and these measurements have different "
+            "ones: give what was measured along one path, or fit them apart"
+        )
+    return given[0][np.append(True, np.diff(given[0]) != 0.0)].tolist()
 
 
 def _steady(case_file: CaseFile) -> dict[str, Any]:

@@ -35,7 +35,7 @@ class ForceDisplacement(Measurement):
     nodes : sequence of int, or str
         As of every measurement; "imposed", the default, for all that supports move along the axis.
     displacement : array_like, shape (n,)
-        Mean displacement of the nodes along the axis (m).
+        Mean displacement of the nodes along the axis (m); creases that yield follow their order.
     force : array_like, shape (n,)
         Force on all of them together along the axis (N), positive along the axis.
     axis : {"x", "y", "z"}
@@ -162,8 +162,11 @@ class Shapes(NodeValues):
 
 
 def _steps(result: Any, factors: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Steps of a path at load factors that it has been asked for."""
-    return np.abs(result["load_factor"].values[None] - factors[:, None]).argmin(axis=1)
+    """Steps of a path at load factors that it has been asked for: in order, or at the nearest."""
+    place, found = np.cumsum(np.append(0, np.diff(factors) != 0.0)), result["load_factor"].values
+    if len(found) > place[-1] and np.array_equal(found[place], factors):
+        return place  # also of a path that passes some of them several times
+    return np.abs(found[None] - factors[:, None]).argmin(axis=1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -23,6 +23,7 @@ from foldyn.errors import ComputationError, InputError, optional
 from foldyn.exports import opensees
 from foldyn.exports.creased_shell import CreasedShell, Joint, shares
 from foldyn.exports.opensees import TIE, TOLERANCE
+from foldyn.materials import MemoryLaw
 from foldyn.patterns import Pattern
 
 ALIKE = 1e-9  # relative difference below which diagonals are equal
@@ -208,7 +209,7 @@ class PanelShells:
         """Least and largest change of each dihedral (nc, 2), rad, up to which folds are linear."""
         structure = self.case.structure
         law, rest = structure.fold_law, structure.pattern.dihedrals
-        if law.linear_between is not None:
+        if law.linear_between is not None and not isinstance(law, MemoryLaw):
             found = np.array(law.linear_between) - rest[:, None]
             if (found[:, 0] < 0.0).all() and (found[:, 1] > 0.0).all():
                 return found

@@ -1,0 +1,206 @@
+"""Contact: panels that touch each other, and planes that they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases.decode import Part, check_keys
+from foldyn.cases.history import History, as_history
+from foldyn.errors import InputError, within
+from foldyn.mechanics.contact.potential import STIFFNESS
+from foldyn.mechanics.contact.tables import (
+    FRICTION,
+    HISTORY,
+    MOTION,
+    NORMAL,
+    PLANE_COLUMNS,
+    POINT,
+    Sheets,
+)
+from foldyn.values import brief, length, number, show, vector
+
+
+@brief
+@dataclass(frozen=True)
+class Plane(Part):
+    """A plane that the sheet cannot pass: the ground, the plate of a press; fixed or moving.
+
+    It meets the nodes of the sheet, at half the sheet's thickness from their middle surface; nodes
+    that are held along all three axes are left alone.
+
+    Parameters
+    ----------
+    point : sequence of float, shape (3,)
+        A point of the plane (m).
+    normal : sequence of float, shape (3,)
+        Normal of any length, on the side on which the sheet is.
+    friction : float, optional
+        Coefficient of Coulomb friction; that of the `Contact` by default.
+    motion : sequence of float, shape (3,), optional
+        Displacement (m) of the plane at factor 1 of the history; it stands still by default.
+    history : History or callable, optional
+        Factor of time of the motion.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.Plane(point=(0, 0, -0.001), normal=(0, 0, 1), friction=0.3)
+    Plane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), friction=0.3)
+    """
+
+    point: Sequence[float]
+    normal: Sequence[float]
+    friction: float | None = None
+    motion: Sequence[float] | None = None
+    history: History | Callable[[Any], Any] | None = None
+
+    keys = {"point": "point", "normal": "normal", "friction": "friction", "motion": "motion"}
+    missing = {
+        "point": "give a point (m) of the plane",
+        "normal": "give its normal, on the side of the sheet",
+    }
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        object.__setattr__(self, "point", vector("point", self.point))
+        object.__setattr__(self, "normal", vector("normal", self.normal, nonzero=True))
+        if self.friction is not None:
+            object.__setattr__(self, "friction", number("friction", self.friction, least=0.0))
+        if self.motion is not None:
+            object.__setattr__(self, "motion", vector("motion", self.motion))
+        if (self.motion is None) != (self.history is None):
+            raise InputError(
+                ": a moving plane needs both its motion (m), at factor 1, and a history", "motion"
+            )
+        if self.history is not None:
+            object.__setattr__(self, "history", as_history(self.history))
+
+
+@brief
+@dataclass(frozen=True)
+class Contact(Part):
+    """Panels that touch each other where they come nearer than the sheet's thickness, and planes.
+
+    Parameters
+    ----------
+    thickness : float, optional
+        Distance (m) of middle surfaces below which panels repel each other; the sheet's thickness
+        by default, that of each panel where they differ.
+    friction : float, default 0
+        Coefficient of Coulomb friction on planes that have none of their own. Panels slide on each
+        other without friction.
+    stiffness : float, optional
+        k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4; 0.03 times Young's modulus times
+        the thickness by default.
+    panels : bool, default True
+        Whether panels touch each other; else planes alone act.
+    planes : sequence of Plane
+        Planes that the sheet meets; none by default.
+
+    Examples
+    --------
+    >>> import foldyn as fd
+    >>> fd.Contact(friction=0.3)
+    Contact(friction=0.3, panels=True, planes=())
+    """
+
+    thickness: float | None = None
+    friction: float = 0.0
+    stiffness: float | None = None
+    panels: bool = True
+    planes: Sequence[Plane] = ()
+
+    keys = {
+        "thickness": "thickness",
+        "friction": "friction",
+        "stiffness": "stiffness",
+        "panels": "panels",
+    }
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.thickness is not None:
+            object.__setattr__(self, "thickness", length("thickness", self.thickness))
+        object.__setattr__(self, "friction", number("friction", self.friction, least=0.0))
+        if self.stiffness is not None:
+            given = number("stiffness", self.stiffness, above=0.0, unit="N/m")
+            object.__setattr__(self, "stiffness", given)
+        if not isinstance(self.panels, bool):
+            raise InputError(f" = {show(self.panels)}: give True or False", "panels")
+        if isinstance(self.planes, str) or not isinstance(self.planes, Sequence):
+            raise InputError(f" = {show(self.planes)}: must be a list of Plane", "planes")
+        for i, plane in enumerate(self.planes):
+            if not isinstance(plane, Plane):
+                raise InputError(f" = {show(plane)}: must be a Plane", f"planes[{i}]")
+        object.__setattr__(self, "planes", tuple(self.planes))
+        if not self.panels and not self.planes:
+            raise InputError(": without planes nothing touches; give planes, or True", "panels")
+
+    def sheets(self, structure: Any, held: NDArray[np.bool_]) -> Sheets:
+        """What may touch of a structure whose nodes are held along all axes, or not (n,)."""
+        panel = np.asarray(structure.triangle_panel)
+        count, sheet = int(panel.max(initial=-1)) + 1, structure.sheet
+        own = sheet.values("thickness", count)
+        moduli = sheet.values("youngs_modulus", count)
+        stiffness = self.stiffness
+        if stiffness is None:
+            stiffness = STIFFNESS * float((moduli * own).min())
+        origin = structure.nodes.mean(axis=0)  # far from the origin digits are lost
+        return Sheets(
+            nodes=structure.nodes - origin,
+            triangles=np.asarray(structure.triangles),
+            panel=panel,
+            thickness=own if self.thickness is None else np.full(count, self.thickness),
+            stiffness=stiffness,
+            panels=self.panels,
+            planes=self._table(origin),
+            held=held,
+        )
+
+    def _table(self, origin: NDArray[np.float64]) -> NDArray[np.float64]:
+        table = np.zeros((len(self.planes), PLANE_COLUMNS))
+        for row, plane in zip(table, self.planes, strict=True):
+            row[POINT : POINT + 3] = np.array(plane.point) - origin
+            row[NORMAL : NORMAL + 3] = np.array(plane.normal) / np.linalg.norm(plane.normal)
+            row[FRICTION] = self.friction if plane.friction is None else plane.friction
+            row[MOTION : MOTION + 3] = plane.motion or 0.0
+            row[HISTORY] = -1
+        return table
+
+
+def contact_from(table: Any, folder: Path | None = None) -> Contact:
+    """Contact from its table in a case file; see `Part.of`."""
+    if not isinstance(table, Mapping):
+        raise InputError(f" = {show(table)}: must be a table, written [contact]")
+    check_keys(table, [*Contact.keys, "planes"])
+    given = table.get("planes", [])
+    if not isinstance(given, list):
+        raise InputError(f" = {show(given)}: must be tables, written [[contact.planes]]", ".planes")
+    planes = []
+    for i, plane in enumerate(given):
+        with within(f".planes[{i}]"):
+            if not isinstance(plane, Mapping):
+                raise InputError(f" = {show(plane)}: must be a table")
+            check_keys(plane, [*Plane.keys, "history"])
+            planes.append(Plane.of(plane, folder))
+    values = {key: value for key, value in table.items() if key != "planes"}
+    try:
+        return Contact(**values, planes=planes)
+    except InputError as error:
+        raise InputError(error.reason, f".{error.field}") from None
+
+
+def refuse_contact(contact: Contact | None, what: str) -> None:
+    """Refuse contact for what does not take it."""
+    if contact is not None:
+        raise InputError(
+            f": {what} not take contact yet, only motions with explicit integrators (rk4, "
+            "central_difference, dormand_prince); leave it out",
+            "contact",
+        )

@@ -1,0 +1,75 @@
+"""Laws with memory in a motion: the body that has them, its state, and what resists at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.cases import Case
+from foldyn.dynamics.dampers import placed
+from foldyn.errors import InputError
+from foldyn.materials.memory_law import VARIABLES
+from foldyn.mechanics.body import Body, Numbering
+from foldyn.mechanics.inelastic_body import InelasticBody, Memory
+from foldyn.structures.remembering import memory
+from foldyn.values import show
+
+
+def with_memory(case: Case, body: Body, by: Numbering) -> Body:
+    """The body of a motion, as it stands in memory, with the branches of its laws if it has any.
+
+    Raises
+    ------
+    InputError
+        A crease that yields or creeps is actuated.
+    """
+    parts = case.remembering
+    if not parts:
+        return body
+    case.check_flow()
+    state = memory_of_case(case)
+    own = state.own._replace(dofs=placed(state.own.dofs, by))
+    return InelasticBody(body, Memory(own, state.settles))
+
+
+def memory_of_case(case: Case) -> Memory:
+    """State of the branches of a case, which begins at rest; dofs in the order of the structure."""
+    return memory(case.remembering, case.body)
+
+
+def check_state(case: Case, given: Any) -> NDArray | str | None:
+    """State (b, 2) of the branches with which a motion starts, "fresh", or None for the default.
+
+    Raises
+    ------
+    InputError
+        Another shape than the case's.
+    """
+    if given is None or isinstance(given, str):
+        return given
+    array = np.array(given, float)
+    count = sum(part.count for part in case.remembering)
+    if array.shape != (count, VARIABLES):
+        raise InputError(
+            f"initial: memory of shape {show(array.shape)}: the case has {(count, VARIABLES)}, "
+            "branches and variables; take the state of a result of the same case"
+        )
+    return array
+
+
+def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
+    """What branches add to the tangent (m, m) at u (n, 3) for turns in no time; None without."""
+    parts = case.remembering
+    if not parts:
+        return None
+    body = case.body
+    q = body.dofs(u)
+    gradient = memory_of_case(case).gradients(q, body.size)
+    added = [
+        part.hinges.stiffness * sum(branch.relaxed + branch.share for branch in part.branches)
+        for part in parts
+    ]
+    return sparse.csr_array(gradient.T @ sparse.diags_array(np.concatenate(added)) @ gradient)

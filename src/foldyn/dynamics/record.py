@@ -1,0 +1,51 @@
+"""One sample of a motion: what is kept of a state of the equation of motion."""
+
+from __future__ import annotations
+
+from foldyn.dynamics.damping import drag
+from foldyn.dynamics.inertia import kinetic_energy, moving_energy, times_mass
+from foldyn.dynamics.system import carry
+from foldyn.dynamics.ties import add_reactions
+from foldyn.jit.compiled import inner
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.kernels import energies_of, lost_of
+
+
+@inner
+def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity, reaction, energy):
+    """Write one sample after `acceleration`.
+
+    The reaction is what the supports exert: M (a + alpha v) + F_int + beta K0 v - p there. energy
+    gets the strain energies, the kinetic energy, what was dissipated and the work.
+    """
+    carry(system.moved, s.factor, 0, q, s.displacement)
+    carry(system.moved, s.factor, 1, w, s.velocity)
+    carry(system.moved, s.factor, 2, a, s.moving)
+    for i in range(system.order.size):
+        for c in range(3):
+            displacement[system.order[i], c] = s.displacement[i, c]
+            velocity[system.order[i], c] = s.velocity[i, c]
+    product, force = flat(s.product), flat(s.force)
+    times_mass(mass, s.moving, s.product)
+    tied = system.ties.slave.size > 0
+    if tied:
+        reaction[:] = 0.0
+        add_reactions(system.ties.reactions, product, 1.0, reaction)
+        add_reactions(system.ties.reactions, force, 1.0, reaction)
+    else:
+        for k in range(system.supported.size):
+            reaction[k] = product[system.supported[k]] + force[system.supported[k]]
+    groups = s.energy.size
+    energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
+    times_mass(mass, s.velocity, s.product)
+    if tied:
+        add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)
+    else:
+        for k in range(system.supported.size):
+            reaction[k] += drag(system.damping, product[system.supported[k]])
+    energies_of(model, s.displacement, work, s.energy)
+    for k in range(groups):
+        energy[k] = s.energy[k]
+    energy[groups + 1] = tally.dissipated + lost_of(model)
+    # what brought the moving supports to their speed belongs to the work: it may come in jolts
+    energy[groups + 2] = tally.work + moving_energy(system.moved_mass, s.factor)

@@ -1,0 +1,164 @@
+"""Laws with memory in small vibrations: a stiffness that depends on the frequency, and is complex.
+
+About a state at rest a hinge resists a turn exp(s t) with k (relaxed + sum share s / (s + rate))
+beside its elastic part: with s = i w the complex modulus of its branches. Modes solve
+
+    (s^2 M + K + K_b(s)) x = 0
+
+for each s near that of a mode of K and M: the frequency is |s| / 2 pi, the damping ratio -Re s/|s|.
+Iterations are Rayleigh quotients, which for symmetric matrices converge to the third order (H. Voss
+in Handbook of Linear Algebra, 2nd ed. 2014, chapter 115).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.superlu import SingularTangentError, factorize
+from foldyn.cases import Case
+from foldyn.dynamics.hereditary import memory_of_case
+from foldyn.errors import ComputationError
+
+MOST = 40  # iterations for a mode
+SETTLED = 1e-11  # relative change of s
+OSCILLATES = 1e-6  # least imaginary part of s, over s
+BESIDE = 1e-7  # of s: how far beside a solution a singular matrix is factorized instead
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Branches of h hinges on nf free dofs.
+
+    Attributes
+    ----------
+    gradient : (h, nf)
+        Of the hinges' angles, 1/m.
+    relaxed : (h,)
+        Stiffness without memory that they add to K, N m/rad.
+    share, rate : (h, b)
+        Stiffness (N m/rad) and rate (1/s) of each branch; of none 0 and 1.
+    """
+
+    gradient: sparse.csr_array
+    relaxed: NDArray
+    share: NDArray
+    rate: NDArray
+
+    def weights(self, s: complex) -> NDArray:
+        """Complex stiffness (h,), N m/rad, at a complex angular frequency, rad/s."""
+        return self.relaxed + (self.share * (s / (s + self.rate))).sum(axis=1)
+
+    def slopes(self, s: complex) -> NDArray:
+        """Their derivative with respect to s."""
+        return (self.share * (self.rate / (s + self.rate) ** 2)).sum(axis=1)
+
+    def stiffness(self, s: complex) -> sparse.csc_array:
+        """Their stiffness (nf, nf), N/m."""
+        return self._matrix(self.weights(s))
+
+    def _matrix(self, weights: NDArray) -> sparse.csc_array:
+        return sparse.csc_array(self.gradient.T @ sparse.diags_array(weights) @ self.gradient)
+
+    def between(self, shapes: NDArray, s: complex) -> NDArray:
+        """Their stiffness between shapes (nf, k), as a matrix (k, k)."""
+        turns = self.gradient @ shapes
+        return turns.T @ (self.weights(s)[:, None] * turns)
+
+
+def branches_of(case: Case, q: NDArray, free: NDArray, size: int) -> Branches | None:
+    """Branches of a case about the dofs q (m,), on the free ones of so many unknowns."""
+    parts = case.remembering
+    if not parts:
+        return None
+    gradient = memory_of_case(case).gradients(q, case.body.size)
+    gradient = sparse.csr_array((gradient.data, gradient.indices, gradient.indptr))
+    gradient.resize((gradient.shape[0], size))
+    if ties := case.constraints:
+        gradient = sparse.csr_array(gradient @ ties.extended(size))
+    most = max(len(part.branches) for part in parts)
+    relaxed, share, rate = [], [], []
+    for part in parts:
+        stiffness, branches = part.hinges.stiffness, part.branches
+        relaxed.append(stiffness * sum(branch.relaxed for branch in branches))
+        missing = most - len(branches)
+        rows = [branch.share * stiffness for branch in branches]
+        share.append(np.stack([*rows, *[0.0 * stiffness] * missing], axis=1))
+        rows = [branch.rate for branch in branches]
+        rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
+    return Branches(
+        sparse.csr_array(gradient[:, free]), np.concatenate(relaxed), np.concatenate(share),
+        np.concatenate(rate),
+    )  # fmt: skip
+
+
+def damped_mode(
+    stiffness: sparse.csc_array, mass: sparse.csc_array, branches: Branches, value: float,
+    shape: NDArray,
+) -> tuple[complex, NDArray[np.complex128]]:  # fmt: skip
+    """Angular frequency s (rad/s) and shape (nf,), x' M x = 1, of the mode near one without memory.
+
+    value, shape : its eigenvalue (rad2/s2), above 0, and shape.
+
+    Raises
+    ------
+    ComputationError
+        The iteration does not converge, or to a motion that creeps back without swinging.
+    """
+    x = shape.astype(complex)
+    s = _quotient(stiffness, mass, branches, 1j * _swinging(branches, value, shape), x)
+    for _ in range(MOST):
+        x = _next(stiffness, mass, branches, s, x)
+        before, s = s, _quotient(stiffness, mass, branches, s, x)
+        if abs(s - before) <= SETTLED * abs(s):
+            if s.imag > OSCILLATES * abs(s):
+                return s, x
+            break
+    raise ComputationError(
+        f"the mode near {np.sqrt(value) / (2.0 * np.pi):.6g} Hz is not found with the memory of "
+        "its creases: they damp it too much to be one"
+    )
+
+
+def _swinging(branches: Branches, value: float, shape: NDArray) -> float:
+    """Angular frequency (rad/s) at which a shape swings by the storage modulus there.
+
+    That of its own frequency without memory may be so far below that damping is all there is.
+    """
+    turns, omega = (branches.gradient @ shape) ** 2, float(np.sqrt(value))
+    for _ in range(MOST):
+        square = value + float(np.real(branches.weights(1j * omega)) @ turns)
+        omega = float(np.sqrt(max(square, 0.0))) or omega
+    return omega
+
+
+def _quotient(
+    stiffness: sparse.csc_array, mass: sparse.csc_array, branches: Branches, s: complex, x: NDArray
+) -> complex:
+    """Solution near s of x' (s^2 M + K + K_b(s)) x = 0, by Newton's method."""
+    k, m, turns = x @ (stiffness @ x), x @ (mass @ x), branches.gradient @ x
+    for _ in range(MOST):
+        value = s * s * m + k + (branches.weights(s) * turns * turns).sum()
+        slope = 2.0 * s * m + (branches.slopes(s) * turns * turns).sum()
+        step = value / slope
+        s = s - step
+        if abs(step) <= 0.1 * SETTLED * abs(s):
+            break
+    return complex(s)
+
+
+def _next(
+    stiffness: sparse.csc_array, mass: sparse.csc_array, branches: Branches, s: complex, x: NDArray
+) -> NDArray:
+    """Shape after an inverse iteration at s."""
+    for at in (s, s * (1.0 + BESIDE)):
+        matrix = sparse.csc_array(stiffness + branches.stiffness(at) + at * at * mass)
+        try:
+            x = factorize(matrix, symmetric=False).solve(mass @ x)
+            break
+        except SingularTangentError:
+            continue
+    return x / np.sqrt(x @ (mass @ x))

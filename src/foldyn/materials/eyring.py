@@ -1,0 +1,105 @@
+"""Creep of creases after Eyring, whose relaxation at a fixed angle is logarithmic.
+
+With c the part of the turn d that has crept, and jumps forward and back over a barrier that the
+moment tilts (H. Eyring, J. Chem. Phys. 4, 1936),
+
+    M = k (d - c),    dc/dt = r (exp(M / M0) - exp(-M / M0)),
+
+M0 per length of the crease. At a fixed angle tanh(M / 2 M0) falls as exp(-2 k r t / M0), and as
+long as M is well above M0 this is M(t) = M(0) - M0 ln(1 + t/t0), t0 = M0 / (k r) exp(-M(0)/M0): the
+logarithmic relaxation of folded sheets (B. Thiria and M. Adda-Bedia, Phys. Rev. Lett. 107, 2011; T.
+Jules, F. Lechenault and M. Adda-Bedia, Phys. Rev. Research 2, 2020). The elastic law has what is
+beyond: M = k (m(d) - c).
+
+Over a step in which d changes by D at a constant rate, w = exp(-M/M0) satisfies the Riccati
+equation w' = (r k/M0) (1 - w^2) - (k D/M0 dt) w, whose solution is that of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import scalar
+from foldyn.materials.law import HingeLaw
+from foldyn.materials.memory_law import Branch, MemoryLaw, columns
+from foldyn.values import number
+
+CODE = 2
+LARGEST = 700.0  # exponent
+
+
+@scalar
+def update(before, after, dt, spring, barrier, rate):
+    """Elastic turn, 0, moment, slope, energy and loss per k, after a turn in a time dt.
+
+    barrier : M0 / k, rad; rate : r, rad/s.
+    """
+    turn = after - before
+    now, slope = _relaxed(turn, dt, spring, barrier, rate)
+    lost = 0.5 * (spring + now) * (turn - (now - spring))
+    # the elastic law has the turn as a whole
+    return now, 0.0, now - after, slope - 1.0, 0.5 * (now * now - after * after), lost
+
+
+@scalar
+def _relaxed(turn, dt, spring, barrier, rate):
+    """Elastic turn after a step, and its derivative with respect to the turn in it."""
+    sign = -1.0 if turn < 0.0 else 1.0
+    p, t = abs(turn) / barrier, rate * dt / barrier
+    if t == 0.0:
+        return spring + turn, 1.0
+    w = math.exp(min(-sign * spring / barrier, LARGEST))
+    root = math.sqrt(p * p + 4.0 * t * t)
+    tanh, rest = math.tanh(0.5 * root), 2.0 / (1.0 + math.exp(min(root, LARGEST)))
+    gap = 4.0 * t * t / (root + p)  # root - p
+    above = w * (gap + p * rest) + 2.0 * t * tanh
+    below = root + p * tanh + 2.0 * w * t * tanh
+    if not above > 0.0:  # no flow that numbers could hold
+        return spring + turn, 1.0
+    dtanh = 0.5 * (1.0 - tanh * tanh) * p / root
+    dabove = w * (rest - gap / root - p * dtanh) + 2.0 * t * dtanh
+    dbelow = p / root + tanh + (p + 2.0 * w * t) * dtanh
+    slope = dbelow / below - dabove / above
+    return -sign * barrier * math.log(above / below), slope
+
+
+@dataclass(frozen=True)
+class Eyring(MemoryLaw):
+    """Creeping law of creases.
+
+    Parameters
+    ----------
+    barrier_moment : float
+        Moment M0 per length of the crease (N m per m), above 0: that at which the rate of creep is
+        e times as large.
+    rate : float
+        Rate r (rad/s), above 0.
+    law : str or HingeLaw
+        The elastic law.
+
+    Examples
+    --------
+    >>> Eyring(barrier_moment=0.001, rate=1e-9).rate
+    1e-09
+    """
+
+    barrier_moment: float
+    rate: float
+    law: str | HingeLaw = "enhanced"
+    name: str = "eyring"
+
+    rate_dependent = True
+
+    def __post_init__(self) -> None:
+        number("Eyring: barrier_moment", self.barrier_moment, above=0.0)
+        number("Eyring: rate", self.rate, above=0.0, unit="rad/s")
+        _ = self.elastic
+
+    def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
+        """See `MemoryLaw`; small moments flow as a dashpot lets them."""
+        barrier = self.barrier_moment * length / stiffness
+        table = columns(len(barrier), barrier, self.rate)
+        return (Branch(CODE, table, -1.0, 1.0, 2.0 * self.rate / barrier),)

@@ -1,0 +1,113 @@
+"""Laws with memory: a hinge law, and branches beside it whose moment depends on the past.
+
+A hinge turned by d = theta - theta0 from its rest angle has the moment M = k (m(d) + sum of b),
+m the elastic law that the law with memory is given, and b a branch per unit stiffness k: a function
+of d, of the state of the branch at the last accepted step, of d there, and of the time since then.
+Kernels call all branches through one switch (`branch_switch`); the elastic part has the code of its
+own law, so that all that does not know of branches takes it as that law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foldyn.errors import InputError
+from foldyn.materials.law import PARAMETERS, HingeLaw
+
+VARIABLES = 2  # of the state of a branch
+
+
+class Branch(NamedTuple):
+    """A branch of n hinges, per unit stiffness.
+
+    Small vibrations of complex angular frequency s about a state at rest see the stiffness
+    relaxed + share s / (s + rate).
+    """
+
+    code: int  # of the switch
+    parameters: NDArray  # (n, 4)
+    relaxed: float
+    share: float
+    rate: NDArray  # (n,) 1/s
+
+
+class MemoryLaw(HingeLaw):
+    """A hinge law with branches: the base of data classes with a field `law`, its elastic part."""
+
+    law: str | HingeLaw
+    lookup: ClassVar[Callable[..., HingeLaw]]
+    """`materials.hinge_law`; the registry, which knows these laws too, gives it to them."""
+    rate_dependent: ClassVar[bool]
+    """Whether its moment depends on time, not on the path alone."""
+    relaxes: ClassVar[bool] = False
+    """Whether its moment, the angle held, comes to that of the elastic part."""
+
+    @cached_property
+    def elastic(self) -> HingeLaw:
+        """Its elastic part."""
+        law = self.lookup(self.law, f"{self.name}: law")
+        if isinstance(law, MemoryLaw):
+            raise InputError(f"{self.name}: law = {law.name!r}: has a memory itself; give another")
+        return law
+
+    def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
+        """Its branches for hinges with stiffnesses (n,), N m/rad, and lengths (n,), m."""
+        raise NotImplementedError
+
+    @property
+    def code(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of the elastic part."""
+        return self.elastic.code
+
+    @property
+    def addresses(self) -> tuple[int, int, int] | None:
+        """Those of the elastic part."""
+        return self.elastic.addresses
+
+    @property
+    def linear_between(self) -> tuple[float, float] | None:  # pyright: ignore
+        """That of the elastic part."""
+        return self.elastic.linear_between
+
+    @property
+    def follows_rest(self) -> bool:  # pyright: ignore
+        """That of the elastic part."""
+        return self.elastic.follows_rest
+
+    @property
+    def closed_at_rest(self) -> bool:  # pyright: ignore
+        """That of the elastic part."""
+        return self.elastic.closed_at_rest
+
+    def parameters(self, rest: NDArray) -> NDArray:
+        """Those of the elastic part."""
+        return self.elastic.parameters(rest)
+
+    def check(self, field: str) -> None:
+        """Refuse an elastic part that the law cannot stand beside."""
+        self.elastic.check("fold_law")
+        stiff = self.elastic.slope(np.pi, np.pi)
+        if not stiff > 0.0:
+            raise InputError(
+                f": {self.name} takes shares of the stiffness at rest, and {self.elastic.name!r} "
+                'has none there; give law = "linear" or "enhanced"',
+                field,
+            )
+
+
+def columns(rows: int, *values: ArrayLike) -> NDArray:
+    """Parameters (n, 4) of a branch, the last ones zero."""
+    table = np.zeros((rows, PARAMETERS))
+    for column, value in enumerate(values):
+        table[:, column] = value
+    return table
+
+
+def memory_of(law: Any) -> MemoryLaw | None:
+    """The law, if it has a memory."""
+    return law if isinstance(law, MemoryLaw) else None

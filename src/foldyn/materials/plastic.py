@@ -1,0 +1,87 @@
+"""Plasticity of creases: a yield moment with isotropic and kinematic hardening.
+
+With the plastic turn p and the sum a of its sizes, per length of the crease,
+
+    M = k (d - p),    f = |M - C p| - (M_y + H a) <= 0,    dp/dt = sgn(M - C p) da/dt,
+
+and a grows where f = 0 only. The elastic law has what is beyond: M = k (m(d) - p).
+
+A step is the return mapping (M. L. Wilkins, 1964; J. C. Simo and T. J. R. Hughes, Computational
+Inelasticity, 1998, box 1.5): where the trial state with the old p has f > 0, a grows by
+f / (k + H + C). It is exact for turns in one direction, whatever the step, and so is what is
+dissipated, int (M_y + H a) da. The slope of the moment within such a step is the consistent one,
+k (H + C) / (k + H + C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import scalar
+from foldyn.materials.law import HingeLaw
+from foldyn.materials.memory_law import Branch, MemoryLaw, columns
+from foldyn.values import number
+
+CODE = 1
+
+
+@scalar
+def update(before, after, plastic, grown, limit, isotropic, kinematic):
+    """Plastic turn, its sum, moment, slope, energy and loss per k, after a turn."""
+    driven = after - plastic - kinematic * plastic
+    beyond = abs(driven) - (limit + isotropic * grown)
+    slope, lost = 0.0, 0.0
+    if beyond > 0.0 and after != before:  # what has not moved stays, rounding or not
+        whole = 1.0 + isotropic + kinematic
+        more = beyond / whole
+        lost = more * (limit + isotropic * (grown + 0.5 * more))
+        plastic += more if driven > 0.0 else -more
+        grown += more
+        slope = -1.0 / whole
+    energy = plastic * (0.5 * (1.0 + kinematic) * plastic - after)
+    return plastic, grown, -plastic, slope, energy, lost
+
+
+@dataclass(frozen=True)
+class Plastic(MemoryLaw):
+    """Elastic and plastic law of creases, independent of rates.
+
+    Parameters
+    ----------
+    yield_moment : float
+        Moment M_y per length of the crease (N m per m) at which it yields first, above 0.
+    isotropic, kinematic : float
+        Hardening H and C (N m/rad per m), at least 0: the growth of the yield moment, and the shift
+        of its middle, by plastic turn.
+    law : str or HingeLaw
+        The elastic law.
+
+    Examples
+    --------
+    >>> Plastic(yield_moment=0.05, kinematic=0.02).yield_moment
+    0.05
+    """
+
+    yield_moment: float
+    isotropic: float = 0.0
+    kinematic: float = 0.0
+    law: str | HingeLaw = "enhanced"
+    name: str = "plastic"
+
+    rate_dependent = False
+
+    def __post_init__(self) -> None:
+        number("Plastic: yield_moment", self.yield_moment, above=0.0)
+        number("Plastic: isotropic", self.isotropic, least=0.0)
+        number("Plastic: kinematic", self.kinematic, least=0.0)
+        _ = self.elastic
+
+    def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:
+        """See `MemoryLaw`."""
+        per = length / stiffness
+        values = (per * x for x in (self.yield_moment, self.isotropic, self.kinematic))
+        table = columns(len(per), *values)
+        return (Branch(CODE, table, 0.0, 0.0, np.ones(len(per))),)

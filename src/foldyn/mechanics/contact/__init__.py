@@ -1,0 +1,1 @@
+"""Contact of a sheet with itself and with planes, for any model."""

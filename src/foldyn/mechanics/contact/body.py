@@ -1,0 +1,159 @@
+"""A body whose parts touch each other and planes, as solvers see it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.mechanics.block_matrix import assembled, pairs_within
+from foldyn.mechanics.body import Blocks, Body, Unstrained
+from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.memory import Memory, memory
+from foldyn.mechanics.contact.model import Touching, TouchingWork
+from foldyn.mechanics.contact.tables import HISTORY, Sheets, Tables, tables
+from foldyn.mechanics.contact.tangent import (
+    guard_tangents,
+    pair_tangents,
+    plane_tangents,
+    touching_pairs,
+)
+from foldyn.mechanics.wrapped_body import WrappedBody
+
+GROUP = "contact"
+
+
+class TouchingBody(WrappedBody):
+    """A body with contact; see `mechanics.body.Body`.
+
+    Its tangent is that of the energy: without friction, which has none.
+
+    Parameters
+    ----------
+    inner : Body
+    sheets : Sheets
+        What may touch.
+    like : TouchingBody, optional
+        One with the same nodes and hinges.
+    """
+
+    def __init__(self, inner: Body, sheets: Sheets, like: TouchingBody | None = None) -> None:
+        super().__init__(inner)
+        self.sheets, self._like = sheets, like
+        self.energy_groups = (*inner.energy_groups, GROUP)
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What may touch, as arrays."""
+        if self._like is not None:
+            return self._like.tables
+        return tables(self.sheets, np.asarray(self.inner.model.hinges).astype(np.int64))
+
+    @cached_property
+    def model(self) -> Touching:  # type: ignore[override]
+        """See `Body`."""
+        return Touching(self.inner.model, self.tables, len(self.inner.energy_groups))
+
+    @cached_property
+    def _memory(self) -> Memory:
+        """Lists of pairs for the evaluations below, which they find again where they serve."""
+        return memory(self.tables, self.sheets.panels)
+
+    def around(self, inner: Body) -> TouchingBody:
+        """See `WrappedBody`."""
+        return TouchingBody(inner, self.sheets, self)
+
+    def driven(self, rows: Mapping[int, int]) -> TouchingBody:
+        """The same with planes, by number, that move with histories of these numbers."""
+        planes = self.sheets.planes.copy()
+        for plane, row in rows.items():
+            planes[plane, HISTORY] = row
+        return TouchingBody(self.inner, replace(self.sheets, planes=planes))
+
+    # ------------------------------------------------------------------ mechanics
+    def contact(self, q: NDArray) -> tuple[float, NDArray]:
+        """Energy (J) and its gradient (n, 3), N, of contact alone."""
+        u = self.nodal(q)
+        force = np.zeros_like(u)
+        add_contact(self.tables, u, self.inner.angles(q), force, self._memory)
+        return float(self._memory.facts.energy), force
+
+    def touch(self, u: NDArray, moved: NDArray) -> NDArray:
+        """Size (n,), N, of the force of contact on each node at u (n, 3), without friction.
+
+        moved : (q, 3) displacement of the planes, m.
+        """
+        self._memory.moved[:, :3] = moved
+        force = self.contact(u.ravel())[1]
+        self._memory.moved[:] = 0.0
+        return np.linalg.norm(force, axis=1)
+
+    def energies(self, q: NDArray) -> NDArray:
+        """See `Body`."""
+        return np.append(self.inner.energies(q), self.contact(q)[0])
+
+    def internal(self, q: NDArray, work: TouchingWork | None = None) -> NDArray:
+        """See `Body`."""
+        inner = self.inner.internal(q, work.inner if work else None)
+        return inner + self.added(self.contact(q)[1])
+
+    def hinge_forces(self, q: NDArray, work: TouchingWork | None = None) -> NDArray:
+        """See `Body`."""
+        return self.inner.hinge_forces(q, work.inner if work else None)
+
+    def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
+        """See `Body`."""
+        return sparse.csr_array(self.inner.tangent(q, floor) + self.contact_tangent(q))
+
+    def step_tangent(self, q: NDArray, before: NDArray | None = None) -> sparse.csr_array:
+        """See `Body`."""
+        return sparse.csr_array(self.inner.step_tangent(q, before) + self.contact_tangent(q))
+
+    def contact_tangent(self, q: NDArray) -> sparse.csr_array:
+        """The second derivative (m, m), N/m, of the energy of contact."""
+        self.contact(q)
+        own, kept = self.tables, self._memory
+        first, second = touching_pairs(own, kept)
+        nodes = np.empty((len(first) + len(second), 4), np.int64)
+        blocks = np.zeros((len(nodes), 12, 12))
+        pair_tangents(own, kept, first, second, nodes, blocks)
+        guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
+        acts = guard_tangents(own, kept.x, guards)
+        nodes = np.concatenate([nodes, own.hinges[acts]])
+        four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
+        pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+        if len(own.planes):
+            normal = plane_tangents(own, kept.x, kept)
+            met = np.flatnonzero(normal.any(axis=(1, 2)))
+            pairs.append(np.column_stack([met, met]))
+            entries.append(normal[met])
+        return assembled(np.concatenate(pairs), np.concatenate(entries), self.size)
+
+    def blocks(self) -> Blocks:
+        """See `Body`."""
+        raise NotImplementedError("implicit methods do not take contact")
+
+    def workspaces(self, threads: int) -> Sequence[TouchingWork]:
+        """See `Body`: one thread."""
+        inner: Any = self.inner.workspaces(1)[0]
+        kept = memory(self.tables, self.sheets.panels)
+        return [TouchingWork(inner, inner.angle, inner.fold_angle, inner.strips, inner.team, kept)]
+
+    # ------------------------------------------------------------------ other bodies
+    def renumbered(self) -> tuple[TouchingBody, NDArray]:
+        """See `Body`."""
+        inner, order = self.inner.renumbered()
+        return TouchingBody(inner, self.sheets.placed(order)), order
+
+    def nominal(self, q: NDArray) -> Body:
+        """See `Body`: without contact."""
+        return self.inner.nominal(q)
+
+    def unstrained(self, q: NDArray) -> Unstrained | None:
+        """See `Body`: without contact."""
+        return self.inner.unstrained(q)

@@ -1,0 +1,133 @@
+"""Closest points of a vertex and a triangle, and of two segments.
+
+Points are tuples of three numbers. A closest point is given by its weights on the corners; regions
+tell on which part of the triangle it lies. The walk through the regions of a triangle: Ericson,
+Real-Time Collision Detection, 2005, section 5.1.5; of two segments: section 5.1.9.
+"""
+
+from __future__ import annotations
+
+from foldyn.jit.compiled import kernel, scalar
+
+INSIDE, SIDE_AB, SIDE_BC, SIDE_CA, CORNER_A, CORNER_B, CORNER_C = range(7)  # regions
+PARALLEL = 1e-14  # of the product of squared lengths: segments that count as parallel
+
+
+@scalar
+def point(x, i):
+    """Row i of positions (n, 3)."""
+    return x[i, 0], x[i, 1], x[i, 2]
+
+
+@scalar
+def dot(a, b):
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@scalar
+def minus(a, b):
+    """Difference a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@scalar
+def cross(a, b):
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@scalar
+def apart(p, a, b, c, wa, wb, wc):
+    """Vector from the point of a triangle with some weights to p."""
+    return (
+        p[0] - wa * a[0] - wb * b[0] - wc * c[0],
+        p[1] - wa * a[1] - wb * b[1] - wc * c[1],
+        p[2] - wa * a[2] - wb * b[2] - wc * c[2],
+    )
+
+
+@scalar
+def between(a, b, c, d, s, t):
+    """Vector from the point at the fraction t of segment cd to that at s of ab."""
+    return (
+        a[0] + s * (b[0] - a[0]) - c[0] - t * (d[0] - c[0]),
+        a[1] + s * (b[1] - a[1]) - c[1] - t * (d[1] - c[1]),
+        a[2] + s * (b[2] - a[2]) - c[2] - t * (d[2] - c[2]),
+    )
+
+
+@kernel
+def closest_on_triangle(p, a, b, c):
+    """Weights of the point of a triangle that is closest to p, and its region."""
+    ab, ac, ap = minus(b, a), minus(c, a), minus(p, a)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    if d1 <= 0.0 and d2 <= 0.0:
+        return 1.0, 0.0, 0.0, CORNER_A
+    bp = minus(p, b)
+    d3, d4 = dot(ab, bp), dot(ac, bp)
+    if d3 >= 0.0 and d4 <= d3:
+        return 0.0, 1.0, 0.0, CORNER_B
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+        return 1.0 - v, v, 0.0, SIDE_AB
+    cp = minus(p, c)
+    d5, d6 = dot(ab, cp), dot(ac, cp)
+    if d6 >= 0.0 and d5 <= d6:
+        return 0.0, 0.0, 1.0, CORNER_C
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+        return 1.0 - w, 0.0, w, SIDE_CA
+    va = d3 * d6 - d5 * d4
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / (d4 - d3 + d5 - d6)
+        return 0.0, 1.0 - w, w, SIDE_BC
+    whole = 1.0 / (va + vb + vc)
+    v, w = vb * whole, vc * whole
+    return 1.0 - v - w, v, w, INSIDE
+
+
+@scalar
+def closest_on_segment(p, a, b):
+    """Fraction of the segment ab at which it is closest to p."""
+    ab = minus(b, a)
+    return min(1.0, max(0.0, dot(minus(p, a), ab) / dot(ab, ab)))
+
+
+@kernel
+def closest_of_segments(a, b, c, d):
+    """Fractions of the segments ab and cd at which they are closest, and whether inside both."""
+    e, g, r = minus(b, a), minus(d, c), minus(a, c)
+    ee, gg, gr, er, eg = dot(e, e), dot(g, g), dot(g, r), dot(e, r), dot(e, g)
+    across = ee * gg - eg * eg
+    s = 0.0
+    if across > PARALLEL * ee * gg:
+        s = min(1.0, max(0.0, (eg * gr - er * gg) / across))
+    t = (eg * s + gr) / gg
+    if t < 0.0:
+        t, s = 0.0, min(1.0, max(0.0, -er / ee))
+    elif t > 1.0:
+        t, s = 1.0, min(1.0, max(0.0, (eg - er) / ee))
+    return s, t, 0.0 < s < 1.0 and 0.0 < t < 1.0
+
+
+@kernel
+def closest_end(a, b, c, d):
+    """Fractions of the segments ab and cd of the closest of their four pairs of end and segment."""
+    s, t = 0.0, closest_on_segment(a, c, d)
+    r = between(a, b, c, d, s, t)
+    best = dot(r, r)
+    for which in range(1, 4):
+        if which == 1:
+            si, ti = 1.0, closest_on_segment(b, c, d)
+        elif which == 2:
+            si, ti = closest_on_segment(c, a, b), 0.0
+        else:
+            si, ti = closest_on_segment(d, a, b), 1.0
+        r = between(a, b, c, d, si, ti)
+        square = dot(r, r)
+        if square < best:
+            best, s, t = square, si, ti
+    return s, t, best

@@ -1,0 +1,47 @@
+"""Guards of hinges: panels that share a crease cannot be told apart by their distance.
+
+A dihedral theta has the energy K t0^2 f(theta / t0) below t0, and so has 2 pi - theta, whatever the
+law of the hinge: faces of thickness t beside a wing of height h meet at t0 = t / h, K = k h^2.
+"""
+
+from __future__ import annotations
+
+import math
+
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.mechanics.contact.distances import point
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.dihedral import dihedral_gradient
+
+TURN = 2.0 * math.pi
+
+
+@scalar
+def gradient_at(tables, x, h):
+    """Dihedral (rad) of a guarded hinge and its gradient (12 numbers)."""
+    a, b = point(x, tables.hinges[h, 0]), point(x, tables.hinges[h, 1])
+    c, d = point(x, tables.hinges[h, 2]), point(x, tables.hinges[h, 3])
+    return dihedral_gradient(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], d[0], d[1], d[2])
+
+
+@kernel
+def add_guards(tables, x, angle, force):
+    """Energy (J) of the guards at dihedrals `angle`; adds their gradient to force (n, 3)."""
+    energy = 0.0
+    for h in range(tables.hinge_limit.size):
+        limit, theta = tables.hinge_limit[h], angle[tables.hinge_row[h]]
+        if limit < theta < TURN - limit:
+            continue
+        found = gradient_at(tables, x, h)
+        turned, sign = found[0], 1.0
+        if turned > math.pi:
+            turned, sign = TURN - turned, -1.0
+        if turned >= limit:
+            continue
+        f, f1, _ = barrier(turned / limit)
+        energy += tables.hinge_stiffness[h] * limit * limit * f
+        moment = sign * tables.hinge_stiffness[h] * limit * f1
+        for v in range(4):
+            for c in range(3):
+                force[tables.hinges[h, v], c] += moment * found[1 + 3 * v + c]
+    return energy

@@ -1,0 +1,67 @@
+"""What contact keeps from one evaluation to the next: pairs that are near, anchors of friction."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.mechanics.contact.tables import Tables
+
+ROOM = 64  # pairs for each triangle, of either kind
+
+
+class Memory(NamedTuple):
+    """Memory of one motion of n nodes against q planes; room for m pairs of either kind."""
+
+    x: NDArray  # (n, 3) positions at the last evaluation, m
+    listed: NDArray  # (n, 3) displacement when the pairs were listed, m
+    pairs: NDArray  # (2, m, 2) vertex and triangle; edge and edge
+    d0: NDArray  # (2, m) m
+    gap: NDArray  # (2, m) distance less d0 when they were listed, m
+    near: NDArray  # (2, m) pairs that may come within d0 in this step
+    anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m; 1 if it is
+    friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force
+    moved: NDArray  # (q, 6) displacement of the planes, m, and its velocity, m/s
+    counts: np.record
+    facts: np.record
+
+
+COUNTED = (
+    "listed_first",  # vertices and triangles
+    "listed_second",  # edges
+    "near_first",
+    "near_second",
+    "lists",  # made so far
+    "has_list",
+    "watched",  # whether `limited` keeps the lists up to date, before every step
+    "hinges",  # that may come within their guard in this step
+    "full",  # whether the last list could not be made
+)
+# energy at the last force (J), skin of the list (m), shortest step asked for so far (s)
+MEASURED = ("energy", "skin", "shortest")
+COUNTS = np.dtype((np.record, [(name, np.int64) for name in COUNTED]))
+FACTS = np.dtype((np.record, [(name, np.float64) for name in MEASURED]))
+
+
+def memory(tables: Tables, panels: bool = True) -> Memory:
+    """New memory."""
+    n, q = len(tables.rest), len(tables.planes)
+    room = ROOM * len(tables.triangles) + 256 if panels else 0
+    counts, facts = np.zeros(1, COUNTS), np.zeros(1, FACTS)
+    facts["skin"] = tables.skin
+    facts["shortest"] = np.inf
+    return Memory(
+        x=tables.rest.copy(),
+        listed=np.zeros((n, 3)),
+        pairs=np.empty((2, room, 2), np.int32),
+        d0=np.empty((2, room)),
+        gap=np.empty((2, room)),
+        near=np.empty((2, room), np.int32),
+        anchor=np.zeros((q, n, 4)),
+        friction=np.zeros((q, n, 4)),
+        moved=np.zeros((q, 6)),
+        counts=counts[0],
+        facts=facts[0],
+    )

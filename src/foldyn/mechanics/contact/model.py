@@ -1,0 +1,104 @@
+"""A model whose parts touch each other and planes: a further term of its energy."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.planes import move_planes, plane_powers
+from foldyn.mechanics.contact.step_limit import limited
+from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.kernels import (
+    contact_limit,
+    contact_powers,
+    energies_of,
+    folds_of,
+    force_of,
+    place_obstacles,
+)
+from foldyn.mechanics.threads import Team
+
+
+class Touching(NamedTuple):
+    """A model with contact."""
+
+    inner: Any
+    contact: Tables
+    groups: int  # of the inner model's energies
+
+    @property
+    def hinges(self) -> NDArray:
+        """Rows (nh, 4) of all hinges."""
+        return self.inner.hinges
+
+
+class TouchingWork(NamedTuple):
+    """Memory of evaluations, one after the other."""
+
+    inner: Any
+    angle: NDArray  # (nh,) dihedrals, rad
+    fold_angle: NDArray  # the inner model's
+    strips: Any
+    team: Team
+    memory: Memory
+
+
+@overload(force_of, inline="always")
+def _force(model, u, force, work):
+    if model.instance_class is not Touching:
+        return None
+
+    def touching(model, u, force, work):
+        force_of(model.inner, u, force, work.inner)
+        add_contact(model.contact, u, work.angle, force, work.memory)
+
+    return touching
+
+
+@overload(energies_of, inline="always")
+def _energies(model, u, work, out):
+    """The energy of contact is that of the last force, which samples are taken after."""
+    if model.instance_class is not Touching:
+        return None
+
+    def touching(model, u, work, out):
+        energies_of(model.inner, u, work.inner, out[: model.groups])
+        out[model.groups] = work.memory.facts.energy
+
+    return touching
+
+
+@overload(folds_of, inline="always")
+def _folds(model):
+    if model.instance_class is not Touching:
+        return None
+    return lambda model: folds_of(model.inner)
+
+
+@overload(place_obstacles, inline="always")
+def _obstacles(model, factor, work):
+    if model.instance_class is not Touching:
+        return None
+    return lambda model, factor, work: move_planes(model.contact, factor, work.memory)
+
+
+@overload(contact_powers, inline="always")
+def _powers(model, v, work):
+    if model.instance_class is not Touching:
+        return None
+    return lambda model, v, work: plane_powers(model.contact, v, work.memory)
+
+
+@overload(contact_limit, inline="always")
+def _limit(model, u, v, dt, lightness, work):
+    if model.instance_class is not Touching:
+        return None
+
+    def touching(model, u, v, dt, lightness, work):
+        return limited(model.contact, u, v, work.angle, dt, lightness, work.memory)
+
+    return touching

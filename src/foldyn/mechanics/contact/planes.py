@@ -1,0 +1,127 @@
+"""Planes that the nodes of a sheet meet, with Coulomb friction.
+
+A node at the distance d from a plane has the energy k d0^2 f(d/d0), d0 half its sheet's thickness.
+Friction is a spring along the plane from the node to an anchor that moves with the plane: it pulls
+with k s, s its stretch, at most mu N, N the normal force. At the end of a step the anchor follows a
+node that slips, and what the spring then loses is dissipated (the elastic predictor and slip of
+return mapping; Wriggers, Computational Contact Mechanics, 2006, section 5.2.3).
+"""
+
+from __future__ import annotations
+
+import math
+
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.tables import FRICTION, HISTORY, MOTION, NORMAL, POINT
+
+
+@kernel
+def move_planes(tables, factor, memory):
+    """Displacements and velocities of the planes for the factors (h, 3) of histories."""
+    for p in range(len(tables.planes)):
+        row = int(tables.planes[p, HISTORY])
+        if row < 0:
+            continue
+        for c in range(3):
+            memory.moved[p, c] = tables.planes[p, MOTION + c] * factor[row, 0]
+            memory.moved[p, 3 + c] = tables.planes[p, MOTION + c] * factor[row, 1]
+
+
+@kernel
+def height(tables, x, memory, p, i):
+    """Distance (m) of node i from plane p, positive on its side."""
+    out = 0.0
+    for c in range(3):
+        out += (x[i, c] - tables.planes[p, POINT + c] - memory.moved[p, c]) * tables.planes[
+            p, NORMAL + c
+        ]
+    return out
+
+
+@kernel
+def add_planes(tables, x, memory, force):
+    """Energy (J) of nodes at planes; adds its gradient and friction to force (n, 3)."""
+    energy, k = 0.0, tables.stiffness
+    for p in range(len(tables.planes)):
+        plane = tables.planes[p]
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            push = memory.friction[p, i]
+            push[0] = push[1] = push[2] = push[3] = 0.0
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            if d >= d0:
+                continue
+            f, f1, _ = barrier(d / d0)
+            energy += k * d0 * d0 * f
+            push[3] = -k * d0 * f1
+            for c in range(3):
+                force[i, c] -= push[3] * plane[NORMAL + c]
+            if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
+                stretch = stretch_of(tables, x, memory, p, i)
+                most = plane[FRICTION] * push[3] / k
+                share = k if stretch[3] <= most else k * most / stretch[3]
+                for c in range(3):
+                    push[c] = share * stretch[c]
+                    force[i, c] += push[c]
+    return energy
+
+
+@kernel
+def stretch_of(tables, x, memory, p, i):
+    """Stretch (m) of the spring of node i on plane p: its vector along the plane, its length."""
+    plane, moved, anchor = tables.planes[p], memory.moved[p], memory.anchor[p, i]
+    a, b, c = x[i, 0] - moved[0], x[i, 1] - moved[1], x[i, 2] - moved[2]
+    a, b, c = a - anchor[0], b - anchor[1], c - anchor[2]
+    out = a * plane[NORMAL] + b * plane[NORMAL + 1] + c * plane[NORMAL + 2]
+    a -= out * plane[NORMAL]
+    b -= out * plane[NORMAL + 1]
+    c -= out * plane[NORMAL + 2]
+    return a, b, c, math.sqrt(a * a + b * b + c * c)
+
+
+@kernel
+def slip(tables, x, memory):
+    """At the end of a step, anchors follow nodes that slip, and begin and end with touch."""
+    for p in range(len(tables.planes)):
+        plane, moved = tables.planes[p], memory.moved[p]
+        if plane[FRICTION] == 0.0:
+            continue
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            anchor = memory.anchor[p, i]
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            if d >= d0:
+                anchor[3] = 0.0
+                continue
+            if anchor[3] == 0.0:
+                anchor[3] = 1.0
+                for c in range(3):
+                    anchor[c] = x[i, c] - moved[c]
+                continue
+            most = -plane[FRICTION] * d0 * barrier(d / d0)[1]
+            stretch = stretch_of(tables, x, memory, p, i)
+            if stretch[3] > most:
+                for c in range(3):
+                    anchor[c] += (1.0 - most / stretch[3]) * stretch[c]
+
+
+@kernel
+def plane_powers(tables, v, memory):
+    """Power (W) of moving planes on nodes with velocities v (n, 3), and that of friction.
+
+    After `add_planes`.
+    """
+    work, dissipated = 0.0, 0.0
+    for p in range(len(tables.planes)):
+        plane, moved = tables.planes[p], memory.moved[p]
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            push = memory.friction[p, i]
+            if push[3] == 0.0:
+                continue
+            for c in range(3):
+                speed = moved[3 + c]
+                work += (push[3] * plane[NORMAL + c] - push[c]) * speed
+                dissipated += push[c] * (v[i, c] - speed)
+    return work, dissipated

@@ -1,0 +1,308 @@
+"""Lists of the pairs that are near, found by sorting into the cells of a grid.
+
+A list holds all pairs nearer than d0 + skin. It serves until a node has moved by half of the skin
+against the mean motion of all.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.mechanics.contact.distances import (
+    apart,
+    between,
+    closest_of_segments,
+    closest_on_triangle,
+    dot,
+    point,
+)
+
+CELLS = 8.0  # per node, at most
+THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
+
+
+@kernel
+def panel_d0(tables, v, panel):
+    """d0 (m) of a node against a panel; 0 if it belongs to it."""
+    for at in range(tables.own_start[v], tables.own_start[v + 1]):
+        if tables.own[at] == panel:
+            return 0.0
+    for at in range(tables.near_start[v], tables.near_start[v + 1]):
+        if tables.near[at] == panel:
+            return tables.near_d0[at]
+    return 0.5 * (tables.node_thickness[v] + tables.panel_thickness[panel])
+
+
+@kernel
+def edge_d0(tables, i, j):
+    """d0 (m) of two edges; 0 if they share a panel or a node."""
+    a, b = tables.edges[i, 0], tables.edges[i, 1]
+    c, d = tables.edges[j, 0], tables.edges[j, 1]
+    if a in (c, d) or b in (c, d):
+        return 0.0
+    best = math.inf
+    for first in range(2):
+        for second in range(2):
+            p, q = tables.edge_panels[i, first], tables.edge_panels[j, second]
+            if p < 0 or q < 0:
+                continue
+            if p == q:
+                return 0.0
+            one = 0.5 * (panel_d0(tables, a, q) + panel_d0(tables, b, q))
+            other = 0.5 * (panel_d0(tables, c, p) + panel_d0(tables, d, p))
+            best = min(best, one, other)
+    return best
+
+
+@kernel
+def vertex_gap(tables, x, v, t):
+    """Distance (m) of a vertex from a triangle."""
+    a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
+    p, pa, pb, pc = point(x, v), point(x, a), point(x, b), point(x, c)
+    wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
+    r = apart(p, pa, pb, pc, wa, wb, wc)
+    return math.sqrt(dot(r, r))
+
+
+@kernel
+def edge_gap(tables, x, i, j):
+    """Distance (m) of two edges."""
+    pa, pb = point(x, tables.edges[i, 0]), point(x, tables.edges[i, 1])
+    pc, pd = point(x, tables.edges[j, 0]), point(x, tables.edges[j, 1])
+    s, t, _ = closest_of_segments(pa, pb, pc, pd)
+    r = between(pa, pb, pc, pd, s, t)
+    return math.sqrt(dot(r, r))
+
+
+@kernel
+def _corners(x, nodes, low, high):
+    """The box (3,), (3,) of some nodes; whether it is finite."""
+    for c in range(3):
+        low[c], high[c] = math.inf, -math.inf
+        for k in range(nodes.size):
+            low[c] = min(low[c], x[nodes[k], c])
+            high[c] = max(high[c], x[nodes[k], c])
+            if not abs(x[nodes[k], c]) < math.inf:
+                return False
+    return True
+
+
+@kernel
+def _cells(low, high, size, most, counts):
+    """Numbers (3,) of cells of at least some size, and the size that gives no more than `most`."""
+    while True:
+        cells = 1.0
+        for c in range(3):
+            cells *= math.floor((high[c] - low[c]) / size) + 1.0
+        if cells <= most:
+            break
+        size *= 1.26
+    for c in range(3):
+        counts[c] = int((high[c] - low[c]) / size) + 1
+    return size
+
+
+@scalar
+def _cell(value, low, size, count):
+    return min(count - 1, max(0, int((value - low) / size)))
+
+
+@kernel
+def _sort(points, low, size, counts, start, items):
+    """Sort points (m, 3) into cells; those of a cell follow each other in `items`."""
+    start[:] = 0
+    cell = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        a = _cell(points[i, 0], low[0], size, counts[0])
+        b = _cell(points[i, 1], low[1], size, counts[1])
+        c = _cell(points[i, 2], low[2], size, counts[2])
+        cell[i] = (a * counts[1] + b) * counts[2] + c
+        start[cell[i] + 1] += 1
+    for k in range(start.size - 1):
+        start[k + 1] += start[k]
+    fill = start[:-1].copy()
+    for i in range(len(points)):
+        items[fill[cell[i]]] = i
+        fill[cell[i]] += 1
+
+
+@scalar
+def _beside(x, nodes, low, high):
+    """Whether the box of two nodes meets a box."""
+    for c in range(3):
+        p, q = x[nodes[0], c], x[nodes[1], c]
+        if max(p, q) < low[c] or min(p, q) > high[c]:
+            return False
+    return True
+
+
+@kernel
+def _vertex_pairs(tables, x, far, skin, low, size, counts, start, items, memory):
+    """List vertices and triangles; returns how many there are."""
+    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+    below, above = np.empty(3), np.empty(3)
+    found, room = 0, memory.d0.shape[1]
+    for t in range(len(tables.triangles)):
+        _corners(x, tables.triangles[t], below, above)
+        for c in range(3):
+            below[c] -= far
+            above[c] += far
+            first[c] = _cell(below[c], low[c], size, counts[c])
+            last[c] = _cell(above[c], low[c], size, counts[c])
+        for i in range(first[0], last[0] + 1):
+            for j in range(first[1], last[1] + 1):
+                row = (i * counts[1] + j) * counts[2]
+                for at in range(start[row + first[2]], start[row + last[2] + 1]):
+                    v = tables.surface[items[at]]
+                    outside = False
+                    for c in range(3):
+                        outside = outside or x[v, c] < below[c] or x[v, c] > above[c]
+                    if outside:
+                        continue
+                    d0 = panel_d0(tables, v, tables.panel[t])
+                    if d0 == 0.0:
+                        continue
+                    gap = vertex_gap(tables, x, v, t) - d0
+                    if gap > skin:
+                        continue
+                    if found < room:
+                        memory.pairs[0, found, 0], memory.pairs[0, found, 1] = v, t
+                        memory.d0[0, found], memory.gap[0, found] = d0, gap
+                    found += 1
+    return found
+
+
+@kernel
+def _edge_pairs(tables, x, far, skin, low, size, counts, half, start, items, memory):
+    """List edges and edges; returns how many there are."""
+    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+    below, above = np.empty(3), np.empty(3)
+    found, room = 0, memory.d0.shape[1]
+    for e in range(len(tables.edges)):
+        _corners(x, tables.edges[e], below, above)
+        for c in range(3):
+            below[c] -= far
+            above[c] += far
+            first[c] = _cell(below[c] - half[c], low[c], size, counts[c])
+            last[c] = _cell(above[c] + half[c], low[c], size, counts[c])
+        for i in range(first[0], last[0] + 1):
+            for j in range(first[1], last[1] + 1):
+                row = (i * counts[1] + j) * counts[2]
+                for at in range(start[row + first[2]], start[row + last[2] + 1]):
+                    other = items[at]
+                    if other <= e or not _beside(x, tables.edges[other], below, above):
+                        continue
+                    d0 = edge_d0(tables, e, other)
+                    if d0 == 0.0:
+                        continue
+                    gap = edge_gap(tables, x, e, other) - d0
+                    if gap > skin:
+                        continue
+                    if found < room:
+                        memory.pairs[1, found, 0], memory.pairs[1, found, 1] = e, other
+                        memory.d0[1, found], memory.gap[1, found] = d0, gap
+                    found += 1
+    return found
+
+
+@kernel
+def list_pairs(tables, u, memory):
+    """List all pairs nearer than d0 + skin at memory.x, the positions at displacement u (n, 3).
+
+    Where there is no room for them the skin becomes thinner. Without finite positions, and with
+    more pairs than there is room for even so, no list is made, and forces are not finite.
+    """
+    x, counts, facts = memory.x, memory.counts, memory.facts
+    counts.has_list = 0
+    low, high, dims = np.empty(3), np.empty(3), np.empty(3, np.int64)
+    counts.listed_first = counts.listed_second = 0
+    if not _corners(x, tables.surface, low, high):
+        counts.full = 1
+        return
+    e = len(tables.edges)
+    middle, half, mean = np.empty((e, 3)), np.zeros(3), 0.0
+    for i in range(e):
+        square = 0.0
+        for c in range(3):
+            p, q = x[tables.edges[i, 0], c], x[tables.edges[i, 1], c]
+            middle[i, c] = 0.5 * (p + q)
+            half[c] = max(half[c], 0.5 * abs(p - q))
+            square += (p - q) ** 2
+        mean += math.sqrt(square) / e
+    vertices = np.empty((tables.surface.size, 3))
+    for i in range(len(vertices)):
+        for c in range(3):
+            vertices[i, c] = x[tables.surface[i], c]
+    skin, thinnest = tables.skin, THINNEST * tables.skin
+    while True:
+        far = tables.farthest + skin
+        size = _cells(low, high, max(0.7 * mean, far), CELLS * len(x) + 64.0, dims)
+        start = np.empty(dims[0] * dims[1] * dims[2] + 1, np.int64)
+        items = np.empty(max(len(vertices), e), np.int64)
+        _sort(vertices, low, size, dims, start, items)
+        first = _vertex_pairs(tables, x, far, skin, low, size, dims, start, items, memory)
+        _sort(middle, low, size, dims, start, items)
+        second = _edge_pairs(tables, x, far, skin, low, size, dims, half, start, items, memory)
+        if max(first, second) <= memory.d0.shape[1]:
+            break
+        skin *= 0.5
+        if skin < thinnest:
+            counts.full = 1
+            return
+    counts.full, counts.has_list = 0, 1
+    counts.lists += 1
+    counts.listed_first, counts.listed_second = first, second
+    facts.skin = skin
+    for i in range(len(x)):
+        for c in range(3):
+            memory.listed[i, c] = u[i, c]
+
+
+@kernel
+def farthest(tables, u, memory):
+    """Largest motion (m) of a node from where pairs were listed, against the mean of all."""
+    n = len(memory.x)
+    mean = np.zeros(3)
+    for i in range(n):
+        for c in range(3):
+            mean[c] += (u[i, c] - memory.listed[i, c]) / n
+    worst = 0.0
+    for i in range(n):
+        square = 0.0
+        for c in range(3):
+            square += (u[i, c] - memory.listed[i, c] - mean[c]) ** 2
+        if not square < math.inf:
+            return math.inf
+        worst = max(worst, square)
+    return math.sqrt(worst)
+
+
+@kernel
+def place(tables, u, memory):
+    """Positions at displacement u (rows, 3) to memory.x."""
+    for i in range(len(memory.x)):
+        for c in range(3):
+            memory.x[i, c] = tables.rest[i, c] + u[i, c]
+
+
+@kernel
+def use_all(memory):
+    """Take all listed pairs for near."""
+    for kind in range(2):
+        count = memory.counts.listed_first if kind == 0 else memory.counts.listed_second
+        for k in range(count):
+            memory.near[kind, k] = k
+    memory.counts.near_first = memory.counts.listed_first
+    memory.counts.near_second = memory.counts.listed_second
+
+
+@kernel
+def follow(tables, u, memory):
+    """Have all pairs that are near at u, wherever it is, among the near ones."""
+    counts = memory.counts
+    if counts.has_list == 0 or not farthest(tables, u, memory) < 0.5 * memory.facts.skin:
+        list_pairs(tables, u, memory)
+        use_all(memory)

@@ -1,0 +1,195 @@
+"""The longest step of an explicit method in which nothing that touches is overrun.
+
+In a step no gap closes by more than `APPROACH` of itself, or of d0 and what it is farther apart,
+at the speed at its begin; and the stiffness of what touches is resolved,
+
+    h <= ((d - d0)+ + eta min(d, d0)) / closing speed,    h <= beta / sqrt(k f'' sum w_i^2 / m_i),
+
+with the weights w_i of the closest points and the masses m_i.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.mechanics.contact.distances import (
+    apart,
+    between,
+    closest_of_segments,
+    closest_on_triangle,
+    dot,
+    point,
+)
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.planes import height, slip
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.search import farthest, list_pairs, place
+from foldyn.mechanics.contact.tables import FRICTION, NORMAL
+
+APPROACH = 0.1
+RESOLVED = 0.25
+REACH = 4.0  # times the fastest motion in a step: how far away pairs are looked at in it
+MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
+
+
+@kernel
+def _fastest(v, n):
+    """Largest speed (m/s) of n nodes against the mean of all."""
+    mean = np.zeros(3)
+    for i in range(n):
+        for c in range(3):
+            mean[c] += v[i, c] / n
+    worst = 0.0
+    for i in range(n):
+        square = 0.0
+        for c in range(3):
+            square += (v[i, c] - mean[c]) ** 2
+        worst = max(worst, square)
+    return math.sqrt(worst)
+
+
+@scalar
+def _bound(limit, d, d0, closing, stiffness, lightness):
+    """The lesser of a step (s) and what a gap d allows that closes at some speed."""
+    if closing > 0.0:
+        limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
+    if d < d0:
+        rate = stiffness * barrier(d / d0)[2] * lightness
+        limit = min(limit, RESOLVED / math.sqrt(rate)) if rate > 0.0 else limit
+    return limit
+
+
+@kernel
+def _vertex_bound(tables, x, v, lightness, i, t, d0, reach, limit):
+    """See `_bound`, for a vertex and a triangle; nan where they are farther than reach."""
+    a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
+    p, pa, pb, pc = point(x, i), point(x, a), point(x, b), point(x, c)
+    wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
+    r = apart(p, pa, pb, pc, wa, wb, wc)
+    d = math.sqrt(dot(r, r))
+    if d - d0 > reach:
+        return np.nan
+    w = apart(point(v, i), point(v, a), point(v, b), point(v, c), wa, wb, wc)
+    light = lightness[i] + wa * wa * lightness[a] + wb * wb * lightness[b] + wc * wc * lightness[c]
+    return _bound(limit, d, d0, -dot(r, w) / d, tables.stiffness, light)
+
+
+@kernel
+def _edge_bound(tables, x, v, lightness, i, j, d0, reach, limit):
+    """See `_bound`, for two edges; nan where they are farther than reach."""
+    a, b = tables.edges[i, 0], tables.edges[i, 1]
+    c, d = tables.edges[j, 0], tables.edges[j, 1]
+    s, t, _ = closest_of_segments(point(x, a), point(x, b), point(x, c), point(x, d))
+    r = between(point(x, a), point(x, b), point(x, c), point(x, d), s, t)
+    distance = math.sqrt(dot(r, r))
+    if distance - d0 > reach:
+        return np.nan
+    w = between(point(v, a), point(v, b), point(v, c), point(v, d), s, t)
+    light = (1.0 - s) ** 2 * lightness[a] + s * s * lightness[b]
+    light += (1.0 - t) ** 2 * lightness[c] + t * t * lightness[d]
+    return _bound(limit, distance, d0, -dot(r, w) / distance, tables.stiffness, light)
+
+
+@kernel
+def _hinges_bound(tables, x, v, lightness, angle, reach, limit, counts):
+    """See `_bound`, for all guarded hinges; counts those that a motion by reach may bring there."""
+    counts.hinges = 0
+    for h in range(tables.hinge_limit.size):
+        begin, theta = tables.hinge_limit[h], angle[tables.hinge_row[h]]
+        if min(theta, TURN - theta) - begin > 2.0 * tables.hinge_reach[h] * reach:
+            continue
+        counts.hinges += 1
+        found = gradient_at(tables, x, h)
+        rate, light = 0.0, 0.0
+        for k in range(4):
+            node = tables.hinges[h, k]
+            for c in range(3):
+                slope = found[1 + 3 * k + c]
+                rate += slope * v[node, c]
+                light += slope * slope * lightness[node]
+        theta = found[0]
+        if theta > math.pi:
+            theta, rate = TURN - theta, -rate
+        limit = _bound(limit, theta, begin, -rate, tables.hinge_stiffness[h], light)
+    return limit
+
+
+@kernel
+def _planes_bound(tables, x, v, lightness, memory, limit):
+    """See `_bound`, for all nodes and planes; friction's springs are resolved, too."""
+    k = tables.stiffness
+    for p in range(len(tables.planes)):
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            closing = 0.0
+            for c in range(3):
+                speed = memory.moved[p, 3 + c] - v[i, c]
+                closing += speed * tables.planes[p, NORMAL + c]
+            limit = _bound(limit, d, d0, closing, k, lightness[i])
+            if d < d0 and tables.planes[p, FRICTION] > 0.0 and lightness[i] > 0.0:
+                limit = min(limit, RESOLVED / math.sqrt(k * lightness[i]))
+    return limit
+
+
+@kernel
+def limited(tables, u, v, angle, dt, lightness, memory):
+    """The longest step (s), at most dt, from displacement u with velocity v, both (rows, 3).
+
+    Lists are renewed, pairs that may touch in the step are gathered, and friction slips: to be
+    called once before each step, where the last one has ended.
+
+    angle : dihedrals (nh,) at u; lightness : (n,) 1 / mass of the nodes, 1/kg.
+    """
+    limit, counts, x = dt, memory.counts, memory.x
+    fast = _fastest(v, len(x))
+    if memory.d0.shape[1] > 0:
+        skin = memory.facts.skin
+        far = farthest(tables, u, memory)
+        placed = False
+        fresh = counts.has_list == 1 and far < MARGIN * skin
+        if counts.has_list == 0 or (not fresh and not far + 2.0 * fast * dt < 0.5 * skin):
+            place(tables, u, memory)
+            list_pairs(tables, u, memory)
+            placed, far, skin = True, 0.0, memory.facts.skin
+        if 2.0 * fast * dt > 0.5 * skin - far:
+            limit = (0.25 * skin - 0.5 * far) / fast
+        reach = REACH * fast * limit + MARGIN * skin
+        for kind in range(2):
+            found = 0
+            listed = counts.listed_first if kind == 0 else counts.listed_second
+            for k in range(listed):
+                if memory.gap[kind, k] - 2.0 * far > reach:
+                    continue
+                if not placed:
+                    place(tables, u, memory)
+                    placed = True
+                one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
+                d0 = memory.d0[kind, k]
+                if kind == 0:
+                    now = _vertex_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+                else:
+                    now = _edge_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+                if now == now:
+                    limit = now
+                    memory.near[kind, found] = k
+                    found += 1
+            if kind == 0:
+                counts.near_first = found
+            else:
+                counts.near_second = found
+        if not placed:
+            place(tables, u, memory)
+        limit = _hinges_bound(tables, x, v, lightness, angle, reach, limit, counts)
+        counts.watched = counts.has_list
+    else:
+        place(tables, u, memory)
+        counts.watched = 1
+    if len(tables.planes) > 0:
+        slip(tables, x, memory)
+        limit = _planes_bound(tables, x, v, lightness, memory, limit)
+    memory.facts.shortest = min(memory.facts.shortest, limit)
+    return limit

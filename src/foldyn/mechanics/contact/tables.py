@@ -1,0 +1,245 @@
+"""Which parts of a sheet can touch, and at which distances: what does not change in a motion.
+
+Parts of one panel never touch. Two panels that share a crease or a corner are near each other by
+nature, so the distance d0 at which a vertex of one feels the other is cut there:
+
+    d0 = t min(2, 2 l / w) beside a crease,    d0 = t min(1, 2 l / w) beside a corner,
+
+l the vertex' distance from what they share at rest, w the largest l of its panel. Panels hinged at
+a crease then meet everywhere at once, at a dihedral of 2 t / w, and N layers stack to N t.
+Elsewhere d0 = t, the mean thickness of both. That of two edges is the mean over the ends of one
+against the panel of the other, the least of the combinations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+ACROSS_CREASE, ACROSS_CORNER = 2.0, 1.0  # most of d0 / t of panels that share one
+POINT, NORMAL, FRICTION, MOTION, HISTORY = 0, 3, 6, 7, 10  # columns of the table of planes
+PLANE_COLUMNS = 11
+
+
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """What may touch: n nodes, t triangles of p panels, and q planes.
+
+    Parameters
+    ----------
+    nodes : (n, 3)
+        Positions at rest, m.
+    triangles, panel : (t, 3), (t,)
+    thickness : (p,)
+        Of the panels, m.
+    stiffness : float
+        k of the potential, N/m.
+    panels : bool
+        Whether panels touch each other.
+    planes : (q, 11)
+        A point (m), the unit normal on the side of the sheet, the coefficient of friction, the
+        displacement (m) at factor 1, and the number of the history of the factor.
+    held : (n,)
+        Nodes that cannot move, which planes leave alone.
+    """
+
+    nodes: NDArray
+    triangles: NDArray
+    panel: NDArray
+    thickness: NDArray
+    stiffness: float
+    panels: bool
+    planes: NDArray
+    held: NDArray
+
+    def placed(self, order: NDArray) -> Sheets:
+        """The same with node order[k] at place k."""
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        return replace(
+            self, nodes=self.nodes[order], triangles=rank[self.triangles], held=self.held[order]
+        )
+
+
+class Tables(NamedTuple):
+    """The same as arrays of compiled code, with e edges and h hinges that are guarded."""
+
+    rest: NDArray  # (n, 3) m
+    triangles: NDArray  # (t, 3)
+    edges: NDArray  # (e, 2)
+    edge_square: NDArray  # (e,) squared lengths at rest, m2
+    shared_side: NDArray  # (t, 3) 1/2 where a side is that of two triangles, else 0
+    shared_corner: NDArray  # (n,) 1/n where n triangles close around a node, else 0
+    panel: NDArray  # (t,)
+    edge_panels: NDArray  # (e, 2) the second one -1 where there is none
+    node_thickness: NDArray  # (n,) m
+    panel_thickness: NDArray  # (p,) m
+    own_start: NDArray  # (n + 1,) first of a node's panels among `own`
+    own: NDArray
+    near_start: NDArray  # (n + 1,) first of the panels that share nodes with those, among `near`
+    near: NDArray
+    near_d0: NDArray  # d0 against these, m
+    surface: NDArray  # (s,) nodes of triangles
+    meeting: NDArray  # (m,) those that planes may meet
+    hinges: NDArray  # (h, 4) nodes j, k, i, l
+    hinge_row: NDArray  # (h,) where a model keeps their dihedrals
+    hinge_limit: NDArray  # (h,) dihedral below which they are guarded, rad
+    hinge_reach: NDArray  # (h,) turn per displacement of a node, at most, rad/m
+    hinge_stiffness: NDArray  # (h,) N m/rad
+    planes: NDArray  # (q, 11)
+    stiffness: float  # N/m
+    farthest: float  # largest d0, m
+    skin: float  # of lists of pairs, m
+
+
+SKIN = 0.15  # of the mean edge: how much farther than d0 listed pairs may be
+GUARDED = 1.0  # rad: the largest dihedral at which a guard may begin
+
+
+def tables(sheets: Sheets, hinges: NDArray) -> Tables:
+    """Arrays of what may touch; hinges (h, 4) of a model, with -1 for a wing that is no node."""
+    nodes, triangles = np.ascontiguousarray(sheets.nodes, float), _whole(sheets.triangles)
+    panel = _whole(sheets.panel)
+    edges, side = edges_of(triangles)
+    uses = np.bincount(side.ravel(), minlength=len(edges))
+    around = np.bincount(triangles.ravel(), minlength=len(nodes))
+    rim = np.zeros(len(nodes), bool)
+    rim[edges[uses != 2].ravel()] = True
+    closed = (around > 0) & ~rim
+    members = panel_nodes(triangles, panel)
+    own = _panels_of_nodes(members, len(nodes))
+    near = near_panels(nodes, members, own, sheets.thickness)
+    thickest = np.array([sheets.thickness[of].max() if len(of) else 0.0 for of in own])
+    apart = nodes[edges[:, 1]] - nodes[edges[:, 0]]
+    square = np.einsum("ij,ij->i", apart, apart)
+    guarded, limit, reach, stiffness = hinge_guards(nodes, hinges, thickest, sheets.stiffness)
+    if not sheets.panels:
+        guarded = guarded[:0]
+    surface = np.unique(triangles)
+    d0 = [of[panel] for of in near for panel in sorted(of)]
+    return Tables(
+        rest=nodes,
+        triangles=triangles,
+        edges=edges,
+        edge_square=square,
+        shared_side=np.where(uses[side] == 2, 0.5, 0.0),
+        shared_corner=np.where(closed, 1.0 / np.maximum(around, 1), 0.0),
+        panel=panel,
+        edge_panels=_panels_of_edges(side, panel, len(edges)),
+        node_thickness=thickest,
+        panel_thickness=np.ascontiguousarray(sheets.thickness, float),
+        own_start=_starts(own),
+        own=_whole([panel for of in own for panel in of]),
+        near_start=_starts(near),
+        near=_whole([panel for of in near for panel in sorted(of)]),
+        near_d0=np.array(d0, float),
+        surface=_whole(surface),
+        meeting=_whole(surface[~sheets.held[surface]]),
+        hinges=_whole(hinges[guarded]).reshape(-1, 4),
+        hinge_row=_whole(guarded),
+        hinge_limit=limit[guarded],
+        hinge_reach=reach[guarded],
+        hinge_stiffness=stiffness[guarded],
+        planes=np.ascontiguousarray(sheets.planes, float).reshape(-1, PLANE_COLUMNS),
+        stiffness=float(sheets.stiffness),
+        farthest=max([float(thickest.max(initial=0.0)), *d0]) if sheets.panels else 0.0,
+        skin=SKIN * float(np.sqrt(square).mean()),
+    )
+
+
+def edges_of(triangles: NDArray) -> tuple[NDArray, NDArray]:
+    """Edges (e, 2), and those of each triangle (t, 3) from its first, second and third corner."""
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges, side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    return _whole(edges), side.reshape(-1, 3)
+
+
+def panel_nodes(triangles: NDArray, panel: NDArray) -> list[NDArray]:
+    """Nodes of each panel, increasing."""
+    order = np.argsort(panel, kind="stable")
+    cut = np.searchsorted(panel[order], np.arange(int(panel.max(initial=-1)) + 2))
+    return [np.unique(triangles[order[first:last]]) for first, last in pairwise(cut)]
+
+
+def _panels_of_nodes(members: list[NDArray], count: int) -> list[list[int]]:
+    own: list[list[int]] = [[] for _ in range(count)]
+    for panel, nodes in enumerate(members):
+        for node in nodes.tolist():
+            own[node].append(panel)
+    return own
+
+
+def _panels_of_edges(side: NDArray, panel: NDArray, count: int) -> NDArray:
+    """The panels (e, 2) of each edge; -1 where there is no second one."""
+    out = np.full((count, 2), -1, np.int64)
+    edge, of = side.ravel(), np.repeat(panel, 3)
+    out[edge[::-1], 0] = of[::-1]
+    other = of != out[edge, 0]
+    out[edge[other], 1] = of[other]
+    return out
+
+
+def near_panels(
+    nodes: NDArray, members: list[NDArray], own: list[list[int]], thickness: NDArray
+) -> list[dict[int, float]]:
+    """Of each node, d0 (m) against the panels that share nodes with a panel of its own."""
+    near: list[dict[int, float]] = [{} for _ in own]
+    for panel, corners in enumerate(members):
+        shared: dict[int, list[int]] = {}
+        for node in corners.tolist():
+            for other in own[node]:
+                if other != panel:
+                    shared.setdefault(other, []).append(node)
+        for other, common in shared.items():
+            away = _distances(nodes, corners, common)
+            most = ACROSS_CORNER if len(common) == 1 else ACROSS_CREASE
+            t = 0.5 * (thickness[panel] + thickness[other])
+            d0 = t * np.minimum(most, 2.0 * away / away.max())
+            for node, value in zip(corners.tolist(), d0.tolist(), strict=True):
+                if other not in own[node]:
+                    near[node][other] = min(near[node].get(other, np.inf), value)
+    return near
+
+
+def _distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
+    """Distances (k,) of nodes from a node, or from the line along several of them."""
+    away = nodes[corners] - nodes[common[0]]
+    if len(common) == 1:
+        return np.linalg.norm(away, axis=1)
+    spread = np.linalg.norm(nodes[common] - nodes[common[0]], axis=1)
+    axis = nodes[common[int(spread.argmax())]] - nodes[common[0]]
+    along = np.clip(away @ axis / (axis @ axis), 0.0, 1.0)
+    return np.linalg.norm(away - along[:, None] * axis, axis=1)
+
+
+def hinge_guards(
+    nodes: NDArray, hinges: NDArray, thickness: NDArray, stiffness: float
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Guarded hinges, and of all: where their guard begins (rad), reach (rad/m), stiffness.
+
+    Faces of thickness t whose lower wing has the height h over the axis meet at a dihedral of about
+    t / h; the guard has the stiffness k h^2, that of a contact at the wing.
+    """
+    whole = np.flatnonzero((hinges >= 0).all(axis=1))
+    limit, reach, strength = np.zeros((3, len(hinges)))
+    j, k, i, l = np.maximum(hinges, 0).T  # noqa: E741
+    axis = nodes[k] - nodes[j]
+    length = np.linalg.norm(axis, axis=1)
+    heights = [np.linalg.norm(np.cross(nodes[w] - nodes[j], axis), axis=1) for w in (i, l)]
+    height = np.minimum(*heights)[whole] / length[whole]
+    limit[whole] = np.minimum(GUARDED, thickness[j[whole]] / height)
+    reach[whole] = 2.0 / height
+    strength[whole] = stiffness * height**2
+    return whole, limit, reach, strength
+
+
+def _starts(lists: list) -> NDArray:
+    return np.concatenate([[0], np.cumsum([len(of) for of in lists])]).astype(np.int64)
+
+
+def _whole(values) -> NDArray:
+    return np.ascontiguousarray(values, np.int64)

@@ -1,0 +1,102 @@
+"""Tangents of all that touches, element by element of four nodes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.jit.compiled import kernel
+from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.contact.distances import closest_of_segments, point
+from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.planes import height
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.search import edge_gap, vertex_gap
+from foldyn.mechanics.contact.tables import NORMAL
+from foldyn.mechanics.contact.vertex_triangle import vertex_triangle_tangent
+from foldyn.mechanics.dihedral import add_hessian
+
+
+@kernel
+def touching_pairs(tables, memory):
+    """Numbers of the listed pairs of either kind nearer than d0 at memory.x."""
+    x, out = memory.x, np.empty((2, memory.d0.shape[1]), np.int64)
+    found = np.zeros(2, np.int64)
+    for k in range(memory.counts.listed_first):
+        v, t = memory.pairs[0, k, 0], memory.pairs[0, k, 1]
+        if vertex_gap(tables, x, v, t) < memory.d0[0, k]:
+            out[0, found[0]] = k
+            found[0] += 1
+    for k in range(memory.counts.listed_second):
+        i, j = memory.pairs[1, k, 0], memory.pairs[1, k, 1]
+        a, b = point(x, tables.edges[i, 0]), point(x, tables.edges[i, 1])
+        c, d = point(x, tables.edges[j, 0]), point(x, tables.edges[j, 1])
+        if not closest_of_segments(a, b, c, d)[2]:
+            continue
+        if edge_gap(tables, x, i, j) < memory.d0[1, k]:
+            out[1, found[1]] = k
+            found[1] += 1
+    return out[0, : found[0]].copy(), out[1, : found[1]].copy()
+
+
+@kernel
+def pair_tangents(tables, memory, first, second, nodes, blocks):
+    """Second derivatives of some listed pairs to nodes (k, 4) and blocks (k, 12, 12)."""
+    x = memory.x
+    for k in range(first.size):
+        v, t = memory.pairs[0, first[k], 0], memory.pairs[0, first[k], 1]
+        nodes[k, 0] = v
+        for c in range(3):
+            nodes[k, 1 + c] = tables.triangles[t, c]
+        vertex_triangle_tangent(tables, x, v, t, memory.d0[0, first[k]], blocks[k])
+    for m in range(second.size):
+        k = first.size + m
+        i, j = memory.pairs[1, second[m], 0], memory.pairs[1, second[m], 1]
+        for end in range(2):
+            nodes[k, end], nodes[k, 2 + end] = tables.edges[i, end], tables.edges[j, end]
+        edge_edge_tangent(tables, x, i, j, memory.d0[1, second[m]], blocks[k])
+
+
+@kernel
+def guard_tangents(tables, x, blocks):
+    """Second derivatives (h, 4, 3, 4, 3) of the guards of hinges, and which of them act (h,)."""
+    acts = np.zeros(tables.hinge_limit.size, np.bool_)
+    points, gradient = np.empty((4, 3)), np.empty((4, 3))
+    for h in range(tables.hinge_limit.size):
+        found, limit = gradient_at(tables, x, h), tables.hinge_limit[h]
+        theta, sign = found[0], 1.0
+        if theta > math.pi:
+            theta, sign = TURN - theta, -1.0
+        if theta >= limit:
+            continue
+        acts[h] = True
+        _, f1, f2 = barrier(theta / limit)
+        for v in range(4):
+            for c in range(3):
+                points[v, c], gradient[v, c] = x[tables.hinges[h, v], c], found[1 + 3 * v + c]
+        turning, block = flat(gradient), blocks[h].reshape(12, 12)
+        for p in range(12):
+            for q in range(12):
+                block[p, q] = tables.hinge_stiffness[h] * f2 * turning[p] * turning[q]
+        add_hessian(points, gradient, sign * tables.hinge_stiffness[h] * limit * f1, blocks[h])
+    return acts
+
+
+@kernel
+def plane_tangents(tables, x, memory):
+    """Second derivatives (n, 3, 3) of the potential of planes."""
+    out = np.zeros((len(x), 3, 3))
+    for p in range(len(tables.planes)):
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            if d >= d0:
+                continue
+            stiffness = tables.stiffness * barrier(d / d0)[2]
+            for a in range(3):
+                for b in range(3):
+                    normal = tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
+                    out[i, a, b] += stiffness * normal
+    return out

@@ -1,0 +1,155 @@
+"""Laws with memory in case files, in stored results, and where they cannot go."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import ComputationError, InputError
+from foldyn.exports.creased_shell import fold_slopes
+from foldyn.viewer.fields import fields
+
+FOLD = """
+[pattern]
+kind = "simple_fold"
+a = 1.0
+b = 1.0
+dihedral = 120
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[model]
+mass = "panel"
+{law}
+[[supports]]
+nodes = [4, 5]
+axes = "xyz"
+[[supports]]
+nodes = [0, 1]
+axes = "z"
+[[loads]]
+nodes = [0, 1]
+force = [1e-3, 0, 0]
+"""
+MOTION = '[analysis]\nkind = "dynamics"\nduration = 0.05\nmethod = "rk4"\n'
+LAWS = {
+    "prony": (
+        'fold_law = { kind = "prony", ratios = [0.5, 0.2], times = [0.02, 0.3], '
+        'law = { kind = "enhanced", theta1 = 50, theta2 = 310 } }',
+        fd.Prony([0.5, 0.2], [0.02, 0.3], fd.EnhancedLinear(50.0, 310.0)),
+    ),
+    "plastic": (
+        'fold_law = { kind = "plastic", yield_moment = 1e-5, kinematic = 1e-3, law = "linear" }',
+        fd.Plastic(1e-5, kinematic=1e-3, law="linear"),
+    ),
+    "eyring": (
+        'fold_law = { kind = "eyring", barrier_moment = 1e-5, rate = 1e-3 }',
+        fd.Eyring(1e-5, 1e-3),
+    ),
+}
+
+
+def written(folder, text):
+    path = folder / "case.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_case_file_has_the_law_and_its_result_keeps_it(tmp_path, name):
+    """The motion can be computed again from what it carries, to the last bit."""
+    text, law = LAWS[name]
+    found = fd.read_case(written(tmp_path, FOLD.format(law=text) + MOTION)).run()
+    fd.save(found, tmp_path / "found.nc")
+    stored = fd.load(tmp_path / "found.nc")
+    case = fd.case_of(stored)
+    assert case.structure.fold_law == law
+    assert stored.memory.dims == ("time", "branch", "variable")
+    assert stored.memory[-1].values.any()
+    again = fd.simulate(
+        case, float(stored.duration), stored.method, float(stored.dt), int(stored.every),
+        fd.initial_state(stored, 0),
+    )  # fmt: skip
+    np.testing.assert_array_equal(again.displacement, stored.displacement)
+    np.testing.assert_array_equal(again.memory, stored.memory)
+
+
+def test_a_motion_starts_from_a_stored_state_and_its_memory(tmp_path):
+    text = FOLD.format(law=LAWS["plastic"][0])
+    first = fd.read_case(written(tmp_path, text + MOTION)).run()
+    fd.save(first, tmp_path / "first.nc")
+    text += MOTION + '[initial]\nfile = "first.nc"\n'
+    found = fd.read_case(written(tmp_path, text)).run()
+    np.testing.assert_array_equal(found.memory[0], first.memory[-1])
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ('fold_law = "prony"', "the law needs ratios and times"),
+        ('fold_law = { kind = "prony", times = 1 }', r"model\.fold_law\.ratios: missing"),
+        (
+            'fold_law = { kind = "prony", ratio = 1, times = 1 }',
+            r"model\.fold_law\.ratio: unknown key; did you mean 'ratios'",
+        ),
+        (
+            'fold_law = { kind = "prony", ratios = 1, times = 1, law = { kind = "linea" } }',
+            r"model\.fold_law\.law.*linea",
+        ),
+        ('bend_law = { kind = "prony", ratios = 1, times = 1, law = "superlinear" }', "none there"),
+        (
+            'scheme = "n5b8e"\nbend_law = { kind = "eyring", barrier_moment = 1, rate = 1 }',
+            'needs "linear"',
+        ),
+    ],
+)
+def test_faults_are_named(tmp_path, law, message):
+    text = FOLD.format(law=law) + MOTION
+    if "n5b8e" in law:
+        text = text.replace('mass = "panel"', "").replace('"rk4"', '"generalized_alpha"')
+    with pytest.raises(InputError, match=message):
+        fd.read_case(written(tmp_path, text)).run()
+
+
+def fold_case(law):
+    pattern, sheet = fd.patterns.simple_fold(dihedral=120), fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    return fd.Case(
+        fd.discretize(pattern, sheet, fold_law=law, mass="panel"),
+        [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")],
+        [fd.Force([0, 1], (1e-3, 0, 0))],
+    )
+
+
+@pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
+def test_methods_that_go_to_and_fro_refuse_creases_that_yield(method):
+    with pytest.raises(InputError, match=r"fold_law = 'plastic': yields.*\"newton\" and"):
+        fd.statics.trace(fold_case(fd.Plastic(1e-3)), method)
+
+
+def test_equilibria_of_creases_that_creep_are_refused():
+    for solve in (fd.statics.trace, lambda case: fd.modes(case, state="equilibrium")):
+        with pytest.raises(InputError, match="fold_law = 'eyring': creep goes on for ever"):
+            solve(fold_case(fd.Eyring(1e-3, 1e-3)))
+
+
+def test_exports_refuse_what_springs_cannot_do():
+    with pytest.raises(InputError, match="springs have no memory"):
+        fold_slopes(fold_case(fd.Prony(1.0, 1.0)).structure)
+
+
+def test_viewers_leave_out_what_angles_do_not_tell():
+    still = np.zeros((1, *fold_case("linear").structure.nodes.shape))
+    case = fold_case(fd.Prony(1.0, 1.0))
+    path = fd.statics.trace(case, load_factors=[0.0])
+    assert "turn" in fields(case, path, still)
+    assert "fold_moment" not in fields(case, path, still)
+
+
+def test_a_mode_that_does_not_swing_any_more_is_an_error():
+    """A dashpot a thousand times as strong as what vibrates."""
+    case = fold_case(fd.Prony(100.0, 0.02, law="linear")).altered(loads=[])
+    with pytest.raises(ComputationError, match="they damp it too much"):
+        fd.modes(case, 1)

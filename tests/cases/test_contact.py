@@ -1,0 +1,114 @@
+"""Contact as an argument: what is checked, cases in writing, case files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cases.contact import contact_from
+from foldyn.cases.document import from_document, to_document
+from foldyn.errors import InputError
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+FOLD = fd.discretize(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60), SHEET)
+PLANE = fd.Plane((0, 0, -0.1), (0, 0, 2), friction=0.4, motion=(0, 0, 0.2), history=fd.Ramp(1.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: fd.Contact(thickness=0.0), "thickness = 0"),
+        (lambda: fd.Contact(friction=-0.1), "friction = -0.1"),
+        (lambda: fd.Contact(stiffness=0.0), "stiffness = 0"),
+        (lambda: fd.Contact(panels=False), "panels: without planes nothing touches"),
+        (lambda: fd.Contact(panels=1), "panels = 1"),
+        (lambda: fd.Contact(planes=[1]), r"planes\[0\] = 1: must be a Plane"),
+        (lambda: fd.Contact(planes=PLANE), "must be a list of Plane"),
+        (lambda: fd.Plane((0, 0), (0, 0, 1)), "point = "),
+        (lambda: fd.Plane((0, 0, 0), (0, 0, 0)), "normal = "),
+        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), friction=-1), "friction = -1"),
+        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), motion=(0, 0, 1)), "both its motion"),
+        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), history=fd.Ramp(1)), "both its motion"),
+        (lambda: fd.Case(FOLD, contact=True), "contact = true: must be a Contact"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_a_case_in_writing_keeps_its_contact():
+    contact = fd.Contact(
+        thickness=0.02, friction=0.1, stiffness=5.0,
+        planes=[PLANE, fd.Plane((0, 0, 9), (0, 0, -1))],
+    )  # fmt: skip
+    document = to_document(fd.Case(FOLD, contact=contact))
+    assert document.obstacles == ()
+    assert from_document(document.sections, document.arrays).contact == contact
+    plain = to_document(fd.Case(FOLD))
+    assert "contact" not in plain.sections
+    assert from_document(plain.sections, plain.arrays).contact is None
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"thicknes": 1.0}, r"\.thicknes: unknown key; did you mean 'thickness'"),
+        ({"thickness": -1.0}, r"\.thickness = -1"),
+        ({"planes": {}}, r"\.planes = .*: must be tables"),
+        ({"planes": [{"point": [0, 0, 0]}]}, r"\.planes\[0\]\.normal: missing"),
+        ({"planes": [{"point": [0, 0, 0], "normal": "z"}]}, r"\.planes\[0\]\.normal = "),
+        (1, " = 1: must be a table"),
+    ],
+)
+def test_tables_name_what_is_wrong(table, message):
+    with pytest.raises(InputError, match=message):
+        contact_from(table)
+
+
+def test_a_case_file_has_contact(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(
+        """
+[pattern]
+kind = "simple_fold"
+a = 1.0
+b = 1.0
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1.0
+[contact]
+friction = 0.2
+[[contact.planes]]
+point = [0, 0, -0.1]
+normal = [0, 0, 1]
+motion = [0, 0, 0.2]
+history = { kind = "ramp", duration = 1.0 }
+[analysis]
+kind = "dynamics"
+method = "rk4"
+duration = 0.1
+"""
+    )
+    contact = fd.read_case(path).case().contact
+    assert contact.friction == 0.2 and contact.planes[0].motion == (0.0, 0.0, 0.2)
+    path.write_text(
+        path.read_text().replace("[contact]\nfriction = 0.2", "[contact]\nfriction = -1")
+    )
+    with pytest.raises(InputError, match=r"contact\.friction = -1"):
+        fd.read_case(path)
+
+
+def test_what_may_touch_follows_the_sheet():
+    parts = [fd.PanelSheet(panels=[1], thickness=0.02)]
+    sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0, panels=parts)
+    s = fd.discretize(fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60), sheet)
+    held = np.zeros(len(s.nodes), bool)
+    made = fd.Contact().sheets(s, held)
+    np.testing.assert_allclose(made.thickness, [0.01, 0.02])
+    assert made.stiffness == pytest.approx(0.03 * 1e6 * 0.01)
+    assert fd.Contact(thickness=0.05).sheets(s, held).thickness.tolist() == [0.05, 0.05]

@@ -1,0 +1,87 @@
+"""Cases with contact: sheets that collide, fold onto themselves, snap and slide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import foldyn as fd
+from foldyn.dynamics import driver, prepare
+
+SHEET = fd.Sheet(
+    youngs_modulus=1.219e9, poissons_ratio=0.2, thickness=0.24e-3, density=690.0,
+    length_scale_ratio=2.7,
+)  # fmt: skip
+G = 9.81
+
+
+def two_sheets() -> tuple[fd.Structure, np.ndarray]:
+    """Two free sheets above each other, askew, and the nodes of the upper one."""
+    w = 0.04
+    grid = np.array([[i * w, j * w, 0.0] for j in (0, 1) for i in (0, 1, 2)])
+    turned = grid @ np.array([[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1]]).T + [0.01, -0.01, 0.002]
+    turned[:, 2] += 0.02 * turned[:, 0]
+    faces = [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)]
+    pattern = fd.Pattern(np.vstack([grid, turned]), faces, name="two sheets")
+    s = fd.discretize(pattern, SHEET, fold_law="linear")
+    upper = np.zeros(len(s.nodes), bool)
+    upper[6:12] = upper[s.centers[2:]] = True
+    return s, upper
+
+
+def strip(panels: int = 3) -> fd.Structure:
+    """A flat strip of paper, panels 40 mm long and 50 mm wide."""
+    nodes = [[0.04 * i, 0.05 * j, 0.0] for i in range(panels + 1) for j in (0, 1)]
+    faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(panels)]
+    return fd.discretize(fd.Pattern(nodes, faces, name="strip"), SHEET, fold_law="linear")
+
+
+def folded_from_both_ends(contact: fd.Contact | None) -> fd.Case:
+    """A strip of three panels whose outer ones fold onto the middle one, which is held."""
+    return fd.Case(
+        strip(), [fd.Fix(nodes=[2, 3, 4, 5])], [fd.Actuate([0, 1], 8.0, fd.Ramp(0.25))],
+        fd.Rayleigh(alpha=20.0), contact=contact,
+    )  # fmt: skip
+
+
+def tower(force: float, contact: fd.Contact | None) -> fd.Case:
+    """The Kresling tower of the gallery, its top pushed down within 20 ms."""
+    pattern = fd.patterns.kresling(sides=6, radius=0.04, height=0.06, twist=30, storeys=1)
+    s = fd.discretize(pattern, SHEET)
+    push = fd.Force(nodes=list(range(6, 12)), vector=(0, 0, -force), history=fd.HalfSine(0.02))
+    return fd.Case(
+        s, [fd.Fix(nodes=list(range(6)))], [push], fd.Rayleigh(alpha=200.0), contact=contact
+    )
+
+
+def on_slope(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
+    """A flat strip that lies on a slope of some degrees; the slope is the x-y plane."""
+    s, a = strip(2), np.radians(angle)
+    plane = fd.Plane((0, 0, -0.4965 * SHEET.thickness), (0, 0, 1), friction=friction)
+    gravity = fd.Gravity((G * np.sin(a), 0, -G * np.cos(a)))
+    contact = fd.Contact(panels=False, planes=[plane])
+    return fd.Case(s, [], [gravity], fd.Rayleigh(alpha=alpha), contact=contact)
+
+
+def crossing(structure: fd.Structure, displacements) -> int:
+    """In how many states triangles cross."""
+    import ipctk
+
+    triangles = np.asarray(structure.triangles, np.int32)
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges = np.unique(np.sort(sides, axis=1), axis=0)
+    mesh = ipctk.CollisionMesh(np.asfortranarray(structure.nodes), edges, triangles)
+    states = [np.asfortranarray(structure.nodes + u) for u in displacements]
+    return sum(bool(ipctk.has_intersections(mesh, state)) for state in states)
+
+
+def without_step_limit(monkeypatch, case: fd.Case, *arguments, **options):
+    """A motion with contact whose steps it does not limit."""
+    with monkeypatch.context() as patch:
+        packed = driver.pack
+
+        def unlimited(*given):
+            made = packed(*given)
+            return made._replace(system=made.system._replace(touches=False))
+
+        patch.setattr(driver, "pack", unlimited)
+        return prepare(case, *arguments, **options)

@@ -1,0 +1,36 @@
+"""Histories of turns through the branches of laws with memory, and what holds for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import foldyn as fd
+from foldyn.materials.branch_switch import branch_table
+
+LAWS = {
+    "prony": fd.Prony([0.3, 0.1], [0.02, 1.0], law="linear"),
+    "plastic": fd.Plastic(0.05, isotropic=0.02, kinematic=0.1, law="linear"),
+    "eyring": fd.Eyring(0.02, 1e-3, law="linear"),
+}
+
+
+def histories(law, turns, times, start=0.0):
+    """State, moment, slope, energy and loss (b, m, 6) of each branch of a hinge with k = L = 1.
+
+    turns : (m,) rad; times : (m,) s between them; start : turn before, at rest.
+    """
+    out = []
+    for branch in law.branches(np.ones(1), np.ones(1)):
+        table = np.empty((len(turns), 6))
+        begun = np.array([start, 0.0, 0.0])
+        branch_table(
+            branch.code, branch.parameters[0], np.asarray(turns, float), np.asarray(times, float),
+            begun, table,
+        )  # fmt: skip
+        out.append(table)
+    return np.array(out)
+
+
+def moments(law, turns, times):
+    """Moments (m,), N m, of the hinge as a whole."""
+    return np.asarray(turns) + histories(law, turns, times)[:, :, 2].sum(axis=0)

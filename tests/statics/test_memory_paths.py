@@ -1,0 +1,123 @@
+"""Equilibria of structures whose laws have memory: relaxed, or yielding along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn import checks
+from foldyn.mechanics.inelastic_body import InelasticBody
+from foldyn.structures.remembering import memory
+from one_hinge import STIFFNESS, WING, moment, one_hinge, opened
+
+LIMIT, HARD = 2e-3, 5e-3  # N m and N m/rad of a hinge 1 m long
+
+
+def cycled(law, factors, turn=0.3):
+    """Path of the hinge, turned by an imposed motion of its wing."""
+    moved = fd.Impose([WING], "z", np.tan(turn))
+    return fd.statics.trace(one_hinge(law, [moved], hold=False), "displacement", factors)
+
+
+def test_paths_have_the_long_time_stiffness():
+    """They are those of the elastic part, and end relaxed."""
+    factors = [0.5, 1.0]
+    path = cycled(fd.Prony([0.5, 0.2], [0.1, 1.0], law="linear"), factors)
+    plain = cycled("linear", factors)
+    np.testing.assert_array_equal(path.reaction, plain.reaction)
+    assert path.memory.shape == (len(path.step), 2, 2)
+    assert not path.memory.any()
+    start = fd.initial_state(path)
+    held = one_hinge(path_law := fd.Prony([0.5, 0.2], [0.1, 1.0], law="linear"))
+    found = fd.simulate(held, 0.1, "rk4", dt=0.01, initial=start)
+    assert path_law.relaxes
+    np.testing.assert_allclose(moment(found), STIFFNESS * opened(path)[-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("hardening", ["isotropic", "kinematic"])
+def test_a_yielding_path_follows_the_law(hardening):
+    """M = k (theta - p) with the plastic turn of the formula; work is stored or dissipated."""
+    law = fd.Plastic(LIMIT, **{hardening: HARD}, law="linear")
+    way = np.linspace(0.0, 1.0, 61)
+    path = cycled(law, [*way, *(1.0 - 2.0 * way[1:])])
+    theta, found = opened(path), moment(path)
+    slope = STIFFNESS * HARD / (STIFFNESS + HARD)
+    first = LIMIT / STIFFNESS
+    top = int(np.argmax(theta))
+    loading = np.where(theta < first, STIFFNESS * theta, LIMIT + slope * (theta - first))[: top + 1]
+    np.testing.assert_allclose(found[: top + 1], loading, rtol=1e-7)
+    plastic = theta[top] - found[top] / STIFFNESS
+    lost = LIMIT * plastic + (0.5 * HARD * plastic**2 if hardening == "isotropic" else 0.0)
+    assert float(path.dissipated[top]) == pytest.approx(lost, rel=1e-7)
+    np.testing.assert_allclose(abs(path.memory[top, 0]), plastic, rtol=1e-7)
+    stored = path.strain_folds.values + path.dissipated.values
+    work = np.append(0.0, np.cumsum(0.5 * (found[1:] + found[:-1]) * np.diff(theta)))
+    np.testing.assert_allclose(work, stored, rtol=0, atol=2e-3 * work.max())  # trapezoids
+
+
+def test_the_work_of_closed_cycles_is_dissipated():
+    """The loop's area, by the corners of the parallelogram, in three cycles."""
+    law = fd.Plastic(LIMIT, kinematic=HARD, law="linear")
+    path = cycled(law, [1.0, *[-1.0, 1.0] * 3])
+    top = np.flatnonzero(opened(path) > 0.3 - 1e-9)
+    lost = np.diff(path.dissipated.values[top])
+    area = 4.0 * LIMIT * (0.3 - LIMIT / STIFFNESS) / (1.0 + HARD / STIFFNESS)
+    np.testing.assert_allclose(lost, area, rtol=1e-6)
+
+
+def test_a_path_goes_on_from_a_stored_point():
+    law = fd.Plastic(LIMIT, kinematic=HARD, law="linear")
+    whole = cycled(law, [1.0, 0.0])
+    moved = fd.Impose([WING], "z", np.tan(0.3))
+    case = one_hinge(law, [moved], hold=False)
+    at = int(np.flatnonzero(opened(whole) > 0.3 - 1e-9)[0])
+    state = fd.initial_state(whole, at)
+    again = fd.statics.trace(case, "displacement", [1.0, 0.0], initial=state)
+    assert moment(again)[-1] == pytest.approx(moment(whole)[-1], rel=1e-9)
+    fresh = fd.State(state.displacement)
+    forgotten = fd.statics.trace(case, "displacement", [1.0, 0.0], initial=fresh)
+    assert moment(forgotten)[-1] == pytest.approx(moment(whole)[-1], rel=1e-6)
+
+
+def test_a_sheet_yields_and_springs_back():
+    """A fold bent beyond its yield moment keeps a part of the turn without load."""
+    pattern, sheet = fd.patterns.simple_fold(1.0, 1.0, dihedral=120), fd.Sheet(1e6, 0.25, 0.01)
+    structure = fd.discretize(pattern, sheet, fold_law=fd.Plastic(1e-3, kinematic=0.002))
+    push = fd.Force([0, 1], (5.2e-3, 0, 0))
+    case = fd.Case(structure, [fd.Fix([4, 5], "xyz"), fd.Fix([0, 1], "z")], [push])
+    path = fd.statics.trace(case, "newton", [0.5, 1.0, 0.5, 0.0])
+    fold = [structure.dihedrals(u)[0][0] for u in path.displacement.values]
+    rest = structure.fold_rest[0]
+    assert abs(fold[-1] - rest) > 0.02
+    assert abs(fold[-1] - rest) < abs(fold[2] - rest)
+    assert float(path.dissipated[-1]) > 0.0
+
+
+@pytest.mark.parametrize(
+    "law",
+    [fd.Prony([0.5, 0.2], [0.1, 1.0]), fd.Plastic(1e-7, 0.01, 0.02), fd.Eyring(1e-3, 1e-3)],
+    ids=lambda law: law.name,
+)
+@pytest.mark.parametrize("model", ["bars_and_hinges", "n5b8e", "shell"])
+def test_tangents_of_bodies_with_memory_are_exact(law, model):
+    """Where hinges yield and flow within the step, dofs without mass included."""
+    pattern, sheet = (
+        fd.patterns.miura((1, 1), 0.1, 0.1, dihedral=120),
+        fd.Sheet(1e6, 0.3, 1e-3, 1.0),
+    )
+    if model == "shell":
+        structure = fd.shell(pattern, sheet, divisions=2, fold_law=law)
+    else:
+        scheme = "n5b8" if model == "bars_and_hinges" else model
+        structure = fd.discretize(pattern, sheet, scheme=scheme, fold_law=law)
+    body = structure.body
+    case = fd.Case(structure)
+    whole = InelasticBody(body, memory(case.remembering, body))
+    random = np.random.default_rng(3)
+    q0, q1 = (3e-3 * random.normal(size=body.size) for _ in range(2))
+    whole.memory.start(whole._rows(q0))
+    own = whole.memory.own
+    own.elapsed[0] = 0.1
+    assert checks.tangent_error(whole.internal, whole.tangent, q1, size=1e-3) < 1e-7
+    assert np.abs(own.moment).min() > 0.0
