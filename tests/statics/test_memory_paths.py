@@ -121,3 +121,15 @@ def test_tangents_of_bodies_with_memory_are_exact(law, model):
     own.elapsed[0] = 0.1
     assert checks.tangent_error(whole.internal, whole.tangent, q1, size=1e-3) < 1e-7
     assert np.abs(own.moment).min() > 0.0
+
+
+def test_folds_are_actuated_beside_bends_that_may_yield():
+    """Bends that do not yield are elastic, and the way is that of elastic ones."""
+    sheet, pattern = fd.Sheet(1e6, 0.25, 0.01, 1.0), fd.patterns.simple_fold(dihedral=120)
+    ends = []
+    for law in ("linear", fd.Plastic(yield_moment=1e3, law="linear")):
+        structure = fd.discretize(pattern, sheet, fold_law="linear", bend_law=law)
+        case = fd.Case(structure, [fd.Fix([0, 1, 4])], [fd.Actuate([0], 150)])
+        ends.append(fd.trace(case, method="newton", steps=4).displacement.values[-1])
+    assert np.abs(ends[0]).max() > 0.1 * pattern.size
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12 * pattern.size)

@@ -22,6 +22,7 @@ from foldyn.mechanics.inelastic import (
 from foldyn.mechanics.step_tangent import FLOOR
 from foldyn.mechanics.tangent import Sparsity, block_keys, joined
 from foldyn.mechanics.viscous import WIDTH
+from foldyn.mechanics.wrapped_body import WrappedBody
 
 
 class Memory:
@@ -84,7 +85,7 @@ class Memory:
         return rates
 
 
-class InelasticBody(Body):
+class InelasticBody(WrappedBody):
     """A body whose hinges have memory; see `mechanics.body.Body`.
 
     Parameters
@@ -95,8 +96,8 @@ class InelasticBody(Body):
     """
 
     def __init__(self, inner: Body, memory: Memory) -> None:
-        self.inner, self.memory = inner, memory
-        self.size, self.rows, self.hidden = inner.size, inner.rows, inner.hidden
+        super().__init__(inner)
+        self.memory = memory
         self.energy_groups = inner.energy_groups
         self.model = Inelastic(inner.model, memory.own)
 
@@ -105,9 +106,9 @@ class InelasticBody(Body):
         flat = np.ascontiguousarray(q, float).ravel()
         return np.pad(flat, (0, 3 * self.rows - flat.size)).reshape(-1, 3)
 
-    def dofs(self, displacement: NDArray, push: NDArray | None = None) -> NDArray:
-        """See `Body`; without what the branches do to the hidden dofs."""
-        return self.inner.dofs(displacement, push)
+    def around(self, inner: Body) -> InelasticBody:
+        """See `WrappedBody`; the branches measure from the rest angles that they have had."""
+        return InelasticBody(inner, self.memory)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`; with what the branches store."""
@@ -163,43 +164,9 @@ class InelasticBody(Body):
         """See `Body`: one thread."""
         return self.inner.workspaces(1)
 
-    # ------------------------------------------------------------------ measures
-    def angles(self, q: NDArray) -> NDArray:
-        """See `Body`."""
-        return self.inner.angles(q)
-
-    def turn(self, q: NDArray, other: NDArray) -> float:
-        """See `Body`."""
-        return self.inner.turn(q, other)
-
-    def scale(self) -> NDArray:
-        """See `Body`."""
-        return self.inner.scale()
-
-    def longest(self) -> float:
-        """See `Body`."""
-        return self.inner.longest()
-
-    def turning_moments(self) -> float:
-        """See `Body`."""
-        return self.inner.turning_moments()
-
-    def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Body`."""
-        return self.inner.holds(q)
-
-    @property
-    def rest_angles(self) -> NDArray:
-        """See `Body`; laws that flow measure from them, and `folded` leaves them as they are."""
-        return self.inner.rest_angles
-
-    def turned(self) -> tuple[NDArray, NDArray]:
-        """See `Body`."""
-        return self.inner.turned()
-
     def nominal(self, q: NDArray) -> Body:
         """See `Body`: of the elastic parts, with the slopes of the branches."""
-        return InelasticBody(self.inner.nominal(q), self.memory)
+        return self.around(self.inner.nominal(q))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `Body`: of the elastic parts."""
