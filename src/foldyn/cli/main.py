@@ -19,6 +19,7 @@ from foldyn.cli.convert import add_convert, convert
 from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
+from foldyn.cli.lasting import lasting
 from foldyn.cli.options import add_figures, add_film, add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
@@ -227,7 +228,8 @@ def _call(given: argparse.Namespace) -> None:
     elif given.command in OTHERS:
         OTHERS[given.command](given)
     else:
-        from foldyn.cli.run import run
+        with lasting():
+            from foldyn.cli.run import run
 
         run(given)
 
