@@ -111,7 +111,8 @@ def test_a_restart_is_the_same_motion_bit_by_bit(name, method, tmp_path):
         np.testing.assert_array_equal(again[variable].values, whole[variable].values[8:])
 
 
-def test_a_restart_of_an_implicit_method_goes_on():
+def test_a_restart_amid_a_motion_of_an_implicit_method_is_near():
+    """At its ends it is exact (`test_continued`); between them memory is what matters."""
     case, steps = pushed(PRONY), {"dt": 2.0**-9, "every": 64}
     whole = fd.simulate(case, 2.0, "generalized_alpha", **steps)
     again = fd.simulate(

@@ -10,7 +10,7 @@ from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes, select
-from foldyn.cases.state import State
+from foldyn.cases.state import Continuation, State
 from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "BaseMotion",
     "Case",
     "Contact",
+    "Continuation",
     "CreaseDamping",
     "Dashpot",
     "Fix",

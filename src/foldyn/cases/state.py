@@ -4,10 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.values import brief, choice, numbers
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Continuation:
+    """What an implicit method needs beside a state to go on as if it had not been stopped.
+
+    Parameters
+    ----------
+    method : str
+        The method.
+    values : ndarray, shape (k,)
+        Its own numbers; those of the displacement come first.
+    """
+
+    method: str
+    values: NDArray
 
 
 @brief
@@ -25,11 +42,16 @@ class State:
         State of the branches of laws with memory, as results have it (`memory`). "fresh": every
         hinge has just come from its rest angle. By default those of the law `prony` have had the
         time to relax there, all others are fresh.
+    continuation : Continuation, optional
+        With which a motion goes on exactly from the end of another one; `initial_state` takes it
+        from the result. It serves the same method where the state and the forces are those of the
+        end; otherwise the motion starts as without it.
     """
 
     displacement: ArrayLike | None = None
     velocity: ArrayLike | None = None
     memory: ArrayLike | str | None = None
+    continuation: Continuation | None = None
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -47,5 +69,10 @@ class State:
             choice("memory", self.memory, ("fresh",))
         elif self.memory is not None:
             object.__setattr__(self, "memory", numbers("memory", self.memory))
+        if not isinstance(self.continuation, Continuation | None):
+            raise InputError(
+                f"continuation: got {type(self.continuation).__name__}; it comes from "
+                "fd.initial_state(result)"
+            )
         if len(shapes) == 2:
             raise InputError("displacement and velocity: must have the same shape")

@@ -217,9 +217,8 @@ def prepare(
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
     sampler = Sampler(case, sample or {}, u, v, plan.start, contact_quantities(case))
-    return Motion(
-        case, integrator, plan, critical, force, (u, v, remembered), packed, sampler, reason
-    )
+    state = u, v, remembered, initial.continuation if initial else None
+    return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason)
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:

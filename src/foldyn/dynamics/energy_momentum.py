@@ -14,6 +14,8 @@ Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,6 +66,15 @@ class EnergyMomentum(Scheme):
         """See `Scheme`."""
         super().accept(h)
         self._before = h
+
+    def state(self) -> list[NDArray]:
+        """See `Scheme`."""
+        return [*super().state(), np.array([self._before])]
+
+    def resume(self, state: Sequence[NDArray]) -> None:
+        """See `Scheme`."""
+        super().resume(state)
+        self._before = float(state[-1][0])
 
     def weights(self, h: float) -> Weights:
         """See `Scheme`."""

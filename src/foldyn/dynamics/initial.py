@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
-from foldyn.cases import Case, State
+from foldyn.cases import Case, Continuation, State
 from foldyn.cases.constraints import AGREES
 from foldyn.cases.ties import check_tied
 from foldyn.dynamics.actuation import turn
@@ -21,6 +21,7 @@ from foldyn.dynamics.timing import histories
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
 from foldyn.results.contents import check_variable
+from foldyn.results.quantities import CONTINUATIONS
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
@@ -57,7 +58,18 @@ def initial_state(result: Any, at: int = -1) -> State:
         state["memory"] = check_variable(
             sample, "memory", ("branch", "variable"), place="initial_state: "
         ).to_numpy()
-    return State(**state)
+    return State(**state, continuation=_continuation(sample) if "time" in sample else None)
+
+
+def _continuation(sample: Any) -> Continuation | None:
+    """What an implicit method has stored with a sample, at either end of a motion."""
+    for name in CONTINUATIONS:
+        if name in sample:
+            found = check_variable(sample, name, ("continued",), place="initial_state: ")
+            method, time = found.attrs.get("method"), found.attrs.get("time")
+            if isinstance(method, str) and time == float(sample["time"]):
+                return Continuation(method, found.to_numpy())
+    return None
 
 
 def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
@@ -184,12 +196,13 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
 
 
 def begin(
-    case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None, plan: StepPlan,
-    packed: Packed,
+    case: Case, u: NDArray, v: NDArray, remembered: NDArray | str | None,
+    continued: Continuation | None, plan: StepPlan, packed: Packed,
 ) -> Course:  # fmt: skip
     """State of the integrators at the start of a motion with displacement u and velocity v.
 
     remembered : that of hinges with memory, see `Memory.start`.
+    continued : where dofs beside displacements begin, if it is known.
     """
     body, system, mass, callbacks, by = packed
     s = scratch(system)
@@ -222,6 +235,8 @@ def begin(
             turn(body.model, system.actuators, s.factor)
         push = following_force(system.following, inward.ravel(), s.factor)
         inward.ravel()[body.hidden] = body.dofs(by.inward(u)[: len(u)], push)[body.hidden]
+        if continued is not None and len(continued.values) > inward.size:
+            inward.ravel()[body.hidden] = continued.values[body.hidden]
     if body.memory is not None:
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited, energy_scale, relative_errors
 from foldyn.dynamics.course import Outcome, Samples, StepPlan, samples
 from foldyn.dynamics.initial import begin
@@ -59,8 +59,8 @@ class Motion:
 
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
-        state: tuple[NDArray, NDArray, NDArray | str | None], packed: Packed, sampler: Sampler,
-        reason: str = "",
+        state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
+        sampler: Sampler, reason: str = "",
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
@@ -101,6 +101,13 @@ class Motion:
         return self._written()
 
     @property
+    def _origin(self) -> str:
+        """From what the motion started."""
+        if isinstance(self._engine, Implicit) and self._engine.continues:
+            return "end of a motion"
+        return "rest" if self.at_rest else "state"
+
+    @property
     def _branches(self) -> int:
         """Number of the branches of laws with memory."""
         memory = self._packed.body.memory
@@ -125,6 +132,9 @@ class Motion:
         began = None
         try:
             engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
+            continued = self._state[3]
+            if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
+                engine.go_on_from(continued.values)
             while True:
                 done = int(course.tally.steps)
                 stretch = min(length, recheck - done % recheck)
@@ -160,6 +170,16 @@ class Motion:
             ) from None
         finally:
             close()
+
+    def _continuations(self) -> dict[str, Continuation]:
+        """What an implicit method went on from, and needs to go on if it stands at a sample."""
+        engine, time, found = self._engine, self._written().time, {}
+        if isinstance(engine, Implicit) and len(time) and self._packed.callbacks.error is None:
+            if self._state[3] and engine.continues:
+                found["continued_from"] = self._state[3]
+            if float(self._course.tally.time) == time[-1]:
+                found["continuation"] = Continuation(self.method.name, engine.continuation())
+        return found
 
     def _sample(self) -> None:
         """Evaluate what the user samples at the samples that are new."""
@@ -296,7 +316,7 @@ class Motion:
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
             self._statistics(), self._sampler.columns(self.stored),
-            out.memory if self._branches else None,
+            out.memory if self._branches else None, self._continuations(),
         )  # fmt: skip
         return crossings.recorded(result)
 
@@ -317,7 +337,7 @@ class Motion:
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
             "energy_error": float(relative_errors(self._written().energy).max(initial=0.0)),
-            "started_from": "rest" if self.at_rest else "state",
+            "started_from": self._origin,
         }
         if self.reason:
             facts["method_reason"] = self.reason

@@ -64,7 +64,7 @@ class Memory:
         """The last accepted step, to `recall`."""
         return tuple(array.copy() for array in self._kept)
 
-    def recall(self, snapshot: tuple[NDArray, ...]) -> None:
+    def recall(self, snapshot: Sequence[NDArray]) -> None:
         """Go back to an accepted step."""
         for array, kept in zip(self._kept, snapshot, strict=True):
             array[:] = kept

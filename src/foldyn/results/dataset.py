@@ -10,11 +10,12 @@ import tomli_w
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.cases import HISTORIES, Case
+from foldyn.cases import HISTORIES, Case, Continuation
 from foldyn.cases.document import Document, pattern_document, to_document
 from foldyn.patterns import Pattern
 from foldyn.results.attributes import facts, own_attributes
 from foldyn.results.quantities import (
+    CONTINUATIONS,
     CROSSINGS,
     ESTIMATES,
     FIDELITY,
@@ -51,7 +52,7 @@ DOCUMENT: Mapping[str, tuple[str, ...]] = {
 """Variables of the case, which every result has, with their dimensions; other tables have one of
 their own."""
 TAKEN = frozenset(
-    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis"}
+    {*MOTION, *CROSSINGS, *DOCUMENT, "time", "node", "axis", *CONTINUATIONS}
     | {"support", "support_node", "support_axis"}
 )
 """Names that every motion has."""
@@ -68,6 +69,7 @@ def trajectory_dataset(
     statistics: Mapping[str, Any],
     sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
     memory: ArrayLike | None = None,
+    continuations: Mapping[str, Continuation] | None = None,
 ) -> xr.Dataset:
     """Dataset of a motion, which carries its own case.
 
@@ -90,6 +92,9 @@ def trajectory_dataset(
         What the user has added.
     memory : array_like, shape (nt, b, 2), optional
         State of the branches of laws with memory.
+    continuations : mapping of str to Continuation, optional
+        What the method needs to go on from the last sample, `continuation`, and what it had at the
+        first, `continued_from`.
 
     Returns
     -------
@@ -108,6 +113,10 @@ def trajectory_dataset(
     if memory is not None:
         values["memory"] = memory
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
+    for name, one in (continuations or {}).items():
+        own = {"method": one.method, "time": float(time[-1 if name == "continuation" else 0])}
+        along, numbers, text = variable(("continued",), one.values, "", CONTINUATIONS[name])
+        data[name] = along, numbers, text | own
     histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads))
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
     times = stage_times(statistics) if called else None

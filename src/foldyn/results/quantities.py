@@ -51,6 +51,11 @@ MOTION: Mapping[str, Quantity] = STATE | {
     "work": Quantity("J", "work of the loads since the start"),
     "memory": MEMORY,
 }
+CONTINUATIONS: Mapping[str, str] = {
+    "continuation": "what the method needs beside to go on from the last sample",
+    "continued_from": "with what the method went on from another motion at the first sample",
+}
+"""What motions of implicit methods have besides, along the dimension continued."""
 PATH: Mapping[str, Quantity] = STATE | {
     "work": Quantity("J", "work of loads, supports and actuators since the first point"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),

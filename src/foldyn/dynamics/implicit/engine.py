@@ -18,9 +18,10 @@ from foldyn.algebra.banded import one_thread
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
-from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Newton, Scheme
+from foldyn.dynamics.implicit.newton import Newton
+from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.system import Packed, acceleration
+from foldyn.dynamics.system import Packed, accelerate, acceleration
 from foldyn.jit.compiled import kernel
 
 SAME_TIME = 1e-9  # of a step: times as near as that are one
@@ -34,6 +35,9 @@ WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kep
 NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
 LEAST = 0.2  # share of a refused step that is tried next, at least
 MEMORY = 0.9  # share of an error that counts a step later
+SAME_STATE = 1e-9  # relative difference of states and forces that are one
+# what is measured along a motion and counts for the next step
+MEASURED = ("wanted", "last", "error", "farthest")
 OUTCOMES = {SOLVED: Outcome.DONE, NOT_FINITE: Outcome.NOT_FINITE}
 
 
@@ -49,6 +53,11 @@ class Implicit:
     plan : StepPlan
     jumps : tuple of float
         Times (s), in order, at which loads jump: steps end there, so that no step sees a jump.
+
+    Attributes
+    ----------
+    continues : bool
+        Whether it goes on from the end of another motion.
     """
 
     threads = 1
@@ -63,6 +72,8 @@ class Implicit:
         self._newton = Newton(self._scheme, self._matrix)
         self._halved = 0
         self._horizon = 0.0  # s in which a vibration moves on
+        self._end: NDArray | None = None
+        self.continues = False
 
     def facts(self) -> dict[str, Any]:
         """Statistics of the run."""
@@ -72,6 +83,69 @@ class Implicit:
             "linear_solver": self._matrix.solver,
             "halved_steps": self._halved,
         }
+
+    def continuation(self) -> NDArray:
+        """All numbers (k,) on which the next steps depend; see `go_on_from`."""
+        state = [*self._state(), self._acceleration()]
+        return np.concatenate([array.ravel() for array in state])
+
+    def go_on_from(self, values: NDArray) -> None:
+        """Have the motion go on as that one did whose end has these numbers.
+
+        Its displacement, its velocity and the acceleration that follows from them must be those of
+        that end: otherwise somebody has changed the state or the case, and it goes on from its own
+        start. `continues` tells which, after the first sample.
+        """
+        self._end = values
+
+    def _resume(self, values: NDArray) -> bool:
+        """See `go_on_from`; tells whether it is the same motion."""
+        scheme, old, tally = self._scheme, self._scheme.old, self._course.tally
+        own = [*self._state(), old.a]
+        if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
+            return False
+        parts = np.split(values, np.cumsum([array.size for array in own])[:-1])
+        state = [part.reshape(array.shape) for part, array in zip(parts, own, strict=True)]
+        nodes = len(self._packed.system.order)
+        if not _same(old.q[:nodes], state[0][:nodes]) or not _same(old.w[:nodes], state[1][:nodes]):
+            return False
+        old.q[:], old.w[:] = state[:2]
+        scheme.begin(self._plan.start)
+        if not _same(old.a, state[-1]):
+            old.q[:], old.w[:] = own[:2]
+            scheme.begin(self._plan.start)
+            return False
+        counted = len(scheme.state())
+        memory, factor = self._packed.body.memory, old.factor.copy()
+        snapshot = None if memory is None else memory.snapshot()
+        with one_thread():
+            self._newton.resume(state[counted + 2 : -1])
+        if memory is not None:
+            memory.recall(snapshot)
+        old.factor[:] = factor
+        scheme.resume(state[:counted])
+        self._course.angle[:] = state[counted]
+        *measured, self._horizon = state[counted + 1]
+        for name, value in zip(MEASURED, measured, strict=True):
+            tally[name] = value
+        return True
+
+    def _acceleration(self) -> NDArray:
+        """Acceleration (n, 3) where the motion stands, of nodes with mass."""
+        memory, out = self._packed.body.memory, np.zeros_like(self._scheme.old.a)
+        if memory is not None:
+            memory.still()
+        old, t = self._scheme.old, float(self._course.tally.time)
+        work, scratch = self._scheme.work, self._scheme.scratch
+        accelerate(*self._packed.arrays, old.q, old.w, t, out, work, scratch)
+        out[self._scheme.massless] = 0.0
+        return out
+
+    def _state(self) -> list[NDArray]:
+        """What the next steps depend on, beside the case and the time."""
+        measured = [float(self._course.tally[name]) for name in MEASURED]
+        course = [self._course.angle.copy(), np.array([*measured, self._horizon])]
+        return [*self._scheme.state(), *course, *self._newton.state()]
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
@@ -105,6 +179,7 @@ class Implicit:
         self._newton.prepare(plan.dt, plan.start)
         if self._packed.body.memory is not None:
             self._packed.body.memory.still()
+        self.continues = self._end is not None and self._resume(self._end)
         return self._sample(plan.start, out)
 
     def _impulse_lasts(self) -> float:
@@ -147,6 +222,8 @@ class Implicit:
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
             part, stop, jump = _divide(t, goal, h, jump)
+            if abs(part - plan.dt) <= SAME_TIME * plan.dt:
+                part = plan.dt  # without the rounding of the times
             outcome, hinge = self._attempt(part, stop, jump)
             if outcome == Outcome.DONE:
                 self._accept(part, stop, jump)
@@ -270,6 +347,10 @@ class Implicit:
             times_mass(self._packed.mass, scheme.weights(h).mass * change, scheme.out)
             error = max(error, _largest(matrix.solve(scheme.out, scheme.step)) / reference)
         return error / plan.tolerance, scale
+
+
+def _same(now: NDArray, then: NDArray) -> bool:
+    return _largest(now - then) <= SAME_STATE * _largest(then)
 
 
 def _next_step(h: float, error: float) -> float:

@@ -1,21 +1,14 @@
-"""What an implicit scheme provides, and Newton's method for the end of a step.
-
-The matrix is made anew in each iteration, unless the residual falls fast with the last one: panels
-that turn within a step move the directions of their stiff bars, and with the old directions the
-iteration soon converges slowly or not at all. Iterations whose matrix is kept cost a force and a
-substitution each.
-"""
+"""What an implicit scheme provides, and how Newton's method judges what is left of a residual."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
@@ -25,8 +18,6 @@ from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
 
 EPS = float(np.finfo(float).eps)
-MOST = 25  # iterations
-SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
 GROWTH = 1e8  # of the residual, at which the iteration has lost its way
 # what is left where the residual no longer falls: rounding, if it is below one of these
@@ -223,6 +214,39 @@ class Scheme(ABC):
         ahead = 0.5 * (h + self._last)
         self.shift[:] = h * (self._speed + ahead * self._growth)
 
+    def state(self) -> list[NDArray]:
+        """What the next step depends on, beside the case and the time; q, w and a come first."""
+        old = self.old
+        return [
+            array.copy()
+            for array in (old.q, old.w, old.a, self._speed, self._growth, np.array([self._last]))
+        ]
+
+    def resume(self, state: Sequence[NDArray]) -> None:
+        """Go on from a state, after `begin` at its displacement and velocity."""
+        own = (self.old.q, self.old.w, self.old.a, self._speed, self._growth)
+        for array, kept in zip(own, state, strict=False):
+            array[:] = kept
+        self._last = float(state[len(own)][0])
+
+    def origin(self) -> tuple[NDArray, ...]:
+        """From what `tangent` makes the matrix after `residual`, beside the step and the case."""
+        own, memory = self, self.packed.body.memory
+        kept = () if memory is None else memory.snapshot()
+        arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.course.angle)
+        return tuple(array.copy() for array in (*arrays, *kept))
+
+    def back(self, h: float, origin: Sequence[NDArray]) -> None:
+        """Go back to where the matrix of a step h (s) was made; `resume` leads on from there."""
+        q, factor, shift, ahead, angle, *kept = origin
+        old, memory, s = self.old, self.packed.body.memory, self.scratch
+        if memory is not None:
+            memory.recall(kept)
+        old.q[:], old.factor[:], self.shift[:], self.course.angle[:] = q, factor, shift, angle
+        s.factor[:], s.time[0] = ahead, 0.0  # evaluated as if for this time
+        self.residual(h, 0.0)
+        s.time[0] = np.nan
+
     def accept(self, h: float) -> None:
         """Make the end of a step h (s) the beginning of the next one."""
         speed = self.shift / h
@@ -231,69 +255,6 @@ class Scheme(ABC):
         for old, new in zip(self.old, self.new, strict=True):
             old[:] = new
         self.folds[:] = self.work.fold_angle
-
-
-class Newton:
-    """Newton's method with the matrix that it keeps from one step to the next."""
-
-    def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
-        self.scheme, self.matrix = scheme, matrix
-        self.iterations = 0
-        self.evaluations = 0
-        self._h = 0.0  # of the last factorization
-        self._lasting = False  # whether a matrix served a whole step: the next one begins with it
-
-    def prepare(self, h: float, t: float) -> None:
-        """Have everything compiled that a step needs."""
-        scheme = self.scheme
-        scheme.shift[:] = 0.0
-        scheme.residual(h, t)
-        scheme.tangent(self.matrix, scheme.displacement(), False)
-        scheme.works(h)
-
-    def renew(self, h: float) -> bool:
-        """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
-        self.scheme.tangent(self.matrix, self.scheme.displacement(), False)
-        try:
-            self.matrix.factorize(self.scheme.weights(h))
-        except SingularTangentError:
-            return False
-        self._h = h
-        return True
-
-    def solve(self, h: float, t: float) -> int:
-        """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
-
-        Returns `SOLVED`, or why not.
-        """
-        scheme, matrix = self.scheme, self.matrix
-        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
-        kept = self._lasting and abs(h - self._h) < SAME_STEP * h
-        last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
-        before, again = scheme.displacement().copy(), False
-        while left > 0:
-            verdict, norm, steps = scheme.iterate(matrix, goal, h, t, last, lowest, left)
-            self.iterations += steps
-            self.evaluations += steps + 1
-            left, again = left - steps, again or steps > 0
-            if verdict != NEW_MATRIX:
-                self._lasting = verdict == SOLVED and matrix.factorizations <= made + 1
-                return verdict
-            lowest = min(lowest, norm)
-            if again:
-                before = scheme.carried(scheme.earlier, scheme.new.factor)
-            scheme.tangent(matrix, before, again)
-            try:
-                matrix.factorize(scheme.weights(h))
-            except SingularTangentError:
-                break
-            self._h, last, again = h, norm, True
-            scheme.earlier[:] = scheme.new.q
-            scheme.shift -= matrix.solve(scheme.out, scheme.step)
-            self.iterations += 1
-            left -= 1
-        self._lasting = False
-        return NOT_CONVERGED
 
 
 @kernel

@@ -1,0 +1,104 @@
+"""Newton's method for the end of a step.
+
+The matrix is made anew in each iteration, unless the residual falls fast with the last one: panels
+that turn within a step move the directions of their stiff bars, and with the old directions the
+iteration soon converges slowly or not at all. Iterations whose matrix is kept cost a force and a
+substitution each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.algebra.superlu import SingularTangentError
+from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.scheme import NEW_MATRIX, NOT_CONVERGED, SOLVED, Goal, Scheme
+
+MOST = 25  # iterations
+SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
+
+
+class Newton:
+    """Newton's method with the matrix that it keeps from one step to the next."""
+
+    def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
+        self.scheme, self.matrix = scheme, matrix
+        self.iterations = 0
+        self.evaluations = 0
+        self._h = 0.0  # of the last factorization
+        self._origin: tuple[NDArray, ...] = ()
+        self._lasting = False  # whether a matrix served a whole step: the next one begins with it
+
+    def prepare(self, h: float, t: float) -> None:
+        """Have everything compiled that a step needs."""
+        scheme = self.scheme
+        scheme.shift[:] = 0.0
+        scheme.residual(h, t)
+        scheme.tangent(self.matrix, scheme.displacement(), False)
+        scheme.works(h)
+
+    def renew(self, h: float) -> bool:
+        """Make the matrix of a step h (s) from its start; tells whether it could be factorized."""
+        try:
+            self._make(h, self.scheme.displacement(), False)
+        except SingularTangentError:
+            return False
+        return True
+
+    def _make(self, h: float, before: NDArray, again: bool) -> None:
+        """Make the matrix of a step h (s); see `Scheme.tangent`."""
+        self._origin = ()
+        self.scheme.tangent(self.matrix, before, again)
+        self.matrix.factorize(self.scheme.weights(h))
+        self._h, self._origin = h, (np.array([h, again]), before.copy(), *self.scheme.origin())
+
+    def state(self) -> list[NDArray]:
+        """What the next step depends on: from what its first matrix was made, if that is kept."""
+        kept = self._lasting and len(self._origin) > 0
+        rest = (np.zeros(2), self.scheme.shift, *self.scheme.origin())
+        origin = self._origin if kept else [np.zeros_like(array) for array in rest]
+        return [np.array([float(kept)]), *origin]
+
+    def resume(self, state: Sequence[NDArray]) -> None:
+        """Make the matrix of a state again, from what it was made: the scheme moves there."""
+        (kept,), (h, again), before, *origin = state
+        if kept:
+            self.scheme.back(h, origin)
+            self._make(h, before, bool(again))
+        self._lasting = bool(kept)
+
+    def solve(self, h: float, t: float) -> int:
+        """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
+
+        Returns `SOLVED`, or why not.
+        """
+        scheme, matrix = self.scheme, self.matrix
+        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
+        kept = self._lasting and abs(h - self._h) < SAME_STEP * h
+        last, lowest, left, made = np.inf if kept else 0.0, np.inf, MOST, matrix.factorizations
+        before, again = scheme.displacement().copy(), False
+        while left > 0:
+            verdict, norm, steps = scheme.iterate(matrix, goal, h, t, last, lowest, left)
+            self.iterations += steps
+            self.evaluations += steps + 1
+            left, again = left - steps, again or steps > 0
+            if verdict != NEW_MATRIX:
+                self._lasting = verdict == SOLVED and matrix.factorizations <= made + 1
+                return verdict
+            lowest = min(lowest, norm)
+            if again:
+                before = scheme.carried(scheme.earlier, scheme.new.factor)
+            try:
+                self._make(h, before, again)
+            except SingularTangentError:
+                break
+            last, again = norm, True
+            scheme.earlier[:] = scheme.new.q
+            scheme.shift -= matrix.solve(scheme.out, scheme.step)
+            self.iterations += 1
+            left -= 1
+        self._lasting = False
+        return NOT_CONVERGED
