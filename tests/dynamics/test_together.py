@@ -41,10 +41,35 @@ def on(monkeypatch, threads, what, method, **options):
     return ds
 
 
+def shaken(structure):
+    """The case on a base that moves, its tip pulled aside."""
+    tip = len(structure.pattern.vertices) - 1
+    ramp = fd.Ramp(1.0, smooth=True)
+    moves = [fd.BaseMotion("z", fd.Harmonic(0.5), 1e-3), fd.Impose([tip], "x", 2e-3, ramp)]
+    plain = case(structure)
+    return fd.Case(structure, [*plain.supports, *moves], plain.loads, plain.damping)
+
+
+def folding(structure):
+    """The case with all creases turned."""
+    turned = fd.Actuate("all", fraction=0.02, history=fd.Ramp(1.0, smooth=True))
+    plain = case(structure)
+    return fd.Case(structure, plain.supports, [*plain.loads, turned], plain.damping)
+
+
+KINDS = {
+    "plain": lambda: case(),
+    "moved": lambda: shaken(sheet()),
+    "turned": lambda: folding(sheet()),
+    "consistent mass": lambda: shaken(sheet(mass="consistent")),
+}
+
+
 @pytest.mark.parametrize("threads", [2, 3])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("method", METHODS)
-def test_threads_share_a_motion(monkeypatch, method, threads):
-    what = case()
+def test_threads_share_a_motion(monkeypatch, method, kind, threads):
+    what = KINDS[kind]()
     dt = 0.5 * fd.critical_step(what, method)
     options = {"duration": STEPS * dt, "dt": dt, "every": 7}
     alone = on(monkeypatch, 1, what, method, **options)
@@ -66,15 +91,12 @@ def test_small_structures_and_what_cannot_be_shared_run_on_one_thread(monkeypatc
     plain = case()
     tip = len(plain.structure.pattern.vertices) - 1
     assert threads_of(pack(plain, 1e-4)) == 2
-    lift = fd.Impose(nodes=[tip], axis="z", value=0.1, history=fd.Ramp(1.0))
     called = fd.Force(nodes=[tip], vector=(0, 0, 1.0), history=lambda t: 1.0)
-    turned = fd.Actuate(creases="all", angle=100, history=fd.Ramp(1.0))
     s = plain.structure
     for other in (
-        fd.Case(s, [fd.Fix(nodes=range(5)), lift]),
         case(s, [called]),
-        case(s, [turned]),
-        case(sheet(mass="consistent")),
+        case(s, [fd.Pressure(1.0)]),
+        fd.Case(s, [fd.Fix(nodes=range(5)), fd.Link([tip - 1, tip], axes="z")]),
     ):
         assert threads_of(pack(other, 1e-4)) == 1
     small = fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.25, 0.01, 1000.0), preset="herkal")

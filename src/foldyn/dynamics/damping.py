@@ -99,18 +99,17 @@ def drag_power(damping, kinetic):
 
 
 @inner
-def drag_works(damping, mass, moved_mass, h, before, after, velocity, product):
+def drag_works(damping, mass, moved_mass, h, before, after, velocity):
     """Work of moving supports against drag in a step of h, and what drag takes in all, J.
 
     velocity : (n, 3), the mean in the step without that of supports.
     before, after : (h, 3) factors of the histories at its ends.
-    product : (n, 3), scratch.
     """
     if damping.alpha == 0.0:
         return 0.0, 0.0
     carried = moving_energy(moved_mass, before) + moving_energy(moved_mass, after)
     carried *= damping.alpha * h
-    kinetic = kinetic_energy(mass, velocity, product, (0, velocity.shape[0]))
+    kinetic = kinetic_energy(mass, velocity, (0, velocity.shape[0]))
     taken = 2.0 * damping.alpha * h * kinetic
     return carried, taken + carried
 

@@ -207,7 +207,7 @@ def _works(system, mass, h, old, new, shift, s):
         du[i] = flat(shift)[i]
         speed[i] = 0.5 * (flat(old.w)[i] + flat(new.w)[i])
     done, lost = drag_works(
-        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.moving, s.product
+        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.moving
     )
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]

@@ -221,7 +221,7 @@ def _works(system, mass, h, old, new, shift, s):
         du[i] = flat(shift)[i]
         flat(s.velocity)[i] = 0.5 * (v0[i] + v1[i])
     done, lost = drag_works(
-        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity, s.product
+        system.damping, mass, system.moved_mass, h, old.factor, new.factor, s.velocity
     )
     for k in range(moved.dof.size):
         dof, row = moved.dof[k], moved.row[k]

@@ -161,11 +161,18 @@ def substitute(m, r, a, scratch):
 
     scratch holds n numbers, 3 n where there are constraints.
     """
+    solve_mass(m, r, a, scratch, 0, 1)
+
+
+@inner
+def solve_mass(m, r, a, scratch, member, members):
+    """The same by one of several threads, which share the axes; one alone with constraints."""
     if m.ties.slave.size > 0:
         _substitute_tied(m, flat(r), flat(a), scratch)
         return
-    a[:] = 0.0
-    for c in range(3):
+    for c in range(member, 3, members):
+        for i in range(a.shape[0]):
+            a[i, c] = 0.0
         k = m.factor_of_axis[c]
         first = m.start[k]
         count = m.start[k + 1] - first
@@ -228,17 +235,15 @@ def moving_energy(mass, factor):
 
 
 @inner_scalar
-def kinetic_energy(m, v, product, own):
-    """v M v / 2 (J) of the nodes own[0] to own[1], of all if the matrix is not diagonal.
-
-    v : (n, 3).
-    product : (n, 3), scratch, used if the matrix is not diagonal.
-    """
+def kinetic_energy(m, v, own):
+    """v M v / 2 (J), the part of the nodes own[0] to own[1]; v (n, 3)."""
     if m.lumped:
         return 0.5 * _lumped_sum(m.diagonal[own[0] : own[1]], v[own[0] : own[1]])
     total = 0.0
-    times_mass(m, v, product)
-    for i in range(v.shape[0]):
+    for i in range(own[0], own[1]):
         for c in range(3):
-            total += v[i, c] * product[i, c]
+            product = 0.0
+            for p in range(m.indptr[i], m.indptr[i + 1]):
+                product += m.data[p] * v[m.indices[p], c]
+            total += v[i, c] * product
     return 0.5 * total

@@ -78,15 +78,13 @@ class Compiled:
 def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
-    One where something would have to be done by each of them: functions of the user, moving
-    supports, actuated folds, loads that depend on the displacement, dampers, contact, the
-    substitutions of a consistent mass matrix.
+    One where something would have to be done by each of them: functions of the user, loads that
+    depend on the displacement, dampers, contact, constraints.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
-    alone = system.moves or system.turns or system.follows or called or system.damping.follows
-    alone = alone or system.touches
-    return 1 if alone or not packed.mass.lumped else packed.body.threads
+    alone = system.follows or called or system.damping.follows or system.touches
+    return 1 if alone or len(system.ties.slave) else packed.body.threads
 
 
 class Integrator(NamedTuple):

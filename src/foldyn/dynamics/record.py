@@ -36,7 +36,7 @@ def record(model, system, mass, q, w, a, tally, work, s, displacement, velocity,
         for k in range(system.supported.size):
             reaction[k] = product[system.supported[k]] + force[system.supported[k]]
     groups = s.energy.size
-    energy[groups] = kinetic_energy(mass, s.velocity, s.product, (0, s.velocity.shape[0]))
+    energy[groups] = kinetic_energy(mass, s.velocity, (0, s.velocity.shape[0]))
     times_mass(mass, s.velocity, s.product)
     if tied:
         add_reactions(system.ties.reactions, product, system.damping.alpha, reaction)

@@ -19,7 +19,7 @@ from scipy import sparse
 from foldyn.cases import Case, History
 from foldyn.cases.waveforms import Callbacks, Waveforms, evaluate
 from foldyn.cases.waveforms import pack as pack_waveforms
-from foldyn.dynamics.actuation import Actuators, actuator_power, actuators, turn
+from foldyn.dynamics.actuation import Actuators, actuators, power_of_part, turn_part
 from foldyn.dynamics.damping import (
     Damping,
     add_dampers,
@@ -36,6 +36,7 @@ from foldyn.dynamics.inertia import (
     kinetic_energy,
     lightness,
     moving_energy,
+    solve_mass,
     substitute,
     times_mass,
 )
@@ -89,7 +90,7 @@ class System(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of one evaluation of the equation of motion.
 
-    Threads share it but for the histories, the range of the loads and the powers.
+    Threads share it but for the histories, the powers, `line`, and what is on their own nodes.
     """
 
     force: NDArray  # (n, 3) F_int + beta K0 v - p
@@ -102,7 +103,9 @@ class Scratch(NamedTuple):
     velocity: NDArray  # (n, 3) v likewise
     moving: NDArray  # (n, 3) acceleration with that of the supports, at samples
     stage: NDArray  # (3, n, 3) for methods of several stages
-    loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes
+    loads: NDArray  # (2,) first and last + 1 of the loads on the thread's own nodes,
+    moved: NDArray  # (2,) of the supports that move there,
+    turned: NDArray  # (2,) and of what turns there
     powers: NDArray  # (2,) in and out, at the last step, for methods that keep them, W
     pushed: NDArray  # (n, 3) forces of loads that depend on the displacement, N; or none (0, 3)
 
@@ -234,12 +237,14 @@ def scratch(system: System) -> Scratch:
     force, product, displacement, velocity, moving = np.zeros((5, nodes, 3))
     line = np.zeros(3 * nodes if len(system.ties.slave) else nodes)
     energy, factor = np.zeros(system.energies), np.zeros((histories, 3))
-    never, loads = np.full(1, np.nan), np.array([0, len(system.loads.dof)])
+    never = np.full(1, np.nan)
+    counts = len(system.loads.dof), len(system.moved.dof), len(system.actuators.hinge)
+    loads, moved, turned = (np.array([0, count]) for count in counts)
     stage, powers = np.zeros((3, nodes, 3)), np.zeros(2)
     pushed = np.zeros((nodes if system.follows else 0, 3))
     return Scratch(
         force, product, line, energy, never, factor, displacement, velocity, moving, stage, loads,
-        powers, pushed,
+        moved, turned, powers, pushed,
     )  # fmt: skip
 
 
@@ -251,7 +256,10 @@ def scratches(system: System, works: Sequence[Any]) -> list[Scratch]:
             powers=np.zeros(2),
             time=whole.time.copy(),
             factor=whole.factor.copy(),
+            line=np.empty_like(whole.line),
             loads=np.searchsorted(system.loads.dof, 3 * work.strips.own),
+            moved=np.searchsorted(system.moved.dof, 3 * work.strips.own),
+            turned=np.searchsorted(system.actuators.lowest, work.strips.own),
         )
         for work in works
     ]
@@ -270,18 +278,23 @@ def place(system, q, w, t, s):
 def carry(moved, factor, derivative, still, out):
     """Add the motion of the supports, S f or a derivative of it, to q, w or q'', all (n, 3)."""
     values, rest = flat(out), flat(still)
-    for i in range(values.size):
+    _carry_part(moved, factor, derivative, rest, values, (0, values.size), (0, moved.dof.size))
+
+
+@inner
+def _carry_part(moved, factor, derivative, rest, values, dofs, supports):
+    """The same for the dofs dofs[0] to dofs[1] with their supports."""
+    for i in range(dofs[0], dofs[1]):
         values[i] = rest[i]
-    for k in range(moved.dof.size):
+    for k in range(supports[0], supports[1]):
         values[moved.dof[k]] += moved.value[k] * factor[moved.row[k], derivative]
 
 
 @inner
-def _moving_power(moved, moved_mass, damping, force, factor):
-    """Power (W) of moving supports but for what changes the kinetic energy of S f'."""
-    power = drag_power(damping, moving_energy(moved_mass, factor))
-    bracket = flat(force)
-    for k in range(moved.dof.size):
+def _moving_power(moved, force, factor, first, last):
+    """Power (W) of some moving supports against the bracket of the forces."""
+    power, bracket = 0.0, flat(force)
+    for k in range(first, last):
         power += bracket[moved.dof[k]] * moved.value[k] * factor[moved.row[k], 1]
     return power
 
@@ -301,10 +314,12 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         evaluate(system.waves, t, derive, s.factor)
         s.time[0] = t
     if system.turns:
-        turn(model, system.actuators, s.factor)
+        turn_part(model, system.actuators, s.factor, s.turned[0], s.turned[1])
     if system.moves:
-        carry(system.moved, s.factor, 0, q, s.displacement)
-        carry(system.moved, s.factor, 1, w, s.velocity)
+        own, supports = (first, last), (s.moved[0], s.moved[1])
+        here, there = flat(s.displacement), flat(s.velocity)
+        _carry_part(system.moved, s.factor, 0, flat(q), here, own, supports)
+        _carry_part(system.moved, s.factor, 1, flat(w), there, own, supports)
     if system.presses:
         place_obstacles(model, s.factor, work)
     u = s.displacement if system.moves else q
@@ -326,8 +341,13 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         wait(work.team)  # others look at this member's velocities
     if has_dampers(damping):  # on one thread only
         power_out += add_dampers(damping, u, v, s.force)
-    if not mass.lumped:  # on one thread only
-        substitute(mass, s.force, out, s.line)
+    kinetic = 0.0
+    if damping.alpha > 0.0:
+        kinetic = kinetic_energy(mass, v, work.strips.own)
+    if not mass.lumped:
+        wait(work.team)  # for the forces of the others, and their look at this member's velocities
+        solve_mass(mass, s.force, out, s.line, work.team.number, work.team.size)
+        wait(work.team)  # each has solved for its axes
     accelerated, relative = flat(out)[first:last], flat(w)[first:last]
     if mass.lumped:
         bracket, inverse = force[first:last], flat(mass.inverse)[first:last]
@@ -337,12 +357,16 @@ def acceleration(model, system, mass, q, w, t, out, work, s):
         for i in range(relative.size):
             accelerated[i] = -accelerated[i] - drag(damping, relative[i])
     if damping.alpha > 0.0:
-        kinetic = kinetic_energy(mass, v, s.product, work.strips.own)
         power_out += drag_power(damping, kinetic)
     if system.moves:
-        power_in += _moving_power(system.moved, system.moved_mass, damping, s.force, s.factor)
+        # but for what changes the kinetic energy of S f'
+        power_in += _moving_power(system.moved, s.force, s.factor, s.moved[0], s.moved[1])
+        if work.team.number == 0:
+            power_in += drag_power(damping, moving_energy(system.moved_mass, s.factor))
     if system.turns:
-        power_in += actuator_power(model, system.actuators, s.factor, work.fold_angle)
+        power_in += power_of_part(
+            model, system.actuators, s.factor, work.fold_angle, s.turned[0], s.turned[1]
+        )
     return power_in, power_out
 
 

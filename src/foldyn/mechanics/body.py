@@ -250,6 +250,10 @@ class Body(ABC):
         """Rest angles (rad) of what actuators turn, and the rows of `model.hinges` there."""
         return np.zeros(0), np.zeros(0, np.int64)
 
+    def lowest_nodes(self, turned: NDArray) -> NDArray:
+        """Lowest node of what turns in these rows (k,): whose thread it is, where there are any."""
+        return np.zeros(len(turned), np.int64)
+
     # ------------------------------------------------------------------ other bodies
     def renumbered(self) -> tuple[Body, NDArray]:
         """The body for long motions, and the nodes (n,) in the order in which it has them."""

@@ -204,6 +204,10 @@ class BarsHingesBody(Body):
         """See `Body`."""
         return self.model.hinge_rest, np.arange(len(self.model.hinge_rest))
 
+    def lowest_nodes(self, turned: NDArray) -> NDArray:
+        """See `Body`."""
+        return self.model.hinges[turned].min(axis=1)
+
     def renumbered(self) -> tuple[BarsHingesBody, NDArray]:
         """See `Body`: along the sheet, unless it is small."""
         if self.rows < SMALL:
