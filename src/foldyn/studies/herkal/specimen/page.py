@@ -79,9 +79,10 @@ def _opening(data: Data) -> str:
         "The paper's raw data are not public. Everything in this part is SYNTHETIC: photographs "
         "and a film that Foldyn rendered of a simulated sheet with the paper's parameters. So that "
         "the model that is fitted is wrong, as models are, that sheet is 3 % softer than the "
-        "model's, has a consistent mass where the model has circumcenter masses, and creeps: "
-        f"{synthetic.CREEP:.0%} of its displacement returns with a time constant of "
-        f"{synthetic.CREEP_TIME:g} s. Lens, blur and noise are a camera's. What comes out shows "
+        "model's, has a consistent mass where the model has circumcenter masses, and creases that "
+        f"relax: for a short time they are {synthetic.RATIO:.0%} stiffer than for long, with a "
+        f"relaxation time of {synthetic.TIME:g} s, so that it drifts back when it is released. "
+        "Lens, blur and noise are a camera's. What comes out shows "
         "how well the method works, and nothing about the paper's sheet. A film, its tracks, or "
         "tables of one's own take its place: foldyn study herkal --data FILE ..."
     )

@@ -1,7 +1,7 @@
 """A synthetic test of the paper specimen, whose raw data are not public.
 
 The sheet that is photographed and filmed is not the model that is fitted to it: it is softer, its
-mass is distributed otherwise, and after the release it creeps back.
+mass is distributed otherwise, and its creases relax, so that after the release it drifts back.
 
 `python -m foldyn.studies.herkal.specimen.synthetic FOLDER` writes photographs and the film.
 """
@@ -20,13 +20,26 @@ from numpy.typing import NDArray
 
 from foldyn import experiment
 from foldyn.analyses import read_case
+from foldyn.analyses.reading import read_document
+from foldyn.studies import find_case
 from foldyn.studies.herkal import calibration
 
 SOFTER = {"sheet.youngs_modulus": 0.97 * 1.219e9}  # Pa: 3 % softer than the model
-OTHERWISE: Mapping[str, Any] = {**SOFTER, "model.mass": "consistent"}  # the model: circumcenter
+RATIO, TIME = 0.05, 0.5  # of a creases' branch: stiffness over the lasting one; relaxation time (s)
+RELAXING: Mapping[str, Any] = {
+    "model.fold_law": {
+        "kind": "prony",
+        "ratios": [RATIO],
+        "times": [TIME],
+        "law": read_document(find_case("herkal/specimen-release"))["model"]["fold_law"],
+    }
+}
+OTHERWISE: Mapping[str, Any] = {  # the model: circumcenter masses, elastic creases
+    **SOFTER,
+    **RELAXING,
+    "model.mass": "consistent",
+}
 SUPPORT = "glued"
-CREEP = 0.04  # share of the displacement that returns slowly,
-CREEP_TIME = 0.5  # and its time constant (s)
 TRACKED = "film.mkv"
 
 
@@ -95,39 +108,36 @@ def photograph(folder: Path, shot: Shot) -> list[Path]:
     return files
 
 
-def film(folder: Path, shot: Shot) -> experiment.SyntheticFilm:
-    """Film of the softer sheet, held and released; its case file is written to the folder."""
-    moved = released(folder, shot)
+def film(
+    folder: Path, shot: Shot, changes: Mapping[str, Any] = OTHERWISE
+) -> experiment.SyntheticFilm:
+    """Film of a sheet, held and released; its case file is written to the folder.
+
+    changes : what it has other than the model, by key.
+    """
+    moved = released(folder, shot, changes)
     return experiment.film_of(
         moved, shot.camera(moved["rest_position"].values), shot.rate,
         sensor=shot.sensor(EXPOSURE), seed=shot.seed,
     )  # fmt: skip
 
 
-def released(folder: Path, shot: Shot) -> xarray.Dataset:
+def released(folder: Path, shot: Shot, changes: Mapping[str, Any] = OTHERWISE) -> xarray.Dataset:
     """The true motion; the release is at `shot.held`."""
-    case = calibration.released_case(folder, OTHERWISE, support=SUPPORT, duration=shot.free)
-    return held_and_creeping(read_case(case).run(), shot.held)
+    case = calibration.released_case(folder, changes, support=SUPPORT, duration=shot.free)
+    return held(read_case(case).run(), shot.held)
 
 
-def held_and_creeping(motion: xarray.Dataset, held: float) -> xarray.Dataset:
-    """A motion that is held before its start, and a share of which returns slowly.
-
-    A share c of the displacement is that of a dashpot and a spring in parallel, in series with the
-    structure: x(t) = (1 - c) u(t) + c u(0) exp(-t/tau).
-    """
+def held(motion: xarray.Dataset, duration: float) -> xarray.Dataset:
+    """A motion before whose start the sheet is held for some time (s)."""
     u, time = motion["displacement"].values, motion["time"].values
-    slow = np.exp(-time / CREEP_TIME)[:, None, None] * u[0]
-    moved = (1.0 - CREEP) * u + CREEP * slow
     step = time[1] - time[0]
-    count = round(held / step)
-    before = np.repeat(u[:1], count, axis=0)
-    times = np.arange(count + len(time)) * step
+    count = round(duration / step)
+    moved = np.concatenate([np.repeat(u[:1], count, axis=0), u])
+    times = np.arange(len(moved)) * step
     kept = motion.drop_dims("time").assign_coords(time=("time", times, motion["time"].attrs))
     along = ("time", "node", "axis")
-    return kept.assign(
-        displacement=(along, np.concatenate([before, moved]), motion["displacement"].attrs)
-    )
+    return kept.assign(displacement=(along, moved, motion["displacement"].attrs))
 
 
 if __name__ == "__main__":
