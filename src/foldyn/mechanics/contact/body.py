@@ -13,16 +13,18 @@ from scipy import sparse
 
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.body import Blocks, Body, Unstrained
+from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
-from foldyn.mechanics.contact.tables import HISTORY, Sheets, Tables, tables
+from foldyn.mechanics.contact.tables import HISTORY, POINT, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     pair_tangents,
     plane_tangents,
     touching_pairs,
 )
+from foldyn.mechanics.tangent import Sparsity
 from foldyn.mechanics.wrapped_body import WrappedBody
 
 GROUP = "contact"
@@ -67,6 +69,15 @@ class TouchingBody(WrappedBody):
     def around(self, inner: Body) -> TouchingBody:
         """See `WrappedBody`."""
         return TouchingBody(inner, self.sheets, self)
+
+    def displaced(self, moved: NDArray) -> TouchingBody:
+        """The same with planes displaced by `moved` (p, 3), m; it shares the lists of pairs."""
+        body = TouchingBody(self.inner, self.sheets, self)
+        planes = self.tables.planes.copy()
+        planes[:, POINT : POINT + 3] += moved
+        body.tables = self.tables._replace(planes=planes)
+        body._memory = self._memory
+        return body
 
     def driven(self, rows: Mapping[int, int]) -> TouchingBody:
         """The same with planes, by number, that move with histories of these numbers."""
@@ -117,26 +128,17 @@ class TouchingBody(WrappedBody):
     def contact_tangent(self, q: NDArray) -> sparse.csr_array:
         """The second derivative (m, m), N/m, of the energy of contact."""
         self.contact(q)
-        own, kept = self.tables, self._memory
-        first, second = touching_pairs(own, kept)
-        nodes = np.empty((len(first) + len(second), 4), np.int64)
-        blocks = np.zeros((len(nodes), 12, 12))
-        pair_tangents(own, kept, first, second, nodes, blocks)
-        guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
-        acts = guard_tangents(own, kept.x, guards)
-        nodes = np.concatenate([nodes, own.hinges[acts]])
-        four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
-        pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
-        if len(own.planes):
-            normal = plane_tangents(own, kept.x, kept)
-            met = np.flatnonzero(normal.any(axis=(1, 2)))
-            pairs.append(np.column_stack([met, met]))
-            entries.append(normal[met])
-        return assembled(np.concatenate(pairs), np.concatenate(entries), self.size)
+        return contact_tangent(self.tables, self._memory, self.size)
 
-    def blocks(self) -> Blocks:
-        """See `Body`."""
-        raise NotImplementedError("implicit methods do not take contact")
+    def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
+        """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
+        u, motion = self.nodal(q), self.nodal(step)
+        return clear_share(self.tables, self._memory, u, motion, moves, keep)
+
+    def blocks(self) -> InnerBlocks:
+        """See `Body`: those of the body within. Which nodes touch changes, so that
+        `contact_tangent` is apart."""
+        return InnerBlocks(self.inner.blocks())
 
     def workspaces(self, threads: int) -> Sequence[TouchingWork]:
         """See `Body`: one thread."""
@@ -157,3 +159,41 @@ class TouchingBody(WrappedBody):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `Body`: without contact."""
         return self.inner.unstrained(q)
+
+
+class InnerBlocks:
+    """Blocks of the body within one with contact; see `mechanics.body.Blocks`."""
+
+    def __init__(self, inner: Blocks) -> None:
+        self._inner = inner
+        self.pattern, self.order, self.unused = inner.pattern, inner.order, inner.unused
+
+    def put(
+        self, body: Body, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+    ) -> None:
+        """See `Blocks`."""
+        own = body.inner if isinstance(body, TouchingBody) else body
+        self._inner.put(own, pattern, u, before, again, out)
+
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`."""
+        return self._inner.filled(pattern)
+
+
+def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
+    """The second derivative (size, size), N/m, of the energy of contact where it was last found."""
+    first, second = touching_pairs(own, kept)
+    nodes = np.empty((len(first) + len(second), 4), np.int64)
+    blocks = np.zeros((len(nodes), 12, 12))
+    pair_tangents(own, kept, first, second, nodes, blocks)
+    guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
+    acts = guard_tangents(own, kept.x, guards)
+    nodes = np.concatenate([nodes, own.hinges[acts]])
+    four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
+    pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+    if len(own.planes):
+        normal = plane_tangents(own, kept.x, kept)
+        met = np.flatnonzero(normal.any(axis=(1, 2)))
+        pairs.append(np.column_stack([met, met]))
+        entries.append(normal[met])
+    return assembled(np.concatenate(pairs), np.concatenate(entries), size)
