@@ -200,7 +200,6 @@ def refuse_contact(contact: Contact | None, what: str) -> None:
     """Refuse contact for what does not take it."""
     if contact is not None:
         raise InputError(
-            f": {what} not take contact yet, only motions with explicit integrators (rk4, "
-            "central_difference, dormand_prince); leave it out",
+            f": {what} not take contact yet, only motions and paths of equilibria; leave it out",
             "contact",
         )

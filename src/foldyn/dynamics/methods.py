@@ -182,7 +182,10 @@ METHODS: Mapping[str, Integrator] = {
             "newmark", generalized_alpha, generalized_alpha.newmark, massless=True, contact=True
         ),
         _implicit(
-            "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True,
+            "generalized_alpha",
+            generalized_alpha,
+            generalized_alpha.scheme(),
+            massless=True,
             contact=True,
         ),
         _implicit(

@@ -166,7 +166,7 @@ def _true(remedy: str, problem: OrigamiProblem) -> str:
 def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
     """A remedy where the path ends because a fold is closed; empty otherwise."""
     structure = problem.structure
-    if not points or not len(structure.folds):
+    if not points or not len(structure.folds) or problem.case.contact is not None:
         return ""
     state = structure.nodes + problem.displacement(points[-1].u)
     folds = np.degrees(hinge_angles(state, structure.folds))

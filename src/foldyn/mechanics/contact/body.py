@@ -17,6 +17,7 @@ from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
+from foldyn.mechanics.contact.planes import add_planes
 from foldyn.mechanics.contact.tables import HISTORY, POINT, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
@@ -64,6 +65,8 @@ class TouchingBody(WrappedBody):
     @cached_property
     def _memory(self) -> Memory:
         """Lists of pairs for the evaluations below, which they find again where they serve."""
+        if self._like is not None:
+            return self._like._memory
         return memory(self.tables, self.sheets.panels)
 
     def around(self, inner: Body) -> TouchingBody:
@@ -71,12 +74,11 @@ class TouchingBody(WrappedBody):
         return TouchingBody(inner, self.sheets, self)
 
     def displaced(self, moved: NDArray) -> TouchingBody:
-        """The same with planes displaced by `moved` (p, 3), m; it shares the lists of pairs."""
-        body = TouchingBody(self.inner, self.sheets, self)
+        """The same with planes displaced by `moved` (p, 3), m."""
+        body = self.around(self.inner)
         planes = self.tables.planes.copy()
         planes[:, POINT : POINT + 3] += moved
         body.tables = self.tables._replace(planes=planes)
-        body._memory = self._memory
         return body
 
     def driven(self, rows: Mapping[int, int]) -> TouchingBody:
@@ -135,9 +137,28 @@ class TouchingBody(WrappedBody):
         u, motion = self.nodal(q), self.nodal(step)
         return clear_share(self.tables, self._memory, u, motion, moves, keep)
 
+    def plane_forces(self, q: NDArray) -> NDArray:
+        """Force (p, 3), N, of each plane on the nodes, without friction."""
+        self.contact(q)
+        out = np.zeros((len(self.tables.planes), 3))
+        for plane, alone in enumerate(self._alone()):
+            force = np.zeros_like(self._memory.x)
+            add_planes(alone, self._memory.x, self._memory, force)
+            out[plane] = -force.sum(axis=0)
+        return out
+
+    def plane_tangents(self, q: NDArray) -> list[NDArray]:
+        """Second derivatives (n, 3, 3), N/m, of the potential of each plane."""
+        self.contact(q)
+        return [plane_tangents(alone, self._memory.x, self._memory) for alone in self._alone()]
+
+    def _alone(self) -> list[Tables]:
+        """Tables with one plane each."""
+        planes = self.tables.planes
+        return [self.tables._replace(planes=planes[p : p + 1]) for p in range(len(planes))]
+
     def blocks(self) -> InnerBlocks:
-        """See `Body`: those of the body within. Which nodes touch changes, so that
-        `contact_tangent` is apart."""
+        """See `Body`: of the body within; which nodes touch changes, so contact is apart."""
         return InnerBlocks(self.inner.blocks())
 
     def workspaces(self, threads: int) -> Sequence[TouchingWork]:
