@@ -258,9 +258,12 @@ class Motion:
                 "often, or the motion is too violent; raise the tolerance, or use rk4"
             )
         if code == Outcome.NOT_CONVERGED:
+            why = "a mass or a stiffness may be missing, or the motion is too violent"
+            if self.case.contact is not None:
+                why = 'panels meet too hard for an implicit method: use method = "dormand_prince"'
             self._stop(
                 f"{moment} no equilibrium was found at the end of a step, however small the step: "
-                "a mass or a stiffness may be missing, or the motion is too violent"
+                f"{why}"
             )
         reason = "a load is not finite"
         if plan.steps and not self.method.implicit:

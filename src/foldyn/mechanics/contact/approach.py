@@ -149,9 +149,10 @@ def clear_share(tables, memory, u, step, moves, keep):
     """
     place(tables, u, memory)
     n, best = len(memory.x), 1.0
+    for i in range(n):  # a largest value does not see nan
+        if not _length(step, i) < math.inf:
+            return 0.0
     fast = fastest(step, n)
-    if not fast < math.inf:
-        return 0.0
     if memory.d0.shape[1] > 0:
         far, skin = farthest(tables, u, memory), memory.facts.skin
         if memory.counts.has_list == 0 or not far <= 0.25 * skin:
