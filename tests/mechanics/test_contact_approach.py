@@ -22,7 +22,7 @@ NO_PLANES = np.zeros((0, 3))
 
 def pair(above: float):
     """Two triangles, one above the other, that list all pairs."""
-    nodes = np.vstack([FLAT, FLAT + [0.2, 0.1, above]])
+    nodes = np.vstack([FLAT, FLAT + np.array([0.2, 0.1, above])])
     own = sheets(nodes, [[0, 1, 2], [3, 4, 5]], [0, 1], 0.1)
     return tables(own, NO_HINGES)._replace(skin=100.0)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import foldyn as fd
-from foldyn.statics import OrigamiProblem
 
 T = 0.2e-3
 SHEET = fd.Sheet(1.219e9, 0.2, T, density=690.0, length_scale_ratio=2.7)
@@ -26,18 +25,13 @@ def press(cells: int = 2, end: float = 0.7) -> tuple[fd.Case, int]:
     ]  # fmt: skip
     half, gap = 0.5 * (high - low - end * layers * T), 0.495 * T
     planes = [
-        fd.Plane((low - gap, 0, 0), (1, 0, 0), motion=(half, 0, 0), history=fd.Ramp(1.0)),
-        fd.Plane((high + gap, 0, 0), (-1, 0, 0), motion=(-half, 0, 0), history=fd.Ramp(1.0)),
+        fd.Plane((low - gap, 0, 0), (1, 0, 0), motion=(half, 0, 0)),
+        fd.Plane((high + gap, 0, 0), (-1, 0, 0), motion=(-half, 0, 0)),
     ]
     return fd.Case(s, supports, contact=fd.Contact(planes=planes)), layers
 
 
 def plates(case: fd.Case, path) -> tuple[np.ndarray, np.ndarray]:
     """Force of the first plane along its normal, N, and length of the sheet along x, m."""
-    problem, forces = OrigamiProblem(case), []
-    normal = np.array(case.contact.planes[0].normal)
-    for factor, displacement in zip(path.load_factor.values, path.displacement.values, strict=True):
-        u = problem.state(displacement, factor)
-        forces.append(problem.body(u, factor).plane_forces(problem.dofs(u))[0] @ normal)
     x = (case.structure.nodes + path.displacement.values)[:, :, 0]
-    return np.array(forces), np.ptp(x, axis=1)
+    return path.plane_force.values[:, 0] @ case.contact.planes[0].normal, np.ptp(x, axis=1)

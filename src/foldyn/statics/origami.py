@@ -281,6 +281,14 @@ class OrigamiProblem:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
         return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
 
+    def touch(self, u: NDArray) -> dict[str, NDArray]:
+        """Forces of contact in a state (m,), as `results.quantities.CONTACT` names them, N."""
+        if self.case.contact is None:
+            return {}
+        q, body = self.dofs(u), self.body(u, 0.0)
+        planes = {"plane_force": body.plane_forces(q)} if self.case.contact.planes else {}
+        return {"contact_force": body.touch(q), **planes}
+
     def clear(self, u: NDArray, step: NDArray) -> float:
         """Share of a step (m,) from a state in which nothing crosses."""
         if self.case.contact is None:

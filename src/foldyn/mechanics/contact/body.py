@@ -96,15 +96,9 @@ class TouchingBody(WrappedBody):
         add_contact(self.tables, u, self.inner.angles(q), force, self._memory)
         return float(self._memory.facts.energy), force
 
-    def touch(self, u: NDArray, moved: NDArray) -> NDArray:
-        """Size (n,), N, of the force of contact on each node at u (n, 3), without friction.
-
-        moved : (q, 3) displacement of the planes, m.
-        """
-        self._memory.moved[:, :3] = moved
-        force = self.contact(u.ravel())[1]
-        self._memory.moved[:] = 0.0
-        return np.linalg.norm(force, axis=1)
+    def touch(self, q: NDArray) -> NDArray:
+        """Size (n,), N, of the force of contact on each node, without friction."""
+        return np.linalg.norm(self.contact(q)[1], axis=1)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
