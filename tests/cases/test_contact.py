@@ -28,8 +28,7 @@ PLANE = fd.Plane((0, 0, -0.1), (0, 0, 2), friction=0.4, motion=(0, 0, 0.2), hist
         (lambda: fd.Plane((0, 0), (0, 0, 1)), "point = "),
         (lambda: fd.Plane((0, 0, 0), (0, 0, 0)), "normal = "),
         (lambda: fd.Plane((0, 0, 0), (0, 0, 1), friction=-1), "friction = -1"),
-        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), motion=(0, 0, 1)), "both its motion"),
-        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), history=fd.Ramp(1)), "both its motion"),
+        (lambda: fd.Plane((0, 0, 0), (0, 0, 1), history=fd.Ramp(1)), "history needs the motion"),
         (lambda: fd.Case(FOLD, contact=True), "contact = true: must be a Contact"),
     ],
 )
@@ -41,7 +40,10 @@ def test_what_cannot_be_used_is_refused(make, message):
 def test_a_case_in_writing_keeps_its_contact():
     contact = fd.Contact(
         thickness=0.02, friction=0.1, stiffness=5.0,
-        planes=[PLANE, fd.Plane((0, 0, 9), (0, 0, -1))],
+        planes=[
+            PLANE, fd.Plane((0, 0, 9), (0, 0, -1)),
+            fd.Plane((0, 0, 9), (0, 0, -1), motion=(0, 0, -1)),
+        ],
     )  # fmt: skip
     document = to_document(fd.Case(FOLD, contact=contact))
     assert document.obstacles == ()
@@ -100,6 +102,40 @@ duration = 0.1
         path.read_text().replace("[contact]\nfriction = 0.2", "[contact]\nfriction = -1")
     )
     with pytest.raises(InputError, match=r"contact\.friction = -1"):
+        fd.read_case(path)
+
+
+def test_in_a_path_the_load_factor_moves_planes(tmp_path):
+    path = tmp_path / "path.toml"
+    text = """
+[pattern]
+kind = "simple_fold"
+a = 1.0
+b = 1.0
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+[[supports]]
+nodes = [0, 1, 2, 3]
+axes = "xyz"
+[[contact.planes]]
+point = [0, 0, -0.006]
+normal = [0, 0, 1]
+motion = [0, 0, 0.02]
+[analysis]
+kind = "statics"
+method = "displacement"
+steps = 2
+"""
+    path.write_text(text)
+    found = fd.read_case(path).run()
+    lifted = found.displacement.sel(node=[4, 5], axis="z").values
+    assert np.abs(lifted[0]).max() < 1e-9 and lifted[-1].min() > 0.014 - 0.005
+    assert float(found.contact[-1]) > 0.0
+    path.write_text(text.replace("0.02]", '0.02]\nhistory = { kind = "ramp", duration = 1.0 }'))
+    with pytest.raises(InputError, match=r"contact\.planes\[0\]\.history = .* a path has no time"):
         fd.read_case(path)
 
 

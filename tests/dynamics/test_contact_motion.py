@@ -7,18 +7,16 @@ import warnings
 import numpy as np
 import pytest
 from contact_cases import (
-    SHEET,
     G,
-    crossing,
     folded_from_both_ends,
     on_slope,
-    strip,
     tower,
     two_sheets,
     without_step_limit,
 )
 
 import foldyn as fd
+from contact_sheets import SHEET, crossing, strip
 from foldyn.checks import observed_order
 from foldyn.dynamics.methods import METHODS
 from foldyn.errors import ComputationError, FoldynWarning, InputError, PenetrationError
@@ -157,7 +155,7 @@ def test_methods_without_contact_refuse_it():
     for name, method in METHODS.items():
         if method.contact:
             continue
-        with pytest.raises(InputError, match="contact yet; choose one of rk4, central_difference"):
+        with pytest.raises(InputError, match="take contact; choose one of rk4, central_difference"):
             fd.simulate(case, 0.01, method=name)
 
 
@@ -193,9 +191,11 @@ def test_samples_tell_where_a_sheet_touches():
 def test_others_refuse_contact():
     push = fd.Force([4, 5], (0, 0, 1e-3))
     case = fd.Case(strip(), [fd.Fix([0, 1, 2, 3])], [push], contact=fd.Contact())
-    for compute in (fd.trace, fd.modes):
-        with pytest.raises(InputError, match=r"contact: .* not take contact yet"):
-            compute(case)
+    with pytest.raises(InputError, match=r"contact: modes and responses do not take contact yet"):
+        fd.modes(case)
+    shell = fd.shell(fd.patterns.simple_fold(a=0.04, b=0.04, dihedral=90), SHEET, divisions=2)
+    with pytest.raises(InputError, match=r"contact: .* shells do not take it yet"):
+        fd.simulate(fd.Case(shell, contact=fd.Contact()), 1e-3, method="newmark")
 
 
 @pytest.mark.slow  # compiles the loop with contact around laws with memory

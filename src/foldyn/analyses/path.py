@@ -24,6 +24,7 @@ from foldyn.analyses.sections import (
     ShownSection,
     Whole,
     check_mass,
+    contact_part,
     one_of,
     part,
     some_shapes,
@@ -137,6 +138,7 @@ class PathSchema(CaseSchema):
     model: PathModel = PathModel()
     supports: list[Annotated[Any, part(support_from, base=NO_BASE, history=TIMELESS)]] = []
     loads: list[Annotated[Any, part(load_from, history=TIMELESS)]] = []
+    contact: Annotated[Any, contact_part(TIMELESS)] = None
     initial: StoredStart | None = None
     analysis: PathSection
     output: PathOutput = PathOutput()

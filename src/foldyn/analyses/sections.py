@@ -218,6 +218,20 @@ def part(read: Callable[[Any, Path | None], Any], **why: str) -> PlainValidator:
     return PlainValidator(read_part)
 
 
+def contact_part(history: str = "") -> PlainValidator:
+    """Accept the table of contact; histories of planes may be refused, for a reason."""
+
+    def read(value: Any, folder: Path | None) -> Any:
+        planes = value.get("planes", []) if isinstance(value, Mapping) else []
+        for i, plane in enumerate(planes if isinstance(planes, list) else []):
+            if history and isinstance(plane, Mapping) and "history" in plane:
+                given = show(plane["history"])
+                raise InputError(f" = {given}: {history}", f".planes[{i}].history")
+        return contact_from(value, folder)
+
+    return part(read)
+
+
 def _per_crease(value: Any) -> Any:
     """Accept a number for all creases, one for each, or a table by name."""
     return per_crease(
@@ -371,4 +385,4 @@ class CaseSchema(Section):
     supports: list[Annotated[Any, part(support_from)]] = []
     loads: list[Annotated[Any, part(load_from)]] = []
     masses: list[Annotated[Any, part(mass_from)]] = []
-    contact: Annotated[Any, part(contact_from)] = None
+    contact: Annotated[Any, contact_part()] = None

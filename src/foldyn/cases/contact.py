@@ -43,9 +43,10 @@ class Plane(Part):
     friction : float, optional
         Coefficient of Coulomb friction; that of the `Contact` by default.
     motion : sequence of float, shape (3,), optional
-        Displacement (m) of the plane at factor 1 of the history; it stands still by default.
+        Displacement (m) of the plane at factor 1; it stands still by default. In a path of
+        equilibria it is multiplied by the load factor.
     history : History or callable, optional
-        Factor of time of the motion.
+        Factor of time of the motion, constant by default.
 
     Examples
     --------
@@ -74,11 +75,9 @@ class Plane(Part):
             object.__setattr__(self, "friction", number("friction", self.friction, least=0.0))
         if self.motion is not None:
             object.__setattr__(self, "motion", vector("motion", self.motion))
-        if (self.motion is None) != (self.history is None):
-            raise InputError(
-                ": a moving plane needs both its motion (m), at factor 1, and a history", "motion"
-            )
-        if self.history is not None:
+        if self.motion is None and self.history is not None:
+            raise InputError(": a history needs the motion (m) at its factor 1", "motion")
+        if self.motion is not None:
             object.__setattr__(self, "history", as_history(self.history))
 
 
@@ -200,7 +199,6 @@ def refuse_contact(contact: Contact | None, what: str) -> None:
     """Refuse contact for what does not take it."""
     if contact is not None:
         raise InputError(
-            f": {what} not take contact yet, only motions with explicit integrators (rk4, "
-            "central_difference, dormand_prince); leave it out",
+            f": {what} not take contact yet, only motions and paths of equilibria; leave it out",
             "contact",
         )

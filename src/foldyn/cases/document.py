@@ -255,8 +255,9 @@ class _Writer:
         planes = []
         for plane in contact.planes:
             table = plane.table()
-            if plane.history is not None:
-                table["history"] = self._history(as_history(plane.history), True)
+            history = as_history(plane.history)
+            if history != Constant():
+                table["history"] = self._history(history, True)
             planes.append(table)
         return {**contact.table(), **({"planes": planes} if planes else {})}
 

@@ -17,9 +17,9 @@ from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.hereditary import check_state
 from foldyn.dynamics.inertia import check_mass, is_lumped
 from foldyn.dynamics.initial import (
-    check_contact,
     check_start,
     check_steady,
+    check_touching,
     warn_of_unstable_damping,
 )
 from foldyn.dynamics.method_choice import AUTO, choose
@@ -169,7 +169,7 @@ def prepare(
         )
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
-    check_contact(case, u, float(start))
+    check_touching(case, u, float(start))
     remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
     reason = ""

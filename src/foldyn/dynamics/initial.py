@@ -13,6 +13,7 @@ from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.constraints import AGREES
 from foldyn.cases.ties import check_tied
+from foldyn.cases.touching import check_contact
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.course import TALLY, Course, StepPlan
 from foldyn.dynamics.inertia import moving_energy
@@ -98,47 +99,13 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
     return pair[0], pair[1]
 
 
-def check_contact(case: Case, u: NDArray, start: float) -> None:
-    """Refuse a start at which something has passed another; warn where panels overlap."""
-    if case.contact is None:
-        return
-    pattern = case.structure.pattern
-    if pattern is not None and pattern.boards is not None:
-        raise InputError(
-            ": is between the middle surfaces of a sheet, beside which thick panels are hinged; "
-            "leave out contact, or hinge_offset",
-            "contact",
-        )
-    x = case.structure.nodes + u
-    surface = np.unique(case.structure.triangles)
-    for i, plane in enumerate(case.contact.planes):
-        point, normal = np.array(plane.point), np.array(plane.normal)
-        if plane.history is not None:
-            point = point + float(plane.history(start)) * np.array(plane.motion)
-        height = (x[surface] - point) @ normal / np.linalg.norm(normal)
-        free = ~case.fixed[surface].all(axis=1)
-        if free.any() and height[free].min() <= 0.0:
-            behind = int(np.argmin(np.where(free, height, np.inf)))
-            raise InputError(
-                f": node {surface[behind]} is {-height[behind]:.3g} m behind it at the start: move "
-                "the plane, or turn its normal to the side of the sheet",
-                f"contact.planes[{i}]",
-            )
-    body: Any = case.body
-    energy = body.contact(body.dofs(u))[0]
-    if not np.isfinite(energy):
-        raise InputError(
-            ": at the start panels meet, or fold onto themselves: start from a state in which "
-            "they are apart, as with crease_rest above 0 and below 360 degrees",
-            "contact",
-        )
-    if not u.any() and energy > 0.0 and not case.contact.planes:
-        warnings.warn(
-            "contact: at rest panels are nearer to each other than the sheet is thick; they will "
-            f"be pushed apart with an energy of {energy:.3g} J",
-            FoldynWarning,
-            stacklevel=4,
-        )
+def check_touching(case: Case, u: NDArray, start: float) -> None:
+    """Refuse displacements (n, 3) with contact at the time `start` (s); see `check_contact`."""
+    planes = () if case.contact is None else case.contact.planes
+    moved = np.zeros((len(planes), 3))
+    for plane, history in case.obstacle_terms:
+        moved[plane] = float(history(start)) * np.array(planes[plane].motion)
+    check_contact(case, u, moved)
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:

@@ -176,9 +176,15 @@ METHODS: Mapping[str, Integrator] = {
         _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
         _explicit(central_difference, 1),
         _explicit(dormand_prince, 6, adaptive=True, remembers=False),
-        _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
         _implicit(
-            "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
+            "newmark", generalized_alpha, generalized_alpha.newmark, massless=True, contact=True
+        ),
+        _implicit(
+            "generalized_alpha",
+            generalized_alpha,
+            generalized_alpha.scheme(),
+            massless=True,
+            contact=True,
         ),
         _implicit(
             "energy_momentum",
@@ -220,7 +226,7 @@ def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
     if case.contact is not None and not method.contact:
-        return "this method does not take contact yet"
+        return "this method does not take contact"
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
     if method.conserving and not case.body.has_discrete_gradient:

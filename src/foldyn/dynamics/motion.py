@@ -132,7 +132,7 @@ class Motion:
         began = None
         try:
             engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
-            continued = self._state[3]
+            continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.go_on_from(continued.values)
             while True:
@@ -172,8 +172,13 @@ class Motion:
             close()
 
     def _continuations(self) -> dict[str, Continuation]:
-        """What an implicit method went on from, and needs to go on if it stands at a sample."""
+        """What an implicit method went on from, and needs to go on if it stands at a sample.
+
+        With contact a motion begins anew: what keeps the nodes on planes is not part of it.
+        """
         engine, time, found = self._engine, self._written().time, {}
+        if self.case.contact is not None:
+            return found
         if isinstance(engine, Implicit) and len(time) and self._packed.callbacks.error is None:
             if self._state[3] and engine.continues:
                 found["continued_from"] = self._state[3]
@@ -278,9 +283,12 @@ class Motion:
                 "often, or the motion is too violent; raise the tolerance, or use rk4"
             )
         if code == Outcome.NOT_CONVERGED:
+            why = "a mass or a stiffness may be missing, or the motion is too violent"
+            if self.case.contact is not None:
+                why = 'panels meet too hard for an implicit method: use method = "dormand_prince"'
             self._stop(
                 f"{moment} no equilibrium was found at the end of a step, however small the step: "
-                "a mass or a stiffness may be missing, or the motion is too violent"
+                f"{why}"
             )
         reason = "a load is not finite"
         if plan.steps and not self.method.implicit:

@@ -1,4 +1,4 @@
-"""Where a sheet touches: the force of contact on each node, as a quantity of samples."""
+"""Where a sheet touches: forces of contact, as quantities of samples."""
 
 from __future__ import annotations
 
@@ -9,22 +9,29 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.results import Quantity
+from foldyn.results.quantities import CONTACT
 
-CONTACT_FORCE = "contact_force"
+CONTACT_FORCE, PLANE_FORCE = CONTACT
 
 
 def contact_quantities(case: Case) -> dict[str, Quantity]:
     """What is sampled of a case with contact; nothing without."""
     if case.contact is None:
         return {}
-    body: Any = case.body
     planes = case.contact.planes
 
-    def force(u: NDArray, v: NDArray, time: float) -> NDArray:
+    def placed(time: float) -> Any:
         moved = np.zeros((len(planes), 3))
         for plane, history in case.obstacle_terms:
             moved[plane] = float(history(time)) * np.array(planes[plane].motion)
-        return body.touch(u, moved)
+        body: Any = case.body
+        return body.displaced(moved)
 
-    text = "force of contact on each node, without friction"
-    return {CONTACT_FORCE: Quantity("N", text, ("node",), force)}
+    def force(u: NDArray, v: NDArray, time: float) -> NDArray:
+        return placed(time).touch(u)
+
+    def push(u: NDArray, v: NDArray, time: float) -> NDArray:
+        return placed(time).plane_forces(u)
+
+    functions = {CONTACT_FORCE: force} | ({PLANE_FORCE: push} if planes else {})
+    return {name: CONTACT[name]._replace(function=own) for name, own in functions.items()}

@@ -44,6 +44,13 @@ STATE = {
     "displacement": Quantity("m", "displacement from the rest position", PLACE),
     "reaction": Quantity("N", "force of the support", ("support",)),
 }
+CONTACT = {
+    "contact_force": Quantity("N", "force of contact on each node, without friction", ("node",)),
+    "plane_force": Quantity(
+        "N", "force of each plane on the sheet, without friction", ("plane", "axis")
+    ),
+}
+"""What motions and paths have where a case has contact, the second one if it has planes."""
 MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
@@ -56,7 +63,9 @@ CONTINUATIONS: Mapping[str, str] = {
     "continued_from": "with what the method went on from another motion at the first sample",
 }
 """What motions of implicit methods have besides, along the dimension continued."""
-PATH: Mapping[str, Quantity] = STATE | {
+PATH: Mapping[str, Quantity] = {
+    **STATE,
+    **CONTACT,
     "work": Quantity("J", "work of loads, supports and actuators since the first point"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
     "point": Quantity(text="kind of the point"),

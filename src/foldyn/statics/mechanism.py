@@ -95,7 +95,7 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     vectors = vectors[:, np.argsort(values, kind="stable")[:MOST_MODES]]
     shapes = np.zeros((size + len(problem.held), vectors.shape[1]))
     shapes[free] = vectors * scale[:, None]
-    shapes = ties.displacement(shapes)
+    shapes = problem.dofs(shapes)
     kept = [k for k, mode in enumerate(shapes.T) if _strains_nothing(unstrained, mode)]
     return np.linalg.qr(shapes[:, kept])[0] if kept else shapes[:, :0]
 

@@ -246,12 +246,13 @@ class Solver:
         return Attempt(u, factor, settings.iterations, reached, failure)
 
     def _share(self, u: NDArray, step: NDArray) -> float:
-        """Share of a step within which nothing turns too far and nothing collides."""
+        """Share of a step within which nothing turns too far, collides or crosses."""
         share = 1.0
         for _ in range(HALVINGS):
             turn = self.problem.turn(u, u + share * step)
             if turn <= MOST_TURN:
-                return share
+                clear = getattr(self.problem, "clear", None)  # problems without contact have none
+                return share * clear(u, share * step) if clear else share
             share *= MOST_TURN / turn if np.isfinite(turn) else 0.5
         return 0.0
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.cases import Actuate, Case
-from foldyn.cases.contact import refuse_contact
 from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import following_force, following_tangent, joined
 from foldyn.mechanics.inelastic_body import InelasticBody
+from foldyn.statics.plates import Plates
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
 from foldyn.structures.remembering import Remembering
@@ -98,8 +98,8 @@ class OrigamiProblem:
         adaptive_load: AdaptiveLoad | None = None, inertia_relief: bool = False,
         flow: str = REFUSED, memory: NDArray | str | None = None,
     ) -> None:  # fmt: skip
-        refuse_contact(case.contact, "paths of equilibria do")
         self._flows = _flows(case, flow)
+        self._plates = _plates(case, bool(self._flows))
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
         body = case.body
@@ -115,18 +115,20 @@ class OrigamiProblem:
         kinds = enumerate((steady, growing))
         self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
         at_rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
-        self._rest = self._ties.coordinates(at_rest)
+        self._rest = self._plates.joined(self._ties.coordinates(at_rest))
         if self._memory is not None:
             self._memory.start(at_rest, memory)
         self._constant = self._extended(_total(steady.load_terms, self._shape))
         self._growing = self._extended(_total(growing.load_terms, self._shape))
-        self.constant = self._ties.force(self._constant)
-        self.growing = self._ties.force(self._growing)
+        self.constant = self._plates.joined(self._ties.force(self._constant))
+        self.growing = self._plates.joined(self._ties.force(self._growing))
         self.load = float(np.abs(self._growing).sum())
         moved = self._extended(_total(case.imposed_terms, self._shape))
-        self._moves = self._extended(case.imposed).astype(bool)
-        self._moves[case.imposed_slaves] = True
-        self.motion = np.where(self._moves, self._ties.coordinates(moved), 0.0)
+        moves = self._extended(case.imposed).astype(bool)
+        moves[case.imposed_slaves] = True
+        motion = np.where(moves, self._ties.coordinates(moved), 0.0)
+        self.motion = self._plates.joined(motion, self._plates.length)
+        self._moves = np.append(moves, self._plates.held)
         angles = body.rest_angles.shape
         self.actuation = Actuation(
             body, _total(growing.rest_terms, angles), _total(steady.rest_terms, angles)
@@ -136,6 +138,7 @@ class OrigamiProblem:
         self.pinned = self._ties.with_held(pins)
         self.free = np.concatenate([np.setdiff1d(case.free_dofs, pins), body.hidden])
         self.held = np.union1d(np.flatnonzero(case.constraints.determined), pins)
+        self.held = np.append(self.held, body.size + np.flatnonzero(self._plates.held))
         self.length = float(np.linalg.norm(structure.nodes - structure.nodes.mean(axis=0)))
         scale = self._ties.largest(body.scale())
         self.force_rounding = EPS * float(np.linalg.norm(scale[self.free]))
@@ -146,7 +149,7 @@ class OrigamiProblem:
 
     def dofs(self, u: NDArray) -> NDArray:
         """Dofs (m,) of the body in a state (m,)."""
-        return self._ties.displacement(u)
+        return self._ties.displacement(self._plates.others(u))
 
     def displacement(self, u: NDArray) -> NDArray:
         """Displacements (n, 3) of the nodes in a state (m,)."""
@@ -156,15 +159,23 @@ class OrigamiProblem:
         """State (m,) with displacements (n, 3) of the nodes, the hidden dofs in balance."""
         push = self._external(self._extended(displacement), factor)
         q = self.actuation.body(factor).dofs(displacement, push)
-        return self._ties.coordinates(q.copy())
+        return self._plates.joined(self._ties.coordinates(q.copy()), factor * self._plates.length)
 
     def projected(self, force: NDArray) -> NDArray:
         """Forces (m,) on states, of forces (m,) on the body's dofs, N."""
         return self._ties.force(force)
 
-    def start(self) -> NDArray:
-        """State (m,) from which the path is sought."""
-        return self._rest.copy()
+    def start(self, factor: float = 0.0) -> NDArray:
+        """State (m,) from which the path is sought, with planes where they are at a factor."""
+        return self._plates.joined(self._plates.others(self._rest), factor * self._plates.length)
+
+    def planes(self, u: NDArray) -> NDArray:
+        """Displacements (p, 3) of the planes of contact in a state (m,), m."""
+        return self._plates.moved(u)
+
+    def body(self, u: NDArray, factor: float) -> Any:
+        """The body, its folds actuated and its planes where they are in a state (m,)."""
+        return self._plates.placed(self.actuation.body(factor), u)
 
     def prescribed(self, factor: float) -> NDArray:
         """Displacements of held dofs: imposed ones times the factor, others where they stood."""
@@ -172,7 +183,7 @@ class OrigamiProblem:
 
     def external(self, u: NDArray, factor: float) -> NDArray:
         """External forces (m,), N."""
-        return self._ties.force(self._external(self.dofs(u), factor))
+        return self._plates.joined(self._ties.force(self._external(self.dofs(u), factor)))
 
     def _external(self, q: NDArray, factor: float) -> NDArray:
         """External forces (m,) on the body's dofs q (m,), N."""
@@ -195,11 +206,14 @@ class OrigamiProblem:
     def unbalanced(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,) on the body's dofs, N."""
         q = self.dofs(u)
-        return self.actuation.body(factor).internal(q, self._work) - self._external(q, factor)
+        return self.body(u, factor).internal(q, self._work) - self._external(q, factor)
 
     def residual(self, u: NDArray, factor: float) -> NDArray:
         """Internal minus external force (m,), N."""
-        return self._ties.force(self.unbalanced(u, factor))
+        force = self._ties.force(self.unbalanced(u, factor))
+        if not self._plates:
+            return force
+        return np.append(force, self._plates.force(self.body(u, factor), self.dofs(u)))
 
     def reactions(self, u: NDArray, factor: float) -> NDArray:
         """What supports exert, N, on `case.reaction_dofs`."""
@@ -209,10 +223,11 @@ class OrigamiProblem:
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Body.step_tangent`."""
         q, old = self.dofs(u), None if before is None else self.dofs(before)
-        matrix = self.actuation.body(factor).step_tangent(q, old)
+        body = self.body(u, factor)
+        matrix = body.step_tangent(q, old)
         if self.following.acts:
             matrix = sparse.csr_array(matrix + self.load_stiffness(q, factor))
-        return self._ties.matrix(matrix)
+        return self._plates.bordered(self._ties.matrix(matrix), body, q, self._ties.force)
 
     def following_force(self, q: NDArray, factor: float) -> NDArray:
         """Forces (m,), N, of loads that depend on the displacement, on the body's dofs q (m,)."""
@@ -227,15 +242,18 @@ class OrigamiProblem:
         if not self.actuation.acts and self._adaptive is None and self._relief is None:
             if not self.following.acts:
                 return -self.growing
-            return -self.growing - following_force(self.following, u, _factors(0.0, 1.0))
+            pushed = following_force(self.following, self.dofs(u), _factors(0.0, 1.0))
+            return -self.growing - self._plates.joined(self._ties.force(pushed))
         ahead, behind = self.residual(u, factor + PROBE), self.residual(u, factor - PROBE)
         return (ahead - behind) / (2.0 * PROBE)
 
     def reference(self, u: NDArray, factor: float) -> float:
         """Largest of the norms of the external forces and of the hinges' forces alone, N."""
-        hinges = self.actuation.body(factor).hinge_forces(self.dofs(u), self._work)
-        external = self._external(u, factor)
-        return max(float(np.linalg.norm(hinges)), float(np.linalg.norm(external)))
+        q, body = self.dofs(u), self.body(u, factor)
+        forces = [body.hinge_forces(q, self._work), self._external(q, factor)]
+        if self.case.contact is not None:
+            forces.append(body.contact(q)[1])
+        return max(float(np.linalg.norm(force)) for force in forces)
 
     def keep(self, u: NDArray) -> Any:
         """Accept a state (m,), where creases have yielded; returns what `recall` takes."""
@@ -263,9 +281,24 @@ class OrigamiProblem:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
         return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
 
+    def touch(self, u: NDArray) -> dict[str, NDArray]:
+        """Forces of contact in a state (m,), as `results.quantities.CONTACT` names them, N."""
+        if self.case.contact is None:
+            return {}
+        q, body = self.dofs(u), self.body(u, 0.0)
+        planes = {"plane_force": body.plane_forces(q)} if self.case.contact.planes else {}
+        return {"contact_force": body.touch(q), **planes}
+
+    def clear(self, u: NDArray, step: NDArray) -> float:
+        """Share of a step (m,) from a state in which nothing crosses."""
+        if self.case.contact is None:
+            return 1.0
+        q, body = self.dofs(u), self.body(u, 0.0)
+        return body.clear(q, self.dofs(u + step) - q, self._plates.moved(step))
+
     def energies(self, u: NDArray, factor: float) -> NDArray:
         """Strain energies (J) by `groups`."""
-        return self.actuation.body(factor).energies(self.dofs(u))
+        return self.body(u, factor).energies(self.dofs(u))
 
     def actuation_rate(self, u: NDArray, factor: float) -> float:
         """Derivative (J) of the energy with respect to the factor at fixed u: by actuation."""
@@ -273,6 +306,31 @@ class OrigamiProblem:
             return 0.0
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
         return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
+
+
+def _plates(case: Case, flows: bool) -> Plates:
+    """Planes that move along the path.
+
+    Raises
+    ------
+    InputError
+        There is friction, or creases yield.
+    """
+    if case.contact is None:
+        return Plates(case)
+    own, planes = case.contact.friction, case.contact.planes
+    if any((own if plane.friction is None else plane.friction) > 0.0 for plane in planes):
+        raise InputError(
+            ".friction: paths of equilibria take contact without friction: give 0 here and in the "
+            "planes, or simulate a slow motion",
+            "contact",
+        )
+    if flows:
+        raise InputError(
+            ": paths of equilibria take it with elastic laws; simulate the motion, or leave it out",
+            "contact",
+        )
+    return Plates(case)
 
 
 def _flows(case: Case, flow: str) -> tuple[Remembering, ...]:
@@ -318,7 +376,7 @@ def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDAr
 def drives(case: Case, constant: Sequence[int]) -> bool:
     """Whether anything of a case grows with the load factor."""
     growing = any(i not in set(constant) for i in range(len(case.loads)))
-    return growing or bool(case.imposed_terms)
+    return growing or bool(case.imposed_terms) or bool(case.obstacle_terms)
 
 
 def is_actuated(case: Case) -> bool:

@@ -166,7 +166,7 @@ def _true(remedy: str, problem: OrigamiProblem) -> str:
 def _closed(problem: OrigamiProblem, points: Sequence[Point]) -> str:
     """A remedy where the path ends because a fold is closed; empty otherwise."""
     structure = problem.structure
-    if not points or not len(structure.folds):
+    if not points or not len(structure.folds) or problem.case.contact is not None:
         return ""
     state = structure.nodes + problem.displacement(points[-1].u)
     folds = np.degrees(hinge_angles(state, structure.folds))
@@ -212,6 +212,7 @@ def _dataset(
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
             **_memory(problem, points),
+            **_touch(problem, points),
         },
         {
             **facts,
@@ -241,6 +242,12 @@ def _memory(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
         return {}
     lost = [0.0 if point.memory is None else point.memory[2][0] for point in points]
     return {"memory": [problem.memory(point.memory) for point in points], "dissipated": lost}
+
+
+def _touch(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
+    """Forces of contact at the points, N."""
+    forces = [problem.touch(point.u) for point in points]
+    return {name: [force[name] for force in forces] for name in forces[0]}
 
 
 def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:

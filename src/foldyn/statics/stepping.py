@@ -206,6 +206,11 @@ class Released:
         """Turn in the problem."""
         return self.problem.turn(u, v)
 
+    def clear(self, u: NDArray, step: NDArray) -> float:
+        """Share of a step in which nothing crosses in the problem."""
+        clear = getattr(self.problem, "clear", None)
+        return clear(u, step) if clear else 1.0
+
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:
     """Station at the equilibrium at a load factor that belongs to a state (m,).

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Gravity, State
 from foldyn.cases.ties import check_tied
+from foldyn.cases.touching import check_contact
 from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
@@ -145,7 +146,8 @@ def trace(
         flow=REFUSED if plan.method.rule is not None else FOLLOWED,
         memory=_flowed(case, initial),
     )  # fmt: skip
-    _check_start(problem)
+    begin = 0.0 if initial is None else plan.begin
+    _check_start(problem, begin)
     _check_actuation(problem, plan)
     refuse_mechanisms(problem)
     solver = Solver(problem, settings)
@@ -160,7 +162,7 @@ def trace(
     }
 
     def stations() -> Walk:
-        start = settle(solver, problem.start(), 0.0 if initial is None else plan.begin)
+        start = settle(solver, problem.start(begin), begin)
         first = kept(problem, start)
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
@@ -254,26 +256,29 @@ def check_movable(case: Case) -> None:
 def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
     """Refuse a case in which nothing happens along the path."""
     check_movable(case)
-    moves = bool(case.imposed_terms) or is_actuated(case)
+    moves = bool(case.imposed_terms) or is_actuated(case) or bool(case.obstacle_terms)
     if plan.method.name == "displacement" and not moves:
         raise InputError(
-            " 'displacement' needs something that moves: an Impose among the supports or an "
-            "Actuate among the loads; paths under forces take 'newton' or 'arc_length'",
+            " 'displacement' needs something that moves: an Impose among the supports, an Actuate "
+            "among the loads, or a plane of contact; paths under forces take 'newton' or "
+            "'arc_length'",
             "method",
         )
     if not plan.factors and plan.begin == 0.0 and plan.method.rule is None:
         return  # one point, of what is constant
     if not (drives(case, constant) or adaptive):
         raise InputError(
-            "nothing grows along the path: give a Force, Gravity, Actuate or Impose that is not "
-            "among the constant loads (load_factors = [0] finds the state under these alone)"
+            "nothing grows along the path: give a Force, Gravity, Actuate, Impose or moving plane "
+            "that is not among the constant loads (load_factors = [0] finds the state under these "
+            "alone)"
         )
 
 
-def _check_start(problem: OrigamiProblem) -> None:
-    """Refuse a state in which a bar has no length left."""
-    structure = problem.structure
-    x = structure.nodes + problem.displacement(problem.start())
+def _check_start(problem: OrigamiProblem, factor: float) -> None:
+    """Refuse a state at a factor in which a bar has no length left, or something has crossed."""
+    structure, u = problem.structure, problem.start(factor)
+    check_contact(problem.case, problem.displacement(u), problem.planes(u))
+    x = structure.nodes + problem.displacement(u)
     length = np.linalg.norm(x[structure.bars[:, 1]] - x[structure.bars[:, 0]], axis=1)
     short = np.flatnonzero(~(length > SHORTEST * structure.bar_length))
     if short.size:

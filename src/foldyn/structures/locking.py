@@ -36,10 +36,10 @@ def kept_apart(structure: Discretized, one: int, other: int) -> str:
     if locks(law):
         return (
             f"the law of this {kind} ({law.name}) locks, but is overcome, and would be with any "
-            "step: push less, or more slowly, end before panels meet, or, in motions with an "
-            "explicit method, give the case contact: fd.Contact()"
+            "step: push less, or more slowly, end before panels meet, or give the case contact: "
+            "fd.Contact()"
         )
     return (
         f"a law that locks ({kind}_law = 'enhanced', EnhancedLinear) keeps panels apart, unless "
-        "they are pushed hard; contact, fd.Contact(), does in motions with an explicit method"
+        "they are pushed hard; contact, fd.Contact(), does however hard"
     )

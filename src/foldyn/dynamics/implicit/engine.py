@@ -20,6 +20,7 @@ from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
+from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.system import Packed, accelerate, acceleration
 from foldyn.jit.compiled import kernel
@@ -69,7 +70,9 @@ class Implicit:
         self._packed, self._course, self._plan, self._jumps = packed, course, plan, jumps
         self._scheme = make(packed, course)
         self._matrix = StepMatrix(packed, self._scheme.symmetric)
-        self._newton = Newton(self._scheme, self._matrix)
+        touches = packed.system.touches
+        self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
+        self._newton = self._touching or Newton(self._scheme, self._matrix)
         self._halved = 0
         self._horizon = 0.0  # s in which a vibration moves on
         self._end: NDArray | None = None
@@ -82,6 +85,7 @@ class Implicit:
             "factorizations": self._matrix.factorizations,
             "linear_solver": self._matrix.solver,
             "halved_steps": self._halved,
+            **self._contact_facts(),
         }
 
     def continuation(self) -> NDArray:
@@ -147,6 +151,11 @@ class Implicit:
         course = [self._course.angle.copy(), np.array([*measured, self._horizon])]
         return [*self._scheme.state(), *course, *self._newton.state()]
 
+    def _contact_facts(self) -> dict[str, Any]:
+        if self._touching is None:
+            return {}
+        return {"contact_lists": int(self._touching.memory.counts.lists)}
+
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         with one_thread():
@@ -176,6 +185,8 @@ class Implicit:
         self._course.tally.farthest = _largest(scheme.displacement())
         if self._packed.system.varies and not plan.steps:
             self._horizon = self._impulse_lasts()
+        if self._touching is not None:
+            self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
         if self._packed.body.memory is not None:
             self._packed.body.memory.still()
@@ -314,12 +325,19 @@ class Implicit:
         done, lost = scheme.works(h)
         course.tally.work += done
         course.tally.dissipated += lost
+        if self._touching is not None:
+            given, taken = self._touching.works()
+            course.tally.work += given
+            course.tally.dissipated += taken
+            self._touching.begin()
         course.angle[:] = scheme.work.angle
         scheme.accept(h)
         if self._packed.body.memory is not None:
             self._packed.body.memory.commit()
         if jump is not None:
             scheme.begin(max(end, jump))
+            if self._touching is not None:
+                self._touching.begin()
 
     def _error(self, t: float, h: float) -> tuple[float, float]:
         """Error of the worst node in a step from t, over the tolerance, and its new scale.

@@ -56,6 +56,8 @@ class StepMatrix:
         Blocks that the caller fills.
     free : ndarray of int
         Free dofs, 3 place + axis, in the order in which they are solved for.
+    added : csr_array, shape (3 rows, 3 rows), or None
+        Further stiffness wherever it stands, N/m, with that of the body: of contact.
     solver : str
         What factorizes.
     """
@@ -89,6 +91,8 @@ class StepMatrix:
         along = self.blocks.order
         self.free = along[~held[along]]
         self._ties = system.ties
+        self.added: sparse.csr_array | None = None
+        self._onto = _onto(self.free, self._ties, 3 * nodes) if system.touches else None
         filled = self.blocks.filled(self.pattern) | (masses != 0.0) | (viscous != 0.0)
         filled |= self._elements.filled(shape)
         filled.reshape(-1)[self._follow] = True
@@ -132,6 +136,9 @@ class StepMatrix:
 
     def _factorized(self, weights: Weights) -> Any:
         """Factors of the matrix without modal damping."""
+        if self.added is not None and self._onto is not None:
+            added = self._onto.T @ self.added @ self._onto
+            return self._sparse(weights, self._matrices, weights.stiffness * added)
         if self._band is not None:
             try:
                 return self._band(weights, self._matrices)
@@ -227,14 +234,23 @@ class _Sparse:
         if symmetric:
             self.solver, self._make = factorizer("auto", size)
 
-    def __call__(self, weights: Weights, matrices: Matrices) -> Any:
+    def __call__(self, weights: Weights, matrices: Matrices, added: Any = None) -> Any:
         data = np.zeros(len(self._indices))
         if len(self._value):
             _gather_tied(weights, matrices, self._take, self._value, self._put, data)
         else:
             _gather(weights, matrices, self._take, self._put, data)
         shape = (self._size, self._size)
-        return self._make(sparse.csc_array((data, self._indices, self._indptr), shape))
+        matrix = sparse.csc_array((data, self._indices, self._indptr), shape)
+        return self._make(matrix if added is None else sparse.csc_array(matrix + added))
+
+
+def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
+    """Motions (dofs, f) of all dofs by those of the free ones: slaves of constraints follow."""
+    number = np.full(dofs, -1)
+    number[free] = np.arange(len(free))
+    start, master, value = _masters(number, free, ties)
+    return sparse.csr_array((value, master, start), (dofs, len(free)))
 
 
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:

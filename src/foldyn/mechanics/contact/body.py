@@ -13,16 +13,19 @@ from scipy import sparse
 
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.body import Blocks, Body, Unstrained
+from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
-from foldyn.mechanics.contact.tables import HISTORY, Sheets, Tables, tables
+from foldyn.mechanics.contact.planes import add_planes
+from foldyn.mechanics.contact.tables import HISTORY, POINT, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     pair_tangents,
     plane_tangents,
     touching_pairs,
 )
+from foldyn.mechanics.tangent import Sparsity
 from foldyn.mechanics.wrapped_body import WrappedBody
 
 GROUP = "contact"
@@ -62,11 +65,21 @@ class TouchingBody(WrappedBody):
     @cached_property
     def _memory(self) -> Memory:
         """Lists of pairs for the evaluations below, which they find again where they serve."""
+        if self._like is not None:
+            return self._like._memory
         return memory(self.tables, self.sheets.panels)
 
     def around(self, inner: Body) -> TouchingBody:
         """See `WrappedBody`."""
         return TouchingBody(inner, self.sheets, self)
+
+    def displaced(self, moved: NDArray) -> TouchingBody:
+        """The same with planes displaced by `moved` (p, 3), m."""
+        body = self.around(self.inner)
+        planes = self.tables.planes.copy()
+        planes[:, POINT : POINT + 3] += moved
+        body.tables = self.tables._replace(planes=planes)
+        return body
 
     def driven(self, rows: Mapping[int, int]) -> TouchingBody:
         """The same with planes, by number, that move with histories of these numbers."""
@@ -83,15 +96,9 @@ class TouchingBody(WrappedBody):
         add_contact(self.tables, u, self.inner.angles(q), force, self._memory)
         return float(self._memory.facts.energy), force
 
-    def touch(self, u: NDArray, moved: NDArray) -> NDArray:
-        """Size (n,), N, of the force of contact on each node at u (n, 3), without friction.
-
-        moved : (q, 3) displacement of the planes, m.
-        """
-        self._memory.moved[:, :3] = moved
-        force = self.contact(u.ravel())[1]
-        self._memory.moved[:] = 0.0
-        return np.linalg.norm(force, axis=1)
+    def touch(self, q: NDArray) -> NDArray:
+        """Size (n,), N, of the force of contact on each node, without friction."""
+        return np.linalg.norm(self.contact(q)[1], axis=1)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`."""
@@ -117,26 +124,36 @@ class TouchingBody(WrappedBody):
     def contact_tangent(self, q: NDArray) -> sparse.csr_array:
         """The second derivative (m, m), N/m, of the energy of contact."""
         self.contact(q)
-        own, kept = self.tables, self._memory
-        first, second = touching_pairs(own, kept)
-        nodes = np.empty((len(first) + len(second), 4), np.int64)
-        blocks = np.zeros((len(nodes), 12, 12))
-        pair_tangents(own, kept, first, second, nodes, blocks)
-        guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
-        acts = guard_tangents(own, kept.x, guards)
-        nodes = np.concatenate([nodes, own.hinges[acts]])
-        four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
-        pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
-        if len(own.planes):
-            normal = plane_tangents(own, kept.x, kept)
-            met = np.flatnonzero(normal.any(axis=(1, 2)))
-            pairs.append(np.column_stack([met, met]))
-            entries.append(normal[met])
-        return assembled(np.concatenate(pairs), np.concatenate(entries), self.size)
+        return contact_tangent(self.tables, self._memory, self.size)
 
-    def blocks(self) -> Blocks:
-        """See `Body`."""
-        raise NotImplementedError("implicit methods do not take contact")
+    def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
+        """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
+        u, motion = self.nodal(q), self.nodal(step)
+        return clear_share(self.tables, self._memory, u, motion, moves, keep)
+
+    def plane_forces(self, q: NDArray) -> NDArray:
+        """Force (p, 3), N, of each plane on the nodes, without friction."""
+        self.contact(q)
+        out = np.zeros((len(self.tables.planes), 3))
+        for plane, alone in enumerate(self._alone()):
+            force = np.zeros_like(self._memory.x)
+            add_planes(alone, self._memory.x, self._memory, force)
+            out[plane] = -force.sum(axis=0)
+        return out
+
+    def plane_tangents(self, q: NDArray) -> list[NDArray]:
+        """Second derivatives (n, 3, 3), N/m, of the potential of each plane."""
+        self.contact(q)
+        return [plane_tangents(alone, self._memory.x, self._memory) for alone in self._alone()]
+
+    def _alone(self) -> list[Tables]:
+        """Tables with one plane each."""
+        planes = self.tables.planes
+        return [self.tables._replace(planes=planes[p : p + 1]) for p in range(len(planes))]
+
+    def blocks(self) -> InnerBlocks:
+        """See `Body`: of the body within; which nodes touch changes, so contact is apart."""
+        return InnerBlocks(self.inner.blocks())
 
     def workspaces(self, threads: int) -> Sequence[TouchingWork]:
         """See `Body`: one thread."""
@@ -157,3 +174,41 @@ class TouchingBody(WrappedBody):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `Body`: without contact."""
         return self.inner.unstrained(q)
+
+
+class InnerBlocks:
+    """Blocks of the body within one with contact; see `mechanics.body.Blocks`."""
+
+    def __init__(self, inner: Blocks) -> None:
+        self._inner = inner
+        self.pattern, self.order, self.unused = inner.pattern, inner.order, inner.unused
+
+    def put(
+        self, body: Body, pattern: Sparsity, u: NDArray, before: NDArray, again: bool, out: NDArray
+    ) -> None:
+        """See `Blocks`."""
+        own = body.inner if isinstance(body, TouchingBody) else body
+        self._inner.put(own, pattern, u, before, again, out)
+
+    def filled(self, pattern: Sparsity) -> NDArray:
+        """See `Blocks`."""
+        return self._inner.filled(pattern)
+
+
+def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
+    """The second derivative (size, size), N/m, of the energy of contact where it was last found."""
+    first, second = touching_pairs(own, kept)
+    nodes = np.empty((len(first) + len(second), 4), np.int64)
+    blocks = np.zeros((len(nodes), 12, 12))
+    pair_tangents(own, kept, first, second, nodes, blocks)
+    guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
+    acts = guard_tangents(own, kept.x, guards)
+    nodes = np.concatenate([nodes, own.hinges[acts]])
+    four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
+    pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+    if len(own.planes):
+        normal = plane_tangents(own, kept.x, kept)
+        met = np.flatnonzero(normal.any(axis=(1, 2)))
+        pairs.append(np.column_stack([met, met]))
+        entries.append(normal[met])
+    return assembled(np.concatenate(pairs), np.concatenate(entries), size)

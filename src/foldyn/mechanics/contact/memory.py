@@ -21,7 +21,8 @@ class Memory(NamedTuple):
     d0: NDArray  # (2, m) m
     gap: NDArray  # (2, m) distance less d0 when they were listed, m
     near: NDArray  # (2, m) pairs that may come within d0 in this step
-    anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m; 1 if it is
+    anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m, and the normal
+    # force when it was, N; 0 if it is not
     friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force
     moved: NDArray  # (q, 6) displacement of the planes, m, and its velocity, m/s
     counts: np.record
@@ -38,6 +39,7 @@ COUNTED = (
     "watched",  # whether `limited` keeps the lists up to date, before every step
     "hinges",  # that may come within their guard in this step
     "full",  # whether the last list could not be made
+    "lagged",  # whether friction is bounded by the normal force at the end of the last step
 )
 # energy at the last force (J), skin of the list (m), shortest step asked for so far (s)
 MEASURED = ("energy", "skin", "shortest")

@@ -4,16 +4,20 @@ A node at the distance d from a plane has the energy k d0^2 f(d/d0), d0 half its
 Friction is a spring along the plane from the node to an anchor that moves with the plane: it pulls
 with k s, s its stretch, at most mu N, N the normal force. At the end of a step the anchor follows a
 node that slips, and what the spring then loses is dissipated (the elastic predictor and slip of
-return mapping; Wriggers, Computational Contact Mechanics, 2006, section 5.2.3).
+return mapping; Wriggers, Computational Contact Mechanics, 2006, section 5.2.3). Implicit methods
+take N from the end of the last step: then friction has a potential within a step, and a symmetric
+tangent.
 """
 
 from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.tables import FRICTION, HISTORY, MOTION, NORMAL, POINT
+
+LEAST = 1e-300  # N: a normal force that is not zero
 
 
 @kernel
@@ -59,12 +63,20 @@ def add_planes(tables, x, memory, force):
                 force[i, c] -= push[3] * plane[NORMAL + c]
             if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
                 stretch = stretch_of(tables, x, memory, p, i)
-                most = plane[FRICTION] * push[3] / k
+                most = farthest_stretch(tables, memory, p, i)
                 share = k if stretch[3] <= most else k * most / stretch[3]
                 for c in range(3):
                     push[c] = share * stretch[c]
                     force[i, c] += push[c]
     return energy
+
+
+@scalar
+def farthest_stretch(tables, memory, p, i):
+    """Stretch (m) at which the spring of node i on plane p slips, after its normal force."""
+    lagged = memory.counts.lagged == 1
+    normal = memory.anchor[p, i, 3] if lagged else memory.friction[p, i, 3]
+    return tables.planes[p, FRICTION] * normal / tables.stiffness
 
 
 @kernel
@@ -94,12 +106,13 @@ def slip(tables, x, memory):
             if d >= d0:
                 anchor[3] = 0.0
                 continue
-            if anchor[3] == 0.0:
-                anchor[3] = 1.0
+            fresh, pressed = anchor[3] == 0.0, -d0 * barrier(d / d0)[1]
+            anchor[3] = max(tables.stiffness * pressed, LEAST)
+            if fresh:
                 for c in range(3):
                     anchor[c] = x[i, c] - moved[c]
                 continue
-            most = -plane[FRICTION] * d0 * barrier(d / d0)[1]
+            most = plane[FRICTION] * pressed
             stretch = stretch_of(tables, x, memory, p, i)
             if stretch[3] > most:
                 for c in range(3):

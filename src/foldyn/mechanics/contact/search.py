@@ -139,50 +139,33 @@ def _beside(x, nodes, low, high):
     return True
 
 
-@kernel
-def _vertex_pairs(tables, x, far, skin, low, size, counts, start, items, memory):
-    """List vertices and triangles; returns how many there are."""
-    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
-    below, above = np.empty(3), np.empty(3)
-    found, room = 0, memory.d0.shape[1]
-    for t in range(len(tables.triangles)):
-        _corners(x, tables.triangles[t], below, above)
+@scalar
+def _gap(tables, x, kind, one, other, low, high):
+    """Where boxes meet: d0 (m) of a pair, 0 if it never touches, and its distance less d0."""
+    if kind == 0:
         for c in range(3):
-            below[c] -= far
-            above[c] += far
-            first[c] = _cell(below[c], low[c], size, counts[c])
-            last[c] = _cell(above[c], low[c], size, counts[c])
-        for i in range(first[0], last[0] + 1):
-            for j in range(first[1], last[1] + 1):
-                row = (i * counts[1] + j) * counts[2]
-                for at in range(start[row + first[2]], start[row + last[2] + 1]):
-                    v = tables.surface[items[at]]
-                    outside = False
-                    for c in range(3):
-                        outside = outside or x[v, c] < below[c] or x[v, c] > above[c]
-                    if outside:
-                        continue
-                    d0 = panel_d0(tables, v, tables.panel[t])
-                    if d0 == 0.0:
-                        continue
-                    gap = vertex_gap(tables, x, v, t) - d0
-                    if gap > skin:
-                        continue
-                    if found < room:
-                        memory.pairs[0, found, 0], memory.pairs[0, found, 1] = v, t
-                        memory.d0[0, found], memory.gap[0, found] = d0, gap
-                    found += 1
-    return found
+            if x[one, c] < low[c] or x[one, c] > high[c]:
+                return 0.0, 0.0
+        d0 = panel_d0(tables, one, tables.panel[other])
+        return d0, vertex_gap(tables, x, one, other) - d0 if d0 > 0.0 else 0.0
+    if other <= one or not _beside(x, tables.edges[other], low, high):
+        return 0.0, 0.0
+    d0 = edge_d0(tables, one, other)
+    return d0, edge_gap(tables, x, one, other) - d0 if d0 > 0.0 else 0.0
 
 
 @kernel
-def _edge_pairs(tables, x, far, skin, low, size, counts, half, start, items, memory):
-    """List edges and edges; returns how many there are."""
+def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, memory):
+    """List vertices and triangles, kind 0, or edges and edges; returns how many there are.
+
+    half : (3,) of the largest extent of what is sorted into the cells by its middle.
+    """
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     below, above = np.empty(3), np.empty(3)
     found, room = 0, memory.d0.shape[1]
-    for e in range(len(tables.edges)):
-        _corners(x, tables.edges[e], below, above)
+    elements = tables.triangles if kind == 0 else tables.edges
+    for e in range(len(elements)):
+        _corners(x, elements[e], below, above)
         for c in range(3):
             below[c] -= far
             above[c] += far
@@ -192,18 +175,15 @@ def _edge_pairs(tables, x, far, skin, low, size, counts, half, start, items, mem
             for j in range(first[1], last[1] + 1):
                 row = (i * counts[1] + j) * counts[2]
                 for at in range(start[row + first[2]], start[row + last[2] + 1]):
-                    other = items[at]
-                    if other <= e or not _beside(x, tables.edges[other], below, above):
-                        continue
-                    d0 = edge_d0(tables, e, other)
-                    if d0 == 0.0:
-                        continue
-                    gap = edge_gap(tables, x, e, other) - d0
-                    if gap > skin:
+                    one, other = e, items[at]
+                    if kind == 0:
+                        one, other = tables.surface[other], e
+                    d0, gap = _gap(tables, x, kind, one, other, below, above)
+                    if d0 == 0.0 or gap > skin:
                         continue
                     if found < room:
-                        memory.pairs[1, found, 0], memory.pairs[1, found, 1] = e, other
-                        memory.d0[1, found], memory.gap[1, found] = d0, gap
+                        memory.pairs[kind, found, 0], memory.pairs[kind, found, 1] = one, other
+                        memory.d0[kind, found], memory.gap[kind, found] = d0, gap
                     found += 1
     return found
 
@@ -223,7 +203,7 @@ def list_pairs(tables, u, memory):
         counts.full = 1
         return
     e = len(tables.edges)
-    middle, half, mean = np.empty((e, 3)), np.zeros(3), 0.0
+    middle, half, none, mean = np.empty((e, 3)), np.zeros(3), np.zeros(3), 0.0
     for i in range(e):
         square = 0.0
         for c in range(3):
@@ -243,9 +223,9 @@ def list_pairs(tables, u, memory):
         start = np.empty(dims[0] * dims[1] * dims[2] + 1, np.int64)
         items = np.empty(max(len(vertices), e), np.int64)
         _sort(vertices, low, size, dims, start, items)
-        first = _vertex_pairs(tables, x, far, skin, low, size, dims, start, items, memory)
+        first = _pairs(tables, x, 0, far, skin, low, size, dims, none, start, items, memory)
         _sort(middle, low, size, dims, start, items)
-        second = _edge_pairs(tables, x, far, skin, low, size, dims, half, start, items, memory)
+        second = _pairs(tables, x, 1, far, skin, low, size, dims, half, start, items, memory)
         if max(first, second) <= memory.d0.shape[1]:
             break
         skin *= 0.5

@@ -36,7 +36,7 @@ MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
 
 
 @kernel
-def _fastest(v, n):
+def fastest(v, n):
     """Largest speed (m/s) of n nodes against the mean of all."""
     mean = np.zeros(3)
     for i in range(n):
@@ -145,7 +145,7 @@ def limited(tables, u, v, angle, dt, lightness, memory):
     angle : dihedrals (nh,) at u; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     limit, counts, x = dt, memory.counts, memory.x
-    fast = _fastest(v, len(x))
+    fast = fastest(v, len(x))
     if memory.d0.shape[1] > 0:
         skin = memory.facts.skin
         far = farthest(tables, u, memory)

@@ -11,10 +11,10 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.planes import height
+from foldyn.mechanics.contact.planes import farthest_stretch, height, stretch_of
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.search import edge_gap, vertex_gap
-from foldyn.mechanics.contact.tables import NORMAL
+from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle_tangent
 from foldyn.mechanics.dihedral import add_hessian
 
@@ -86,7 +86,7 @@ def guard_tangents(tables, x, blocks):
 
 @kernel
 def plane_tangents(tables, x, memory):
-    """Second derivatives (n, 3, 3) of the potential of planes."""
+    """Second derivatives (n, 3, 3) of the potential of planes, and of that of lagged friction."""
     out = np.zeros((len(x), 3, 3))
     for p in range(len(tables.planes)):
         for m in range(tables.meeting.size):
@@ -99,4 +99,23 @@ def plane_tangents(tables, x, memory):
                 for b in range(3):
                     normal = tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
                     out[i, a, b] += stiffness * normal
+            tied = tables.planes[p, FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0
+            if tied and memory.counts.lagged == 1:
+                _friction_tangent(tables, x, memory, p, i, out[i])
     return out
+
+
+@kernel
+def _friction_tangent(tables, x, memory, p, i, out):
+    """Add the derivative of the spring of node i on plane p to out (3, 3)."""
+    k, stretch = tables.stiffness, stretch_of(tables, x, memory, p, i)
+    most = farthest_stretch(tables, memory, p, i)
+    slips = stretch[3] > most
+    share = most / stretch[3] if slips else 1.0
+    for a in range(3):
+        for b in range(3):
+            along = -tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
+            along += 1.0 if a == b else 0.0
+            if slips:  # its force keeps its size
+                along -= stretch[a] * stretch[b] / (stretch[3] * stretch[3])
+            out[a, b] += k * share * along

@@ -1,0 +1,198 @@
+"""Newton's method for steps with contact: every iterate keeps parts apart.
+
+The potential of contact has no value where something has passed another, and grows without bound
+before it. So the prediction of a step and every iteration are cut to the share in which no gap
+closes by more than a part of itself (`mechanics.contact.approach`), and then to where the residual
+along the iteration is no longer large on the other side: there the energy has passed its least
+value. Where none of this leads to equilibrium the step is refused, and halved.
+
+Which nodes touch changes from one iteration to the next. The tangent of contact is a sparse matrix
+of its own, added to that of the structure before the factorization.
+
+Friction takes the normal force of the end of the last step, so that within a step it has a
+potential. Anchors follow nodes that slip where a step is accepted, as in explicit methods.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.algebra.superlu import SingularTangentError
+from foldyn.dynamics.implicit.matrix import StepMatrix
+from foldyn.dynamics.implicit.newton import Newton
+from foldyn.dynamics.implicit.scheme import (
+    ENOUGH,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    ROUNDING,
+    SOLVED,
+    STALL,
+    Goal,
+    Scheme,
+)
+from foldyn.dynamics.system import place
+from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.planes import move_planes, slip
+from foldyn.mechanics.contact.tables import NORMAL, POINT
+
+MOST = 60  # iterations, many of which are cut
+CUTS = 12  # of one iteration by the residual along it
+OVERSHOT = 0.5  # of the residual along an iteration: what may be left of it on the other side
+SMALLEST, LARGEST = 0.1, 0.5  # share of an iteration that is tried after one that goes too far
+PREDICTIONS = (1.0, 0.5, 0.25, 0.0)  # shares of the predicted motion, where obstacles move
+
+
+class TouchingNewton(Newton):
+    """Newton's method for steps with contact; see `Newton`."""
+
+    def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
+        super().__init__(scheme, matrix)
+        body: Any = scheme.packed.body
+        while not isinstance(body, TouchingBody):
+            body = body.inner
+        self._tables, self._memory = body.tables, scheme.work.memory
+        self._memory.counts.lagged = 1
+        self._size = 3 * scheme.packed.system.rows
+        self._free = np.zeros(self._size, bool)
+        self._free[matrix.free] = True
+        self._moved = np.zeros((len(self._tables.planes), 3))  # of planes at the start of the step
+        self._pushed = self._memory.friction.copy()  # and what they did to nodes there
+
+    @property
+    def memory(self) -> Memory:
+        """What contact keeps."""
+        return self._memory
+
+    def begin(self) -> None:
+        """Take the state where forces were evaluated last for the start of the next step."""
+        kept = self._memory
+        self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
+        slip(self._tables, kept.x, kept)
+
+    def works(self) -> tuple[float, float]:
+        """Work (J) of planes that move in a step that has been solved, and what friction took."""
+        kept, scheme = self._memory, self.scheme
+        if not len(self._moved):
+            return 0.0, 0.0
+        push = 0.5 * (self._pushed + kept.friction)
+        along = (kept.moved[:, :3] - self._moved)[:, None, :]
+        motion = (scheme.moved() - scheme.displacement())[: push.shape[1]]
+        normal = push[:, :, 3:] * self._tables.planes[:, None, NORMAL : NORMAL + 3]
+        done = float(((normal - push[:, :, :3]) * along).sum())
+        return done, float((push[:, :, :3] * (motion - along)).sum())
+
+    def solve(self, h: float, t: float) -> int:
+        """See `Newton`."""
+        scheme, matrix = self.scheme, self.matrix
+        self._lasting = False
+        goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
+        if not self._predict(t):
+            return NOT_CONVERGED
+        before, again, last = scheme.displacement().copy(), False, 0.0
+        norm, reference = self._residual(h, t)
+        for _ in range(MOST):
+            if not norm < np.inf:
+                return NOT_FINITE
+            if _solved(goal, norm, reference, last):
+                return SOLVED
+            scheme.tangent(matrix, before, again)
+            matrix.added = self._tangent()
+            try:
+                matrix.factorize(scheme.weights(h))
+            except SingularTangentError:
+                return NOT_CONVERGED
+            self._h = h
+            before, again = scheme.moved().copy(), True
+            step = -matrix.solve(scheme.out, scheme.step)
+            self.iterations += 1
+            last = norm
+            norm, reference = self._along(h, t, step)
+        return NOT_CONVERGED
+
+    def _residual(self, h: float, t: float) -> tuple[float, float]:
+        self.evaluations += 1
+        return self.scheme.residual(h, t)
+
+    def _tangent(self) -> sparse.csr_array | None:
+        """That of contact where forces were evaluated last; None where nothing touches."""
+        tangent = contact_tangent(self._tables, self._memory, self._size)
+        return tangent if tangent.nnz else None
+
+    def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
+        """Go on by as much of a step (rows, 3) as leads on; norms of the residual there."""
+        scheme, start = self.scheme, self.scheme.shift.copy()
+        slope = float((scheme.out * step).sum())
+        share = self._clear(scheme.moved(), step, np.zeros_like(self._moved))
+        for _ in range(CUTS):
+            scheme.shift[:] = start + share * step
+            norm, reference = self._residual(h, t)
+            there = float((scheme.out * step).sum())
+            if there <= OVERSHOT * abs(slope) or slope >= 0.0:
+                break
+            share *= min(LARGEST, max(SMALLEST, -slope / (there - slope)))
+        return norm, reference
+
+    def _clear(self, u: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
+        """Share of a step from u, both (rows, 3), that crosses nothing, as planes move (q, 3)."""
+        return clear_share(self._tables, self._memory, u, step, moves, keep)
+
+    def _predict(self, t: float) -> bool:
+        """Cut the predicted motion to where nothing crosses; tells whether there is such a one.
+
+        Supports and planes are at the end of the step at once: nodes make way for planes, and where
+        this does not help the step is too long.
+        """
+        scheme = self.scheme
+        predicted, start = scheme.shift.copy(), scheme.displacement().copy()
+        u, moves = self._at(t)
+        if not moves.any() and not len(scheme.packed.system.moved.dof):
+            scheme.shift *= self._start(start, u - start, moves)
+            return True
+        for share in PREDICTIONS:
+            scheme.shift[:] = share * predicted
+            u, moves = self._at(t)
+            self._give_way(u, moves)
+            u, moves = self._at(t)
+            if self._start(start, u - start, moves) == 1.0:
+                return True
+        return False
+
+    def _start(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
+        """`_clear` from the start of the step, where planes are."""
+        self._memory.moved[:, :3] = self._moved
+        return self._clear(u, step, moves)
+
+    def _at(self, t: float) -> tuple[NDArray, NDArray]:
+        """Displacement (rows, 3) at time t with the shift as it is, and motion of planes (q, 3)."""
+        scheme, kept = self.scheme, self._memory
+        s, old = scheme.scratch, scheme.old
+        place(scheme.packed.system, old.q + scheme.shift, old.w, t, s)
+        move_planes(self._tables, s.factor, kept)
+        return s.displacement.copy(), kept.moved[:, :3] - self._moved
+
+    def _give_way(self, u: NDArray, moves: NDArray) -> None:
+        """Push nodes before planes that would overtake them at u (rows, 3)."""
+        own, met = self._tables, self._tables.meeting
+        start, d0 = self.scheme.displacement(), 0.5 * own.node_thickness[met]
+        free = self._free.reshape(-1, 3)[met]
+        for p in np.flatnonzero(moves.any(axis=1)):
+            point, normal = own.planes[p, POINT : POINT + 3], own.planes[p, NORMAL : NORMAL + 3]
+            gap = (own.rest[met] + start[met] - point - self._moved[p]) @ normal
+            now = (own.rest[met] + u[met] - point - self._moved[p] - moves[p]) @ normal
+            short = np.maximum(0.5 * np.minimum(gap, d0) - now, 0.0)
+            self.scheme.shift[met] += np.where(free, short[:, None] * normal, 0.0)
+
+
+def _solved(goal: Goal, norm: float, reference: float, last: float) -> bool:
+    """Whether a residual (N), after the last one, is that of a step that is solved; see `judge`."""
+    forces = max(reference, goal.least)
+    if norm <= goal.tolerance * forces:
+        return True
+    rounding = max(ENOUGH * forces, ROUNDING * goal.rounding)
+    return last > 0.0 and norm > STALL * last and norm <= rounding

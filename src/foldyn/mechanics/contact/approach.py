@@ -1,0 +1,168 @@
+"""How far a motion may go before something crosses: the limit of steps that solve equations.
+
+Explicit methods limit their steps by speeds (`step_limit`). A step of Newton's method is a motion
+without one: nodes and planes go along straight lines, and it is cut so that each gap keeps a share
+of itself, no guarded hinge passes 0 or 2 pi, and nothing leaves the range of the list of pairs.
+
+The first gap to close is found by conservative advancement, which needs distances alone: a pair
+whose points move by l at most against each other keeps its gap g above its goal over the share
+(g - goal) / l of the motion; from there the next share follows (additive continuous collision
+detection; Li, Kaufman and Jiang, Codimensional Incremental Potential Contact, ACM Trans. Graph. 40,
+2021, section 5).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.mechanics.contact.distances import (
+    apart,
+    between,
+    closest_of_segments,
+    closest_on_triangle,
+    dot,
+    point,
+)
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.planes import height
+from foldyn.mechanics.contact.search import farthest, list_pairs, place, use_all
+from foldyn.mechanics.contact.step_limit import fastest
+from foldyn.mechanics.contact.tables import NORMAL
+
+KEEP = 0.2  # of each gap
+NEAR = 0.01  # of the goal: gaps so little above it have reached it
+ADVANCES = 100  # of one pair
+HALVINGS = 40  # where a hinge would pass
+
+
+@kernel
+def _distance(corners, kind):
+    """Distance (m) of a vertex from a triangle, kind 0, or of two edges, of corners (4, 3)."""
+    a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
+    if kind == 0:
+        wb, wc, wd, _ = closest_on_triangle(a, b, c, d)
+        r = apart(a, b, c, d, wb, wc, wd)
+    else:
+        s, t, _ = closest_of_segments(a, b, c, d)
+        r = between(a, b, c, d, s, t)
+    return math.sqrt(dot(r, r))
+
+
+@scalar
+def _length(values, i):
+    return math.sqrt(values[i, 0] ** 2 + values[i, 1] ** 2 + values[i, 2] ** 2)
+
+
+@kernel
+def _pair_share(corners, motion, kind, keep, best):
+    """The lesser of `best` and the share of a motion (4, 3) that leaves corners (4, 3) apart."""
+    for c in range(3):
+        mean = 0.25 * (motion[0, c] + motion[1, c] + motion[2, c] + motion[3, c])
+        for i in range(4):
+            motion[i, c] -= mean
+    one, two = _length(motion, 0), _length(motion, 1)
+    three, four = _length(motion, 2), _length(motion, 3)
+    fast = one + max(two, three, four) if kind == 0 else max(one, two) + max(three, four)
+    d = _distance(corners, kind)
+    goal, now = keep * d, 0.0
+    for _ in range(ADVANCES):
+        if not fast * (best - now) > d - goal:
+            return best
+        more = (d - goal) / fast
+        now += more
+        for i in range(4):
+            for c in range(3):
+                corners[i, c] += more * motion[i, c]
+        d = _distance(corners, kind)
+        if not d > (1.0 + NEAR) * goal:
+            break
+    return min(best, now)
+
+
+@kernel
+def _pairs_share(tables, memory, step, keep, best):
+    """Share of a motion (n, 3) that leaves all listed pairs apart."""
+    x, corners, motion = memory.x, np.empty((4, 3)), np.empty((4, 3))
+    nodes = np.empty(4, np.int64)
+    for kind in range(2):
+        listed = memory.counts.listed_first if kind == 0 else memory.counts.listed_second
+        for k in range(listed):
+            one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
+            if kind == 0:
+                nodes[0] = one
+                for i in range(3):
+                    nodes[1 + i] = tables.triangles[other, i]
+            else:
+                for i in range(2):
+                    nodes[i], nodes[2 + i] = tables.edges[one, i], tables.edges[other, i]
+            for i in range(4):
+                for c in range(3):
+                    corners[i, c], motion[i, c] = x[nodes[i], c], step[nodes[i], c]
+            best = _pair_share(corners, motion, kind, keep, best)
+    return best
+
+
+@kernel
+def _planes_share(tables, memory, step, moves, keep, best):
+    """Share of a motion (n, 3) that leaves all nodes before the planes, which move (q, 3)."""
+    for p in range(len(tables.planes)):
+        for m in range(tables.meeting.size):
+            i, closing = tables.meeting[m], 0.0
+            for c in range(3):
+                closing += (moves[p, c] - step[i, c]) * tables.planes[p, NORMAL + c]
+            if closing > 0.0:
+                best = min(best, (1.0 - keep) * height(tables, memory.x, memory, p, i) / closing)
+    return best
+
+
+@kernel
+def _hinges_share(tables, x, step, keep, best):
+    """Share of a motion (n, 3) in which no guarded hinge passes 0 or 2 pi."""
+    ahead, n = np.empty_like(x), len(x)
+    angle = np.empty(tables.hinge_limit.size)
+    for h in range(angle.size):
+        angle[h] = gradient_at(tables, x, h)[0]
+    for _ in range(HALVINGS):
+        for i in range(n):
+            for c in range(3):
+                ahead[i, c] = x[i, c] + best * step[i, c]
+        passes = False
+        for h in range(angle.size):
+            theta, now = angle[h], gradient_at(tables, ahead, h)[0]
+            near, was = min(now, TURN - now), min(theta, TURN - theta)
+            passes = passes or not (abs(now - theta) < math.pi and near >= keep * was)
+        if not passes:
+            return best
+        best *= 0.5
+    return 0.0
+
+
+@kernel
+def clear_share(tables, memory, u, step, moves, keep):
+    """Share, from 0 to 1, of a motion from displacement u by `step`, (rows, 3), that crosses none.
+
+    moves : (q, 3) motion of the planes along with it, m; keep : share of each gap that is left.
+    The list of pairs is renewed where it would not serve; memory.x becomes the positions at u.
+    """
+    place(tables, u, memory)
+    n, best = len(memory.x), 1.0
+    for i in range(n):  # a largest value does not see nan
+        if not _length(step, i) < math.inf:
+            return 0.0
+    fast = fastest(step, n)
+    if memory.d0.shape[1] > 0:
+        far, skin = farthest(tables, u, memory), memory.facts.skin
+        if memory.counts.has_list == 0 or not far <= 0.25 * skin:
+            list_pairs(tables, u, memory)
+            use_all(memory)
+            far, skin = 0.0, memory.facts.skin
+        if memory.counts.full == 1:
+            return 0.0
+        if fast > 0.5 * skin - far:
+            best = (0.5 * skin - far) / fast
+        best = _pairs_share(tables, memory, step, keep, best)
+        best = _hinges_share(tables, memory.x, step, keep, best)
+    return max(0.0, _planes_share(tables, memory, step, moves, keep, best))

@@ -1,0 +1,80 @@
+"""Planes of contact that move along a path: one more dof, held like a support that moves.
+
+Its value is the way (m) of the plane that goes farthest; at the load factor f all planes have gone
+f times their motion. So a step of Newton's method moves them together with the sheet, and is cut
+where they would overtake it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.cases import Case
+
+
+class Plates:
+    """The planes of a case as one dof of its states, or none.
+
+    Parameters
+    ----------
+    case : Case
+
+    Attributes
+    ----------
+    length : float
+        Way of that dof per unit of the load factor, m.
+    """
+
+    def __init__(self, case: Case) -> None:
+        planes = () if case.contact is None else case.contact.planes
+        motion = np.array([plane.motion or (0.0, 0.0, 0.0) for plane in planes], float)
+        motion = motion.reshape(-1, 3)
+        self.length = float(np.linalg.norm(motion, axis=1).max(initial=0.0))
+        self._motion = motion / self.length if self.length else motion
+
+    def __bool__(self) -> bool:
+        """Whether any plane moves."""
+        return self.length > 0.0
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """One True for the dof, if there is one."""
+        return np.ones(int(bool(self)), bool)
+
+    def joined(self, values: NDArray, own: float = 0.0) -> NDArray:
+        """Values (m,) of the other dofs with that of this one."""
+        return np.append(values, own) if self else values
+
+    def others(self, values: NDArray) -> NDArray:
+        """Values (m, ...) of the other dofs, of those of all."""
+        return values[:-1] if self else values
+
+    def moved(self, values: NDArray) -> NDArray:
+        """Displacements (p, 3) of the planes, m, of the values of all dofs."""
+        return float(values[-1]) * self._motion if self else np.zeros_like(self._motion)
+
+    def placed(self, body: Any, values: NDArray) -> Any:
+        """A body with its planes where they are in a state."""
+        return body.displaced(self.moved(values)) if self else body
+
+    def force(self, body: Any, q: NDArray) -> float:
+        """What moves the planes along their motion, N; q (m,) of the body."""
+        return float((body.plane_forces(q) * self._motion).sum())
+
+    def bordered(self, matrix: sparse.csr_array, body: Any, q: NDArray, project: Any) -> Any:
+        """A tangent of the other dofs with the row and column of this one, N/m.
+
+        project : makes of forces on the body's dofs those on states.
+        """
+        if not self:
+            return matrix
+        column, own = np.zeros(body.size), 0.0
+        for block, along in zip(body.plane_tangents(q), self._motion, strict=True):
+            column[: block.shape[0] * 3] -= (block @ along).ravel()
+            own += float((block @ along).sum(axis=0) @ along)
+        edge = sparse.csr_array(project(column)[:, None])
+        return sparse.csr_array(sparse.block_array([[matrix, edge], [edge.T, [[own]]]]))

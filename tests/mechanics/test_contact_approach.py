@@ -1,0 +1,139 @@
+"""How far steps may go before something crosses, and lagged friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_samples import T, miura, sheets, touching
+
+from foldyn.checks import tangent_error
+from foldyn.mechanics.contact.approach import KEEP, clear_share
+from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
+from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.memory import memory
+from foldyn.mechanics.contact.planes import slip
+from foldyn.mechanics.contact.search import edge_gap, list_pairs, place, vertex_gap
+from foldyn.mechanics.contact.tables import tables
+
+NO_HINGES = np.zeros((0, 4), np.int64)
+FLAT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+NO_PLANES = np.zeros((0, 3))
+
+
+def pair(above: float):
+    """Two triangles, one above the other, that list all pairs."""
+    nodes = np.vstack([FLAT, FLAT + np.array([0.2, 0.1, above])])
+    own = sheets(nodes, [[0, 1, 2], [3, 4, 5]], [0, 1], 0.1)
+    return tables(own, NO_HINGES)._replace(skin=100.0)
+
+
+@pytest.mark.parametrize("keep", [0.2, 0.5])
+def test_a_gap_that_closes_keeps_its_share(keep):
+    made = pair(0.3)
+    down, u = np.zeros((6, 3)), np.zeros((6, 3))
+    down[3:, 2] = -1.0
+    share = clear_share(made, memory(made), u, down, NO_PLANES, keep)
+    assert share == pytest.approx(0.3 * (1.0 - keep), rel=0.02)
+    assert share <= 0.3 * (1.0 - keep)
+
+
+def test_motions_that_close_no_gap_go_all_the_way():
+    made, u = pair(0.3), np.zeros((6, 3))
+    away, together, along = np.zeros((6, 3)), np.full((6, 3), 5.0), np.zeros((6, 3))
+    away[3:, 2], along[3:, 0] = 1.0, 0.3
+    for step in (away, together, along):
+        assert clear_share(made, memory(made), u, step, NO_PLANES, KEEP) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_nothing_crosses_on_the_way_of_any_motion(seed):
+    rng = np.random.default_rng(seed)
+    own = tables(
+        sheets(rng.uniform(-1, 1, (12, 3)), np.arange(12).reshape(4, 3), range(4), 0.02), NO_HINGES
+    )._replace(skin=100.0)
+    u, kept = np.zeros((12, 3)), memory(own)
+    step = rng.standard_normal((12, 3))
+    share = clear_share(own, kept, u, step, NO_PLANES, KEEP)
+    place(own, u, kept)
+    list_pairs(own, u, kept)
+    first, second = gaps(own, kept, 0.0 * step), []
+    for at in np.linspace(0.0, share, 40):
+        second.append(gaps(own, kept, at * step))
+    assert (np.min(second, axis=0) >= KEEP * first * (1.0 - 1e-9)).all()
+    if share < 1.0:  # no farther than need be: some gap is nearly down to what it keeps
+        assert (second[-1] / first).min() < 1.05 * KEEP
+
+
+def gaps(own, kept, u):
+    """Distances of all listed pairs at displacement u."""
+    x = own.rest + u
+    first = [vertex_gap(own, x, *kept.pairs[0, k]) for k in range(kept.counts.listed_first)]
+    second = [edge_gap(own, x, *kept.pairs[1, k]) for k in range(kept.counts.listed_second)]
+    return np.array([*first, *second])
+
+
+def test_steps_stay_within_the_range_of_the_list():
+    made = pair(0.3)._replace(skin=0.1)
+    step = np.zeros((6, 3))
+    step[3:, 0] = 2.0  # along each other: 1 m of each against the mean
+    kept = memory(made)
+    share = clear_share(made, kept, np.zeros((6, 3)), step, NO_PLANES, KEEP)
+    assert share == pytest.approx(0.5 * 0.1)
+    assert kept.counts.lists == 1
+    clear_share(made, kept, 0.9 * share * step, step, NO_PLANES, KEEP)
+    assert kept.counts.lists == 2
+
+
+def test_planes_and_sheets_that_meet_share_the_gap():
+    made = tables(sheets(FLAT, [[0, 1, 2]], [0], 0.1, [((0, 0, -0.2), (0, 0, 1), 0.0)]), NO_HINGES)
+    kept, u = memory(made), np.zeros((3, 3))
+    up, down = np.array([[0.0, 0.0, 1.0]]), np.zeros((3, 3))
+    down[:, 2] = -1.0
+    assert clear_share(made, kept, u, down, 0.0 * up, KEEP) == pytest.approx(0.8 * 0.2)
+    assert clear_share(made, kept, u, down, up, KEEP) == pytest.approx(0.8 * 0.1)
+    assert clear_share(made, kept, u, down, -up, KEEP) == 1.0
+    assert clear_share(made, kept, u, np.full((3, 3), np.nan), up, KEEP) == 0.0
+
+
+def test_no_hinge_passes_zero():
+    body = touching(miura(20.0))
+    u = np.zeros(body.size)
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        step = 0.02 * rng.standard_normal(body.size)
+        share = body.clear(u, step, NO_PLANES)
+        assert 0.0 < share < 1.0
+        angles = body.angles(share * step)[body.tables.hinge_row]
+        before = body.angles(u)[body.tables.hinge_row]
+        near, was = (np.minimum(a, 2 * np.pi - a) for a in (angles, before))
+        assert (np.abs(angles - before) < np.pi).all() and (near >= KEEP * was).all()
+
+
+@pytest.mark.parametrize("stretch", [1e-7, 1e-4])
+def test_the_tangent_of_lagged_friction_is_exact(stretch):
+    """Sticking with a small stretch, slipping with a large one."""
+    made = miura(70.0)
+    floor = ((0.0, 0.0, float(made.nodes[:, 2].min()) - 0.4 * T), (0.0, 0.0, 1.0), 0.3)
+    body = TouchingBody(
+        made.body, sheets(made.nodes, made.triangles, made.triangle_panel, T, [floor])
+    )
+    kept, u = memory(body.tables), np.zeros((len(made.nodes), 3))
+    place(body.tables, u, kept)
+    slip(body.tables, kept.x, kept)
+    kept.counts.lagged = 1
+    rng = np.random.default_rng(1)
+    u[:, :2] = stretch * rng.standard_normal((len(u), 2))
+
+    def force(v):
+        out = np.zeros_like(u)
+        add_contact(body.tables, v.reshape(-1, 3), body.angles(v), out, kept)
+        return out.ravel()
+
+    def tangent(v):
+        force(v)
+        return contact_tangent(body.tables, kept, body.size)
+
+    assert np.abs(force(u.ravel())[0::3]).max() > 0.0
+    assert tangent_error(force, tangent, u.ravel(), size=1e-9) < 1e-6
+    matrix = tangent(u.ravel())
+    assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
