@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Newton, Scheme
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed, acceleration
 from foldyn.jit.compiled import kernel
 
@@ -73,6 +74,24 @@ class Implicit:
             "halved_steps": self._halved,
         }
 
+    def standing(self) -> dict[str, NDArray]:
+        """All on which the next steps depend beside the case, between two stretches."""
+        made = np.array([self._matrix.factorized, self._matrix.factorizations])
+        return snapshot(self._parts()) | {"factorized": made}
+
+    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+        """Go on as the engine that stood there."""
+        restore(self._parts(), standing)
+        made, count = standing["factorized"].tolist()
+        if made:
+            with one_thread():
+                self._newton.remake()
+        self._matrix.factorizations = count
+
+    def _parts(self) -> dict[str, Any]:
+        own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
+        return parts_of(self._packed, self._course) | own | {"matrices": self._matrix.changing}
+
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         with one_thread():
@@ -88,7 +107,7 @@ class Implicit:
         advance = self._fixed if plan.steps else self._adaptive
         end = min(last, plan.steps) if plan.steps else last
         while tally.steps < end and (plan.steps or tally.time < plan.end):
-            if plan.every and not plan.steps and tally.samples == len(out.time):
+            if plan.every and not plan.steps and tally.samples == out.end:
                 return Outcome.FULL, -1
             outcome, hinge = advance(out)
             tally.evaluations = self._newton.evaluations
@@ -201,7 +220,7 @@ class Implicit:
     def _due(self, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps end, and whether a sample waits there."""
         plan, number = self._plan, int(self._course.tally.samples)
-        if plan.every or number == len(out.time):
+        if plan.every or number == out.end:
             return plan.end, False
         time = plan.start + number * plan.interval
         if time < plan.end - SAME_TIME * plan.interval:

@@ -261,6 +261,10 @@ class Newton:
         self._h = h
         return True
 
+    def remake(self) -> None:
+        """Factorize the matrix of the last step that was made anew, from its blocks."""
+        self.matrix.factorize(self.scheme.weights(self._h))
+
     def solve(self, h: float, t: float) -> int:
         """Move scheme.shift from its prediction to equilibrium at the end t of a step h (s).
 
