@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 import xarray
@@ -19,6 +19,7 @@ from foldyn.analyses.sections import CaseSchema
 from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
+from foldyn.dynamics import Keeping
 from foldyn.errors import InputError, within
 from foldyn.linear import refinement
 from foldyn.patterns import Pattern
@@ -34,6 +35,16 @@ Begun = Callable[[], None]
 Compute = Callable[[bool, Begun], xarray.Dataset]
 """Computes a result, with or without a bar; calls its second argument, once or more often, after
 all input has been accepted."""
+
+
+@runtime_checkable
+class Kept(Protocol):
+    """A computation that can be kept on the disk while it runs, and go on from there."""
+
+    kept: Keeping | None
+
+    def keep(self, keeping: Keeping, shown: bool) -> None:
+        """Say how it is kept, and whether its result is to be shown, for which memory must do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +175,7 @@ def movable(case: Case) -> NDArray[np.int64]:
 
 def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
     """Names of the arguments of an analysis' function, but for what `run` itself gives."""
-    own = {"case", "progress", "options"}
+    own = {"case", "progress", "options", "kept"}
     return tuple(name for name in signature(function).parameters if name not in own)
 
 

@@ -15,7 +15,7 @@ from foldyn.analyses.sections import Animation, CaseSchema, Positive, Section, S
 from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
-from foldyn.dynamics import METHODS, compiled, prepare
+from foldyn.dynamics import METHODS, Keeping, compiled, prepare
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import InputError
 from foldyn.report.album import (
@@ -113,7 +113,7 @@ class MotionAnalysis(Analysis):
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
         given = {"initial": case_file.start(mass).state, **self.arguments, **changes}
-        return _Prepared(prepare(case_file.case(mass), **given))
+        return _Prepared(prepare(case_file.case(mass), **given, kept=True))
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:
         """Refuse more samples than memory holds, or fewer than spectra need."""
@@ -125,6 +125,8 @@ class MotionAnalysis(Analysis):
                 "analysis.duration, or run without --figures",
                 "every",
             )
+        if all(one.kept and not one.shown for one in computations if isinstance(one, _Prepared)):
+            return
         case = motions[0].case
         check_samples(
             sum(motion.expected_samples for motion in motions),
@@ -208,10 +210,17 @@ class _Prepared:
 
     def __init__(self, motion: Any) -> None:
         self.motion = motion
+        self.kept: Keeping | None = None
+        self.shown = True  # whether its result is looked at as a whole
+
+    def keep(self, keeping: Keeping, shown: bool) -> None:
+        """See `Kept`."""
+        self.kept, self.shown = keeping, shown
 
     def __call__(self, progress: bool, begun: Begun) -> xarray.Dataset:
         begun()
-        return self.motion.run(progress)
+        found = None if self.kept is None else self.motion.finished(self.kept)
+        return self.motion.run(progress, self.kept) if found is None else found
 
 
 def _table(case_file: CaseFile, results: ByRule, nodes: list[int]) -> Table:

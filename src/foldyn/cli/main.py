@@ -20,7 +20,7 @@ from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.lasting import lasting
-from foldyn.cli.options import add_figures, add_film, add_results
+from foldyn.cli.options import add_figures, add_film, add_results, flag
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
@@ -58,6 +58,13 @@ def parser() -> argparse.ArgumentParser:
         description="Run a case file: figures, report.html and result.nc go to a folder.",
     )
     _add_common(run, "results")
+    flag(run, "--resume", "go on with a motion that was cut off, from its last checkpoint")
+    run.add_argument(
+        "--checkpoint",
+        type=float,
+        metavar="SECONDS",
+        help="of a motion: computing time between checkpoints (default: 60)",
+    )
 
     modes = commands.add_parser(
         "modes",

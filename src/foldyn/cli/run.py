@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foldyn.analyses import ANALYSES, CaseFile, Computation, read_case
+from foldyn.analyses.casefile import Kept
 from foldyn.analyses.provenance import Call, mesh_error
 from foldyn.analyses.reading import read_as
 from foldyn.cli.clock import Clock
@@ -19,9 +20,11 @@ from foldyn.cli.folder import Results, drawing, held
 from foldyn.cli.options import BOTH
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import noted_warnings, speech
+from foldyn.dynamics import SECONDS, Keeping
 from foldyn.errors import ComputationError, InputError, MotionInterrupted
 from foldyn.plots import FIGURES
 from foldyn.studies import find_case
+from foldyn.values import number
 
 if TYPE_CHECKING:
     import xarray
@@ -60,6 +63,7 @@ def run(given: Namespace) -> Path:
             output = replace(case_file.output, animation=given.film)
             case_file = replace(case_file, output=output)
         task = [case_file.computation(mass) for mass in case_file.masses]
+        _keep(task, folder, given)
         with case_file.placing():
             case_file.analysis.check([one.compute for one in task], given.figures is not None)
         if page:
@@ -83,6 +87,23 @@ def run(given: Namespace) -> Path:
                 written = case_file.analysis.page(case_file, done, folder, call, given.figures)
             say(f"wrote {'figures and ' if drawn else ''}{written}")
     return folder
+
+
+def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
+    """Have motions kept in the folder while they run."""
+    resume, seconds = getattr(given, "resume", False), getattr(given, "checkpoint", None)
+    if resume and given.replace:
+        raise InputError("--resume: goes on with what is there; leave out --replace")
+    if seconds is not None:
+        number("--checkpoint", seconds, above=0.0)
+    for one in task:
+        if isinstance(one.compute, Kept):
+            how = "--resume", "--replace"
+            keeping = Keeping(folder / one.file, seconds or SECONDS, resume, given.replace, how)
+            one.compute.keep(keeping, not given.no_figures)
+        elif resume or seconds is not None:
+            option = "--resume" if resume else "--checkpoint"
+            raise InputError(f"{option}: only motions have checkpoints; leave it out")
 
 
 def _read(path: Path, given: Namespace) -> CaseFile:
@@ -118,14 +139,29 @@ def _computed(
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
                 results.keep(one.file, partial(save, error.partial))
+                if not isinstance(error, MotionInterrupted):
+                    _saved(one, error.partial)
             raise failed from None
         result = done[one.mass]
-        results.keep(one.file, partial(save, result))
+        there = result.encoding.get("source") == str(results.folder / one.file)
+        results.keep(one.file, partial(save, result) if not there else lambda _: None)
+        result = done[one.mass] = _saved(one, result)
         say(one.case_file.analysis.line(one.mass, result))
         if mesh := mesh_error(result):
             say(f"  {one.mass}: {mesh}")
         _tell_missing(one.place, result, say)
     return done
+
+
+def _saved(one: Computation, result: xarray.Dataset) -> xarray.Dataset:
+    """The result of a motion from its file, if it was kept on the disk, where it is no more."""
+    from foldyn.results import load
+
+    keeping = one.compute.kept if isinstance(one.compute, Kept) else None
+    if keeping is None or not keeping.begun:
+        return result
+    keeping.remove()
+    return load(keeping.file, whole=False)
 
 
 def _tell_missing(place: str, result: xarray.Dataset, say: Callable[[str], None]) -> None:

@@ -2,6 +2,7 @@
 
 from foldyn.dynamics.driver import prepare, simulate
 from foldyn.dynamics.initial import initial_state
+from foldyn.dynamics.keeping import SECONDS, Keeping
 from foldyn.dynamics.methods import METHODS, compiled, critical_step
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Progress
@@ -9,6 +10,8 @@ from foldyn.dynamics.stability import largest_frequency
 
 __all__ = [
     "METHODS",
+    "SECONDS",
+    "Keeping",
     "Motion",
     "Progress",
     "compiled",

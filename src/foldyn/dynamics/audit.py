@@ -47,6 +47,50 @@ def relative_errors(energy: NDArray) -> NDArray:
     return np.abs(energy_error(energy)) / scale if scale > 0.0 else np.zeros(len(energy))
 
 
+class Balance:
+    """What the samples of a motion, seen piece by piece, say of its energies.
+
+    Attributes
+    ----------
+    start : ndarray, shape (1, columns)
+        Energies (J) of the first sample, as audited; none (0, columns) before it.
+    count : int
+        Samples seen.
+    error, scale, largest, farthest : float
+        Largest energy error (J), energy at play (J), energy of all (J), and displacement (m).
+    """
+
+    NUMBERS = ("error", "scale", "largest", "farthest")
+
+    def __init__(self) -> None:
+        self.start = np.zeros((0, 0))
+        self.count = 0
+        self.error = self.scale = self.largest = self.farthest = 0.0
+
+    def add(self, energy: NDArray, displacement: NDArray) -> None:
+        """See further samples: energies (k, columns), displacements (k, n, 3)."""
+        if not len(energy):
+            return
+        if not self.count:
+            self.start = energy[:1].copy()
+        self.count += len(energy)
+        seen = np.concatenate([self.start, energy])
+        self.error = max(self.error, float(np.abs(energy_error(seen)).max()))
+        self.scale = max(self.scale, energy_scale(seen))
+        self.largest = max(self.largest, float(np.nanmax(np.abs(energy))))
+        self.farthest = max(self.farthest, float(displacement.max()), -float(displacement.min()))
+
+    @property
+    def relative(self) -> float:
+        """Largest energy error over the energies at play; 0 where nothing is at play."""
+        return self.error / self.scale if self.scale > 0.0 else 0.0
+
+    def off(self, energy: NDArray, limit: float) -> NDArray:
+        """Which of some samples have an error above a limit times the energies at play."""
+        seen = np.concatenate([self.start, energy])
+        return np.abs(energy_error(seen))[1:] > limit * self.scale
+
+
 class Rounding:
     """What rounding hides in the motions of a body."""
 
@@ -54,24 +98,24 @@ class Rounding:
         self.length = body.longest()
         self._force, self._moment = float(np.linalg.norm(body.scale())), body.turning_moments()
 
-    def energy(self, energy: NDArray, moved: float) -> float:
+    def energy(self, energy: NDArray | float, moved: float) -> float:
         """Energy (J) of the rounding errors in a motion with displacements up to `moved` (m).
 
-        energy : (samples, columns), as audited.
+        energy : (samples, columns), as audited, or the largest of them.
         """
         strain = moved / self.length
         bars = self._force * moved * min(strain, 1.0)
         turns = self._moment * ANGLE * min(strain, math.pi)
         return MARGIN * (EPS * (float(np.nanmax(np.abs(energy))) + bars) + turns)
 
-    def reveals(self, energy: NDArray, moved: float) -> bool:
+    def reveals(self, balance: Balance) -> bool:
         """Whether an error as large as the energies at play shows that a motion is unstable.
 
         In the first steps under a load that begins slowly the little energy that there is may be
         far off: implicit methods measure their errors against no less than `BEGUN`.
         """
-        far = moved > BEGUN * self.length
-        return far and energy_scale(energy) > self.energy(energy, moved)
+        far = balance.farthest > BEGUN * self.length
+        return far and balance.scale > self.energy(balance.largest, balance.farthest)
 
     def least_motion(self, accuracy: float) -> float:
         """Displacement (m) below which dihedrals are less accurate than that; 0 without hinges."""

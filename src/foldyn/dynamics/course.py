@@ -70,7 +70,7 @@ class Course(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Output of k samples, s supported dofs."""
+    """Room for k samples from number `first` on, s supported dofs."""
 
     time: NDArray  # (k,) s
     displacement: NDArray  # (k, n, 3)
@@ -78,10 +78,22 @@ class Samples(NamedTuple):
     reaction: NDArray  # (k, s)
     energy: NDArray  # (k, columns) as `audit.audited` names them
     memory: NDArray  # (k, b, 2) states of the b branches of laws with memory
+    first: int  # samples before these that are kept elsewhere
+
+    @property
+    def end(self) -> int:
+        """Number of the sample for which there is no room any more."""
+        return self.first + len(self.time)
 
     def doubled(self) -> Samples:
         """These, with room for as many again."""
-        return Samples(*(np.concatenate([array, np.empty_like(array)]) for array in self))
+        arrays = (np.concatenate([array, np.empty_like(array)]) for array in self[:-1])
+        return Samples._make((*arrays, self.first))
+
+    def until(self, number: int) -> Samples:
+        """Those among them before this number."""
+        arrays = (array[: number - self.first] for array in self[:-1])
+        return Samples._make((*arrays, self.first))
 
 
 def samples(count: int, nodes: int, supported: int, energies: int, branches: int = 0) -> Samples:
@@ -93,6 +105,7 @@ def samples(count: int, nodes: int, supported: int, energies: int, branches: int
         np.empty((count, supported)),
         np.empty((count, energies)),
         np.empty((count, branches, VARIABLES)),
+        0,
     )
 
 
@@ -117,7 +130,7 @@ def passed_through(now, before, first, last):
 @inner
 def sample(model, system, mass, u, v, a, t, course, out, work, s):
     """Write the next sample, after `acceleration` at u, v and t; returns an outcome."""
-    k = course.tally.samples
+    k = course.tally.samples - out.first
     out.time[k] = t
     record(
         model, system, mass, u, v, a, course.tally, work, s,

@@ -126,7 +126,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     """
     model, system, mass, work = borrowed(model), borrowed(system), borrowed(mass), borrowed(work)
     course, out, s = borrowed(course), borrowed(out), borrowed(s)
-    tally, n = course.tally, course.u.size
+    tally, n, room = course.tally, course.u.size, out.first + out.time.size
     u, v = flat(course.u), flat(course.v)
     speeds, accelerations = np.empty((7, n)), np.empty((7, n))
     powers, weights = np.empty((2, 7)), np.empty(7)
@@ -152,7 +152,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         speeds[0, i], accelerations[0, i] = v[i], fa[i]
     last = tally.steps + stretch
     while tally.steps < last and tally.time < plan.end:
-        if plan.every > 0 and tally.samples == out.time.size:
+        if plan.every > 0 and tally.samples == room:
             break
         t, wanted = tally.time, tally.wanted
         stop = np.searchsorted(plan.stops, t, side="right")
@@ -202,7 +202,7 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         due = plan.start + tally.samples * plan.interval
         begun = tally.work, tally.dissipated
-        while plan.every == 0 and tally.samples < out.time.size and due <= after + ROUNDING * h:
+        while plan.every == 0 and tally.samples < room and due <= after + ROUNDING * h:
             _weights(min(1.0, (due - t) / h), weights)
             _combine(u, speeds, weights, h, 7, fut)
             _combine(v, accelerations, weights, h, 7, fvt)
@@ -245,5 +245,5 @@ def advance(model, system, mass, course, plan, out, work, s, stretch):
     tally.power_in, tally.power_out = powers[0, 0], powers[1, 0]
     for i in range(n):
         flat(course.carry)[i] = accelerations[0, i]
-    full = plan.every > 0 and tally.samples == out.time.size and tally.time < plan.end
+    full = plan.every > 0 and tally.samples == room and tally.time < plan.end
     return (Outcome.FULL if full else Outcome.DONE), -1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -22,12 +23,14 @@ from foldyn.dynamics.initial import (
     check_touching,
     warn_of_unstable_damping,
 )
+from foldyn.dynamics.keeping import SECONDS, check_keeping
 from foldyn.dynamics.method_choice import AUTO, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.stored import stored
 from foldyn.dynamics.system import pack
 from foldyn.dynamics.touch import contact_quantities
 from foldyn.errors import FoldynWarning, InputError
@@ -60,6 +63,9 @@ def simulate(
     progress: bool | Reporter | None = None,
     spectral_radius: float | None = None,
     sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
+    store: str | os.PathLike[str] | None = None,
+    checkpoint: float = SECONDS,
+    resume: bool = False,
 ) -> xarray.Dataset:
     """Integrate M x'' + C x' + F_int(x) = p(t) from an initial state.
 
@@ -98,6 +104,14 @@ def simulate(
         Further variables of the result: functions of displacement (n, 3), m, velocity (n, 3),
         m/s, and time, s, which return a number or an array; as `fd.Quantity(units, text, dims,
         function)` with its unit, meaning and dimensions. They are evaluated at every sample.
+    store : path, optional
+        File for the result, as "run.nc". Samples then go to the disk as the motion goes on, into
+        the folder "run.nc.unfinished", so that its length is not limited by memory.
+    checkpoint : float, default 60.0
+        With `store`: time (s) of computing between checkpoints, from which it can go on.
+    resume : bool, default False
+        With `store`: go on with the same motion from the last checkpoint of a run that was cut off,
+        to the same bits; from the beginning where there is none. A finished one is only read.
 
     Returns
     -------
@@ -106,14 +120,17 @@ def simulate(
         at supported dofs; energies (J): `kinetic`, `strain_bars`, `strain_folds`,
         `strain_bends`, `dissipated`, `work` (of loads, moving supports and actuated folds). First
         sample at the start. Attributes hold the statistics of the run; the case travels along
-        (`foldyn.case_of`).
+        (`foldyn.case_of`). With `store` its variables are read from the file where they are used,
+        as by ``fd.load("run.nc", whole=False)``.
 
     Raises
     ------
     InputError
-        An argument out of range, a step above the critical one, a free node without mass.
+        An argument out of range, a step above the critical one, a free node without mass; a motion
+        to go on with that is not the one that was begun, by the name of what differs.
     ComputationError
         A function of `sample` failed, or gave another shape or no finite numbers, after the start.
+        The disk is full: what was kept until then stays, to go on from.
     InstabilityError, PenetrationError
         The motion grew without bound or became NaN; panel passed through panel. What was
         computed until then is in the exception's `partial`.
@@ -132,10 +149,14 @@ def simulate(
     rest or, with the damping's state = "start", at the initial displacement. Dashpots between nodes
     and damped creases follow the motion.
     """
+    keeping = None if store is None else check_keeping(store, checkpoint, resume)
+    if store is None and resume:
+        raise InputError(": there is nothing to go on with; name the file of the result", "store")
     motion = prepare(
-        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius, sample
-    )
-    return motion.run(progress)
+        case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius,
+        sample, keeping is not None,
+    )  # fmt: skip
+    return motion.run(progress) if keeping is None else stored(motion, keeping, progress)
 
 
 def prepare(
@@ -150,10 +171,12 @@ def prepare(
     start: float = 0.0,
     spectral_radius: float | None = None,
     sample: Mapping[str, Callable[..., Any] | Quantity] | None = None,
+    kept: bool = False,
 ) -> Motion:
     """Check everything that `simulate` checks and choose the step, without computing a motion.
 
-    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`.
+    Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`. One that
+    is `kept` on the disk may have more samples than memory holds.
     """
     if not isinstance(case, Case):
         raise InputError(f"case: got {type(case).__name__}, give a Case")
@@ -198,7 +221,8 @@ def prepare(
             "one or leave dt out (force = true integrates all the same)",
             "dt",
         )
-    timing.check_samples(timing.expected_samples(plan), len(u), len(case.reaction_dofs))
+    if not kept:
+        timing.check_samples(timing.expected_samples(plan), len(u), len(case.reaction_dofs))
     if integrator.implicit:
         check_fill(case.structure.fill, case.body.size)
     check_steady(case, plan.start, plan.end)

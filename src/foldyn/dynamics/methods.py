@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.waveforms import CALLED
@@ -20,6 +20,7 @@ from foldyn.dynamics import (
 from foldyn.dynamics.course import Course, Samples, StepPlan
 from foldyn.dynamics.implicit.engine import Implicit
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
+from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
@@ -54,6 +55,7 @@ class Compiled:
         threads: int,
     ) -> None:  # fmt: skip
         self._loop, self._arguments = loop, (*packed.arrays, course, plan)
+        self._packed, self._course = packed, course
         self._works = packed.body.workspaces(threads)
         self._memories = scratches(packed.system, self._works)
         self.threads = len(self._works)
@@ -65,6 +67,19 @@ class Compiled:
             for work, memory in zip(self._works, self._memories, strict=True)
         ]
         return run_together(self._loop, [work.team for work in self._works], arguments)[0]
+
+    def standing(self) -> dict[str, NDArray]:
+        """All on which the next steps depend beside the case, between two stretches."""
+        return snapshot(self._parts())
+
+    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+        """Go on as the engine that stood there; for as many threads."""
+        restore(self._parts(), standing)
+
+    def _parts(self) -> dict[str, Any]:
+        contact = [getattr(work, "memory", ()) for work in self._works]
+        powers = [memory.powers for memory in self._memories]
+        return parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
 
     def facts(self) -> dict[str, Any]:
         """Statistics of its own, for the result's attributes: what contact has cost."""

@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Continuation
-from foldyn.dynamics.audit import Rounding, audited, energy_scale, relative_errors
-from foldyn.dynamics.course import Outcome, Samples, StepPlan, samples
+from foldyn.dynamics.audit import Rounding, audited
+from foldyn.dynamics.course import Outcome, Samples, StepPlan
+from foldyn.dynamics.doubts import doubts
+from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
+from foldyn.dynamics.keeping import KEY, Keeping
 from foldyn.dynamics.methods import Compiled, Implicit, Integrator
+from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.stability import (
@@ -25,7 +29,7 @@ from foldyn.dynamics.stability import (
     stability_limit,
 )
 from foldyn.dynamics.system import Packed, place, scratch
-from foldyn.dynamics.timing import expected_samples
+from foldyn.dynamics.timing import check_samples, expected_samples
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
@@ -44,8 +48,7 @@ if TYPE_CHECKING:
 RECHECKS = 20  # of the critical step during a motion
 CHUNK = 256  # steps of the first stretch; later ones take about REPORT_EVERY seconds
 REPORT_EVERY = 0.25
-INACCURATE = 1e-2  # relative energy error above which the user is warned
-EXPLODED = 1.0  # and above which the motion is stopped
+EXPLODED = 1.0  # relative energy error above which the motion is stopped
 # Panels that cross are looked for at samples so far apart that it takes a small share of the time
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
 IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
@@ -67,8 +70,9 @@ class Motion:
         self._state, self._packed, self._sampler = state, packed, sampler
         self._rounding = Rounding(packed.body)
         self._engine: Compiled | Implicit | None = None
+        self._keeping: Keeping | None = None
         self.seconds = 0.0
-        self._start(0)
+        self._start()
         self.at_rest = not (self._course.u.any() or self._course.v.any())
 
     @property
@@ -81,24 +85,39 @@ class Motion:
         """Samples computed so far."""
         return int(self._course.tally.samples)
 
-    def run(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
-        """Integrate the motion; see `simulate`."""
-        self.samples(progress)
+    def run(
+        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
+    ) -> xarray.Dataset:
+        """Integrate the motion; see `simulate`.
+
+        What is kept on the disk meanwhile stays there, with the samples of the result where there
+        are many, until the result is saved.
+        """
+        self._integrated(progress, keeping)
         crossings = self._crossings()
         if len(crossings.first):
-            when = f"t = {self._out.time[crossings.first[0]]:.6g} s"
+            when = f"t = {self._output.time(crossings.first[0]):.6g} s"
             text = crossings.text(when, self.stored)
             warnings.warn(text, CrossingWarning, stacklevel=3)
         return self._dataset(crossings)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
-        self._start(self.expected_samples)
-        self._sampler.clear()
+        self._integrated(progress)
+        return self._output.written(self.stored)
+
+    def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
+        self._keeping = keeping
+        if keeping is None:
+            nodes, reactions = len(self.case.structure.nodes), len(self.case.reaction_dofs)
+            check_samples(self.expected_samples, nodes, reactions)
+        self._start()
+        self._output.begin()
         self._integrate(*reporter(progress))
-        if doubts := self._doubts(self._audit()):
-            warnings.warn(doubts, FoldynWarning, stacklevel=3)
-        return self._written()
+        self._audit()
+        size, remedy = float(self._course.tally.farthest), self._smaller_step()
+        if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
+            warnings.warn(text, FoldynWarning, stacklevel=4)
 
     @property
     def _origin(self) -> str:
@@ -113,20 +132,16 @@ class Motion:
         memory = self._packed.body.memory
         return 0 if memory is None else len(memory.own.state)
 
-    def _start(self, count: int) -> None:
-        """Go back to the start, with room for `count` samples."""
-        structure = self.case.structure
+    def _start(self) -> None:
+        """Go back to the start."""
         self._course = begin(self.case, *self._state, self.plan, self._packed)
-        self._out = samples(
-            count, len(structure.nodes), len(self.case.reaction_dofs),
-            len(audited(self.case.energy_groups)), self._branches,
-        )  # fmt: skip
+        self._output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
     def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
         """Advance in stretches; after each, report the progress and audit the motion."""
         system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
-        plan, course = self.plan, self._course
-        memory = scratch(system)
+        plan, course, output = self.plan, self._course, self._output
+        memory, earlier = scratch(system), 0.0
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
         began = None
@@ -135,21 +150,22 @@ class Motion:
             continued = self._state[3] if self.case.contact is None else None
             if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
                 engine.go_on_from(continued.values)
+            earlier = self._resumed(engine)
             while True:
                 done = int(course.tally.steps)
-                stretch = min(length, recheck - done % recheck)
+                stretch = min(length, recheck - done % recheck, self._fits(length))
                 clock = time.perf_counter()
-                code, hinge = engine.advance(self._out, stretch)
+                code, hinge = engine.advance(output.window, stretch)
                 clock = time.perf_counter() - clock
                 began = time.perf_counter() if began is None else began
-                self.seconds = time.perf_counter() - began
+                self.seconds = earlier + time.perf_counter() - began
                 self._sample()
                 if isinstance(callbacks.error, Exception):
                     self._stop(str(callbacks.error), cause=callbacks.error)
                 if callbacks.error is not None:
                     raise callbacks.error
                 if code == Outcome.FULL:
-                    self._out = self._out.doubled()
+                    output.more_room(self.stored)
                 elif code != Outcome.DONE:
                     self._fail(code, hinge)
                 step, now = int(course.tally.steps), float(course.tally.time)
@@ -157,6 +173,7 @@ class Motion:
                 report(Progress(now - plan.start, plan.end - plan.start, step, self._audit()))
                 if ended:
                     return
+                self._keep(engine)
                 watched = plan.steps and not self.force and self.method.growth is not None
                 if watched and step % recheck == 0 and step > done:
                     place(system, course.u, course.v, now, memory)
@@ -165,31 +182,73 @@ class Motion:
                 least = 1 if self.method.implicit else CHUNK
                 length = max(least, min(int(length * min(growth, 8.0)), 100_000))
         except KeyboardInterrupt:
+            kept = self._keeping.summary if self._keeping else ""
             raise MotionInterrupted(
-                f"interrupted at t = {course.tally.time:.6g} s", self._dataset()
+                f"interrupted at t = {course.tally.time:.6g} s{kept}", self._dataset()
             ) from None
         finally:
             close()
 
-    def _continuations(self) -> dict[str, Continuation]:
+    def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.
 
         With contact a motion begins anew: what keeps the nodes on planes is not part of it.
         """
-        engine, time, found = self._engine, self._written().time, {}
+        engine, found = self._engine, {}
         if self.case.contact is not None:
             return found
-        if isinstance(engine, Implicit) and len(time) and self._packed.callbacks.error is None:
+        if isinstance(engine, Implicit) and self.stored and self._packed.callbacks.error is None:
             if self._state[3] and engine.continues:
-                found["continued_from"] = self._state[3]
-            if float(self._course.tally.time) == time[-1]:
-                found["continuation"] = Continuation(self.method.name, engine.continuation())
+                found["continued_from"] = self._output.time(0), self._state[3]
+            last = self._output.time(self.stored - 1)
+            if float(self._course.tally.time) == last:
+                end = Continuation(self.method.name, engine.continuation())
+                found["continuation"] = last, end
         return found
+
+    def _identity(self) -> dict[str, Any]:
+        *state, continued = self._state
+        state.append(continued.values if continued else None)
+        return identity(self.case, self.method, self.plan, state, self._sampler.rows)
+
+    def finished(self, keeping: Keeping) -> xarray.Dataset | None:
+        """Its result, if it is finished and to be gone on with."""
+        return keeping.finished(key_of(self._identity()))
+
+    def _fits(self, length: int) -> int:
+        """Steps, at most `length`, for whose samples there is room."""
+        fits = self._output.fits(int(self._course.tally.steps), self.stored)
+        if fits is not None and fits < 1 <= length:
+            self._output.flush(self.stored)
+            fits = self._output.fits(int(self._course.tally.steps), self.stored)
+        return length if fits is None else max(0, min(length, fits))
+
+    def _keep(self, engine: Compiled | Implicit) -> None:
+        """Make a checkpoint, if it is time for one."""
+        if self._keeping is None or not self._keeping.due:
+            return
+        self._output.flush(self.stored)
+        standing = {f"engine.{name}": array for name, array in engine.standing().items()}
+        standing |= self._output.standing() | {"seconds": np.array(self.seconds)}
+        self._keeping.checkpoint(standing, float(self._course.tally.time))
+
+    def _resumed(self, engine: Compiled | Implicit) -> float:
+        """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
+        if self._keeping is None:
+            return 0.0
+        about = self._identity() | {"threads": engine.threads}
+        kept = self._keeping.begin(about, self._output.rows)
+        if kept is None:
+            return 0.0
+        own = "engine."
+        engine.go_on({name[len(own) :]: kept[name] for name in kept if name.startswith(own)})
+        self._output.go_on(kept, self.stored)
+        return float(kept["seconds"])
 
     def _sample(self) -> None:
         """Evaluate what the user samples at the samples that are new."""
         try:
-            self._sampler.take(self._out, self.stored)
+            self._output.take(self.stored)
         except SamplingError as error:
             self._stop(str(error), ComputationError, error)
 
@@ -199,22 +258,17 @@ class Motion:
 
     def _audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
-        energy = self._written().energy
-        relative = relative_errors(energy)
-        worst = float(relative.max())
-        if worst > EXPLODED and self._rounding.reveals(energy, self._farthest()):
-            bad = int(np.argmax(relative > EXPLODED))
+        balance = self._output.see(self.stored)
+        if balance.relative > EXPLODED and self._rounding.reveals(balance):
+            bad = self._output.first_off(self.stored, EXPLODED)
+            at = self._output.time(bad)
             self._course.tally.samples = bad
+            self._output.shorten(bad)
             self._stop(
-                f"the motion is unstable: at t = {self._out.time[bad]:.6g} s the energy balance is "
+                f"the motion is unstable: at t = {at:.6g} s the energy balance is "
                 f"off by more than the energies at play; {self._smaller_step()}"
             )
-        return worst
-
-    def _farthest(self) -> float:
-        """Largest displacement (m) of a sample so far."""
-        moved = self._written().displacement
-        return max(float(moved.max()), -float(moved.min()))
+        return balance.relative
 
     def _smaller_step(self) -> str:
         if not self.plan.steps:
@@ -313,23 +367,22 @@ class Motion:
         few = FEW // max(1, len(getattr(self.case.structure, "triangles", ())))
         looks = max(1, few, int(work / PER_LOOK))
         stride = -(-max(1, self.stored) // looks)
-        return crossings_of(self.case, self._written().displacement, stride)
+        return crossings_of(self.case, self._output.displacement(self.stored), stride)
 
     def _dataset(self, crossings: Crossings | None = None) -> xarray.Dataset:
         """Samples stored so far, with the case, the statistics and the panels that cross."""
-        out = self._written()
         crossings = crossings or self._crossings()
+        out, sampled = self._output.first(self.stored)
         names = audited(self.case.energy_groups)
         energies: dict[str, NDArray] = dict(zip(names, out.energy.T, strict=True))
         result = trajectory_dataset(
             self.case, out.time, out.displacement, out.velocity, out.reaction, energies,
-            self._statistics(), self._sampler.columns(self.stored),
-            out.memory if self._branches else None, self._continuations(),
+            self._statistics(), sampled, out.memory if self._branches else None,
+            self._continuations(),
         )  # fmt: skip
-        return crossings.recorded(result)
-
-    def _written(self) -> Samples:
-        return Samples(*(array[: self.stored] for array in self._out))
+        if self._keeping is not None:
+            result.attrs[KEY] = key_of(self._identity())
+        return crossings.recorded(self._output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
         plan, tally, engine = self.plan, self._course.tally, self._engine
@@ -344,7 +397,7 @@ class Motion:
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
-            "energy_error": float(relative_errors(self._written().energy).max(initial=0.0)),
+            "energy_error": self._output.see(self.stored).relative,
             "started_from": self._origin,
         }
         if self.reason:
@@ -361,34 +414,6 @@ class Motion:
             }
         facts["force_evaluations"] = int(tally.evaluations)
         return facts | (engine.facts() if engine else {})
-
-    def _doubts(self, error: float) -> str:
-        """Warning about a motion with a relative energy error; empty if there is none."""
-        energy, farthest = self._written().energy, self._farthest()
-        least = self._rounding.least_motion(INACCURATE)
-        if 0.0 < farthest < least:
-            return (
-                f"nothing moves farther than {farthest:.2g} m, and below {least:.2g} m rounding "
-                "hides how hinges turn, so that they do not resist: use larger loads, lighter or "
-                "softer panels, or a longer motion"
-            )
-        size, least = float(self._course.tally.farthest), self.plan.floor
-        if 0.0 < size < least:
-            return (
-                f"the motion is small: {size:.2g} m at most, where errors of steps are measured "
-                f"by {least:.2g} m, a share of the longest bar; use a tolerance of "
-                f"{self.plan.tolerance * size / least:.1g}, or a method with a fixed step"
-            )
-        if error <= INACCURATE:
-            return ""
-        off = f"the energy balance of the motion is off by {error:.1%} of the energies at play"
-        scale, rounding = energy_scale(energy), self._rounding.energy(energy, farthest)
-        if scale <= rounding:
-            return (
-                f"{off}, {scale:.2g} J: they are below the rounding errors of forces and "
-                f"displacements of this size ({rounding:.2g} J), which may be all that moves"
-            )
-        return f"{off}: {self._smaller_step()}"
 
 
 def _from_closed(angle: NDArray) -> NDArray:

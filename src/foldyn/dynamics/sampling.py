@@ -75,13 +75,28 @@ class Sampler:
 
     def clear(self) -> None:
         """Forget all values."""
+        self.drop(0)
+
+    def drop(self, count: int) -> None:
+        """Forget the values at the first samples, `count` of them, and go on with the next one."""
         self._values: dict[str, list[NDArray]] = {name: [] for name in self._quantities}
-        self._taken = 0
+        self._first = self._taken = count
+
+    @property
+    def rows(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each quantity at a sample."""
+        return {name: shape for name, (_, shape) in self._quantities.items()}
+
+    @property
+    def known(self) -> dict[str, Quantity]:
+        """The quantities, with their dimensions."""
+        return {name: quantity for name, (quantity, _) in self._quantities.items()}
 
     def take(self, samples: Samples, count: int) -> None:
         """Evaluate at the samples up to `count` that are new; raises SamplingError."""
         for k in range(self._taken, count):
-            state = samples.displacement[k], samples.velocity[k], float(samples.time[k])
+            i = k - samples.first
+            state = samples.displacement[i], samples.velocity[i], float(samples.time[i])
             for name, (quantity, shape) in self._quantities.items():
                 try:
                     value = _value(quantity, *state)
@@ -93,13 +108,13 @@ class Sampler:
                 self._values[name].append(value)
             self._taken = k + 1
 
-    def columns(self, count: int) -> dict[str, tuple[Quantity, NDArray]]:
-        """Quantities with their values at the first `count` samples, nan where there is none."""
-        columns = {}
-        for name, (quantity, shape) in self._quantities.items():
+    def columns(self, count: int) -> dict[str, NDArray]:
+        """Values at the samples up to `count` that are not forgotten, nan where there is none."""
+        columns, count = {}, count - self._first
+        for name, (_, shape) in self._quantities.items():
             column, values = np.full((count, *shape), np.nan), self._values[name][:count]
             column[: len(values)] = np.reshape(values, (-1, *shape))
-            columns[name] = quantity, column
+            columns[name] = column
         return columns
 
 

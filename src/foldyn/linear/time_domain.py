@@ -128,7 +128,7 @@ class Rig:
         dt, tolerance = self.integration.dt, self.integration.tolerance
         if dt is not None:
             dt = every / math.ceil(every / dt * (1.0 - 1e-12))
-        time, displacement, velocity, _, _, memory = prepare(
+        time, displacement, velocity, _, _, memory, _ = prepare(
             self.driven(history), duration, self.integrator, dt, every,
             initial or State(self.state), tolerance=tolerance, start=start,
         ).samples(progress)  # fmt: skip

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.mechanics.crossings import crossing_panels
+from foldyn.results.columns import Column
 from foldyn.results.quantities import CROSSINGS, variable
 
 MOST_SHOWN = 8  # pairs of panels that a text names
@@ -67,13 +68,13 @@ class Crossings(NamedTuple):
         )
 
 
-def crossings_of(case: Case, displacement: NDArray, stride: int = 1) -> Crossings:
+def crossings_of(case: Case, displacement: NDArray | Column, stride: int = 1) -> Crossings:
     """Look for panels that pass through each other.
 
     Parameters
     ----------
     case : Case
-    displacement : ndarray, shape (k, n, 3)
+    displacement : ndarray or Column, shape (k, n, 3)
         Of the nodes at each sample, m. Samples that are not finite are not looked at.
     stride : int
         Every so manieth sample is looked at, so that the last one is; where panels cross, also

@@ -69,7 +69,7 @@ def trajectory_dataset(
     statistics: Mapping[str, Any],
     sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
     memory: ArrayLike | None = None,
-    continuations: Mapping[str, Continuation] | None = None,
+    continuations: Mapping[str, tuple[float, Continuation]] | None = None,
 ) -> xr.Dataset:
     """Dataset of a motion, which carries its own case.
 
@@ -92,9 +92,9 @@ def trajectory_dataset(
         What the user has added.
     memory : array_like, shape (nt, b, 2), optional
         State of the branches of laws with memory.
-    continuations : mapping of str to Continuation, optional
-        What the method needs to go on from the last sample, `continuation`, and what it had at the
-        first, `continued_from`.
+    continuations : mapping of str to (float, Continuation), optional
+        Time (s) of the last sample and what the method needs to go on from there, `continuation`;
+        the same of the first sample and what it had there, `continued_from`.
 
     Returns
     -------
@@ -113,8 +113,8 @@ def trajectory_dataset(
     if memory is not None:
         values["memory"] = memory
     data = variables(known, "time", values | {name: array for name, (_, array) in added.items()})
-    for name, one in (continuations or {}).items():
-        own = {"method": one.method, "time": float(time[-1 if name == "continuation" else 0])}
+    for name, (at, one) in (continuations or {}).items():
+        own = {"method": one.method, "time": at}
         along, numbers, text = variable(("continued",), one.values, "", CONTINUATIONS[name])
         data[name] = along, numbers, text | own
     histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads))

@@ -29,6 +29,7 @@ from foldyn.input_files import check_file
 from foldyn.results.apart import apart
 from foldyn.results.attributes import FORMAT
 from foldyn.results.contents import check_result, whole_attribute
+from foldyn.results.streams import put
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
@@ -74,13 +75,17 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     write(_split(ds), path)
 
 
-def load(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a result from a NetCDF file, whole into memory.
+def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
+    """Read a result from a NetCDF file.
 
     Parameters
     ----------
     path : path
         A file that `save` wrote.
+    whole : bool, default True
+        Whether all of it is read into memory. Otherwise variables are read from the file where they
+        are used, each time, as far as they are: for results that are larger than memory. The file
+        must stay where it is meanwhile.
 
     Returns
     -------
@@ -92,7 +97,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         There is no such file, or it is not a Foldyn result.
     """
     path = Path(path)
-    ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)")
+    ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)", whole)
     check_result(ds, f"{path}: ")
     try:
         newer = whole_attribute(ds, "foldyn_format") > FORMAT
@@ -122,6 +127,23 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     OSError
         The disk is full, or fails.
     """
+    path = check_target(path)
+    try:
+        with whole(path) as part:
+            fill(part, lambda sink: put(ds, sink, ENGINE))
+            _seal(part)
+    except PermissionError:
+        raise InputError(f"{path}: may not be written; choose another folder") from None
+
+
+def check_target(path: str | os.PathLike[str]) -> Path:
+    """Path of a file to be written; refuses one that cannot be.
+
+    Raises
+    ------
+    InputError
+        It is a folder, there is no folder for it, or its name is that of another kind of file.
+    """
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file")
@@ -132,12 +154,7 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         )
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    try:
-        with whole(path) as part:
-            fill(part, lambda sink: ds.to_netcdf(sink, engine=ENGINE))
-            _seal(part)
-    except PermissionError:
-        raise InputError(f"{path}: may not be written; choose another folder") from None
+    return path
 
 
 def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
@@ -152,8 +169,8 @@ def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
             raise sink.failure
 
 
-def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
-    """Read a dataset, whole into memory.
+def read(path: str | os.PathLike[str], unreadable: str, into_memory: bool = True) -> xr.Dataset:
+    """Read a dataset, whole into memory unless a file with a seal is to be read as it is used.
 
     Raises
     ------
@@ -170,7 +187,7 @@ def read(path: str | os.PathLike[str], unreadable: str) -> xr.Dataset:
                 "copy, or compute it again"
             )
         if sealed:
-            return _load(path)
+            return _load(path) if into_memory else _opened(path)
         size = path.stat().st_size  # HDF5 may crash on what is damaged
         list_engines()  # once, and not in each of the processes
         seconds, memory = LEAST_SECONDS + size // PER_SECOND, LEAST_MEMORY + 3 * MOST_PACKED * size
@@ -191,6 +208,18 @@ def _load(path: Path) -> xr.Dataset:
     with warnings.catch_warnings():  # of xarray, on what it finds odd
         warnings.simplefilter("ignore")
         ds = xr.load_dataset(path, engine=ENGINE, decode_times=False, decode_timedelta=False)
+    return _fitting(ds)
+
+
+def _opened(path: Path) -> xr.Dataset:
+    _check_header(path)
+    ds = xr.open_dataset(
+        path, engine=ENGINE, decode_times=False, decode_timedelta=False, cache=False
+    )
+    return _fitting(ds)
+
+
+def _fitting(ds: xr.Dataset) -> xr.Dataset:
     for name, variable in ds.variables.items():
         if variable.shape != tuple(ds.sizes[dim] for dim in variable.dims):
             raise ValueError(f"{name}: {variable.shape} does not fit its dimensions")
@@ -305,7 +334,7 @@ def _split(ds: xr.Dataset) -> xr.Dataset:
     """Dataset with the two parts of each complex variable instead of it."""
     split = ds
     for name, variable in ds.data_vars.items():
-        if np.iscomplexobj(variable.values):
+        if np.issubdtype(variable.dtype, np.complexfloating):
             own = {**variable.attrs, _WHOLE: str(name)}
             parts = {f"{name}_{part}": getattr(variable, part).assign_attrs(own) for part in _PARTS}
             split = split.drop_vars(str(name)).assign(parts)

@@ -13,6 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from foldyn.results.columns import pieces_of
+
 
 class Quantity(NamedTuple):
     """A variable of a result.
@@ -181,9 +183,14 @@ def _missing(values: Any) -> int:
 
 def missing_values(ds: xr.Dataset) -> dict[str, str]:
     """Say how many values each incomplete variable of a result lacks, and why, by name."""
-    return {
-        str(name): f"{_missing(ds[name].values)} of {ds[name].size} values are missing (nan): "
-        f"{ds[name].attrs.get('missing', UNEXPECTED)}"
+    missing = {
+        name: sum(map(_missing, pieces_of(ds[name].variable)))
         for name in ds.data_vars
-        if _missing(ds[name].values)
+        if ds[name].dtype.kind in "fc"
+    }
+    return {
+        str(name): f"{count} of {ds[name].size} values are missing (nan): "
+        f"{ds[name].attrs.get('missing', UNEXPECTED)}"
+        for name, count in missing.items()
+        if count
     }

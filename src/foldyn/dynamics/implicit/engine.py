@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
 from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
+from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed, accelerate, acceleration
 from foldyn.jit.compiled import kernel
 
@@ -121,11 +122,11 @@ class Implicit:
             return False
         counted = len(scheme.state())
         memory, factor = self._packed.body.memory, old.factor.copy()
-        snapshot = None if memory is None else memory.snapshot()
+        branches = None if memory is None else memory.snapshot()
         with one_thread():
             self._newton.resume(state[counted + 2 : -1])
         if memory is not None:
-            memory.recall(snapshot)
+            memory.recall(branches)
         old.factor[:] = factor
         scheme.resume(state[:counted])
         self._course.angle[:] = state[counted]
@@ -156,6 +157,27 @@ class Implicit:
             return {}
         return {"contact_lists": int(self._touching.memory.counts.lists)}
 
+    def standing(self) -> dict[str, NDArray]:
+        """All on which the next steps depend beside the case, between two stretches."""
+        made = np.array([self._matrix.factorized, self._matrix.factorizations])
+        origin = {f"origin.{k}": array for k, array in enumerate(self._newton.origin)}
+        return snapshot(self._parts()) | {"factorized": made} | origin
+
+    def go_on(self, standing: Mapping[str, NDArray]) -> None:
+        """Go on as the engine that stood there."""
+        restore(self._parts(), standing)
+        made, count = standing["factorized"].tolist()
+        if made:
+            with one_thread():
+                self._newton.remake()
+        self._matrix.factorizations = count
+        count = sum(name.startswith("origin.") for name in standing)
+        self._newton.origin = tuple(standing[f"origin.{k}"] for k in range(count))
+
+    def _parts(self) -> dict[str, Any]:
+        own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
+        return parts_of(self._packed, self._course) | own | {"matrices": self._matrix.changing}
+
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
         with one_thread():
@@ -171,7 +193,7 @@ class Implicit:
         advance = self._fixed if plan.steps else self._adaptive
         end = min(last, plan.steps) if plan.steps else last
         while tally.steps < end and (plan.steps or tally.time < plan.end):
-            if plan.every and not plan.steps and tally.samples == len(out.time):
+            if plan.every and not plan.steps and tally.samples == out.end:
                 return Outcome.FULL, -1
             outcome, hinge = advance(out)
             tally.evaluations = self._newton.evaluations
@@ -289,7 +311,7 @@ class Implicit:
     def _due(self, out: Samples) -> tuple[float, bool]:
         """Time (s) by which the next steps end, and whether a sample waits there."""
         plan, number = self._plan, int(self._course.tally.samples)
-        if plan.every or number == len(out.time):
+        if plan.every or number == out.end:
             return plan.end, False
         time = plan.start + number * plan.interval
         if time < plan.end - SAME_TIME * plan.interval:

@@ -151,6 +151,11 @@ class StepMatrix:
         """Make the damping of elements that follow the motion what it is at u (n, 3)."""
         self._elements.put(u, self._matrices.damping)
 
+    @property
+    def changing(self) -> list[NDArray]:
+        """Blocks that change along a motion."""
+        return [self._matrices.stiffness, self._matrices.damping]
+
     def forget(self) -> None:
         """Give up the factors."""
         self._factors = None

@@ -22,14 +22,20 @@ SAME_STEP = 1e-3  # relative difference of steps that may share a matrix
 
 
 class Newton:
-    """Newton's method with the matrix that it keeps from one step to the next."""
+    """Newton's method with the matrix that it keeps from one step to the next.
+
+    Attributes
+    ----------
+    origin : tuple of ndarray
+        From what the matrix was made: its step, and what `Scheme.back` takes; empty without one.
+    """
 
     def __init__(self, scheme: Scheme, matrix: StepMatrix) -> None:
         self.scheme, self.matrix = scheme, matrix
         self.iterations = 0
         self.evaluations = 0
         self._h = 0.0  # of the last factorization
-        self._origin: tuple[NDArray, ...] = ()
+        self.origin: tuple[NDArray, ...] = ()
         self._lasting = False  # whether a matrix served a whole step: the next one begins with it
 
     def prepare(self, h: float, t: float) -> None:
@@ -50,16 +56,20 @@ class Newton:
 
     def _make(self, h: float, before: NDArray, again: bool) -> None:
         """Make the matrix of a step h (s); see `Scheme.tangent`."""
-        self._origin = ()
+        self.origin = ()
         self.scheme.tangent(self.matrix, before, again)
         self.matrix.factorize(self.scheme.weights(h))
-        self._h, self._origin = h, (np.array([h, again]), before.copy(), *self.scheme.origin())
+        self._h, self.origin = h, (np.array([h, again]), before.copy(), *self.scheme.origin())
+
+    def remake(self) -> None:
+        """Factorize the matrix of the last step that was made anew, from its blocks."""
+        self.matrix.factorize(self.scheme.weights(self._h))
 
     def state(self) -> list[NDArray]:
         """What the next step depends on: from what its first matrix was made, if that is kept."""
-        kept = self._lasting and len(self._origin) > 0
+        kept = self._lasting and len(self.origin) > 0
         rest = (np.zeros(2), self.scheme.shift, *self.scheme.origin())
-        origin = self._origin if kept else [np.zeros_like(array) for array in rest]
+        origin = self.origin if kept else [np.zeros_like(array) for array in rest]
         return [np.array([float(kept)]), *origin]
 
     def resume(self, state: Sequence[NDArray]) -> None:

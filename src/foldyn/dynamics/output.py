@@ -1,0 +1,227 @@
+"""The samples of a motion: all of them in memory or, of one that is kept, the last of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.dynamics.audit import Balance, audited
+from foldyn.dynamics.course import Samples, StepPlan, samples
+from foldyn.dynamics.keeping import Keeping
+from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.timing import expected_samples
+from foldyn.results import Quantity
+from foldyn.results.columns import PIECE, Column, Columns, pieces
+
+if TYPE_CHECKING:
+    import xarray
+
+LEAST = 16  # samples that a window holds at least
+
+
+class Output:
+    """Room for the samples of a motion, and what is known of those that are written.
+
+    Parameters
+    ----------
+    case : Case
+    plan : StepPlan
+    sampler : Sampler
+        What the user samples.
+    branches : int
+        Of laws with memory.
+    keeping : Keeping, optional
+        Where samples go when the memory for them is full.
+
+    Attributes
+    ----------
+    window : Samples
+        Room that compiled loops write to.
+    balance : Balance
+        Of all samples that were seen.
+    """
+
+    def __init__(
+        self, case: Case, plan: StepPlan, sampler: Sampler, branches: int,
+        keeping: Keeping | None = None,
+    ) -> None:  # fmt: skip
+        self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
+        self._keeping = keeping
+        self._names = audited(case.energy_groups)
+        at_once = 1  # samples in a step, at most
+        if not plan.steps and not plan.every:
+            at_once = math.floor(plan.dt / plan.interval) + 2
+        self._at_once = at_once
+        self.balance = Balance()
+        self.window = self._room(0)
+        sampler.clear()
+
+    def _room(self, count: int) -> Samples:
+        structure = self._case.structure
+        return samples(
+            count, len(structure.nodes), len(self._case.reaction_dofs), len(self._names),
+            self._branches,
+        )  # fmt: skip
+
+    def begin(self) -> None:
+        """Make room for the samples that are expected, or for as many as memory is taken for."""
+        count = expected_samples(self._plan)
+        if self._keeping is not None:
+            row = sum(array.nbytes for array in self._room(1)[:-1])
+            count = min(count, max(PIECE // row, LEAST, 2 * self._at_once))
+        self.window = self._room(count)
+
+    @property
+    def rows(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of what a sample consists of, by name."""
+        own = self.window._asdict()
+        del own["first"]
+        return {name: array.shape[1:] for name, array in own.items()} | self._sampler.rows
+
+    # ------------------------------------------------------------------ while it runs
+    def fits(self, steps: int, stored: int) -> int | None:
+        """Steps for whose samples there is room, after as many; None: for all that come."""
+        if self._keeping is None:
+            return None
+        if self._plan.steps:
+            return self.window.end * self._plan.every - 1 - steps
+        return (self.window.end - stored) // self._at_once
+
+    def take(self, stored: int) -> None:
+        """Evaluate what the user samples where it is new; raises `SamplingError`."""
+        self._sampler.take(self.window, stored)
+
+    def see(self, stored: int) -> Balance:
+        """The balance of energies with all samples that are new."""
+        new = self.written(stored)
+        seen = self.balance.count - new.first
+        self.balance.add(new.energy[seen:], new.displacement[seen:])
+        return self.balance
+
+    def first_off(self, stored: int, limit: float) -> int:
+        """Number of the first sample whose energies are off by more than a limit."""
+        first = 0
+        for energy, _ in self._energies(stored):
+            off = self.balance.off(energy, limit)
+            if off.any():
+                return first + int(np.argmax(off))
+            first += len(energy)
+        return first
+
+    def shorten(self, count: int) -> None:
+        """Leave out all samples after the first ones."""
+        if self._keeping is not None and self._keeping.begun:
+            self._keeping.columns.cut(min(count, self._keeping.columns.count))
+        self.balance = Balance()
+        for energy, displacement in self._energies(count):
+            self.balance.add(energy, displacement)
+
+    def more_room(self, stored: int) -> None:
+        """Make room for more samples."""
+        if self._keeping is None:
+            self.window = self.window.doubled()
+        else:
+            self.flush(stored)
+
+    def flush(self, stored: int) -> None:
+        """Put the samples on the disk; the window is empty then."""
+        assert self._keeping is not None
+        out = self.written(stored)
+        self.see(stored)
+        rows = out._asdict() | self._sampler.columns(stored)
+        del rows["first"]
+        self._keeping.append(rows)
+        self.window = self.window._replace(first=stored)
+        self._sampler.drop(stored)
+
+    def standing(self) -> dict[str, NDArray]:
+        """What is known of the samples on the disk, to `go_on`."""
+        own = self.balance
+        return {
+            "balance_start": own.start,
+            "balance": np.array([getattr(own, name) for name in Balance.NUMBERS]),
+        }
+
+    def go_on(self, standing: Mapping[str, NDArray], count: int) -> None:
+        """Go on after the samples on the disk."""
+        self.window = self.window._replace(first=count)
+        self._sampler.drop(count)
+        own = self.balance
+        own.start, own.count = standing["balance_start"], count
+        for name, value in zip(Balance.NUMBERS, standing["balance"].tolist(), strict=True):
+            setattr(own, name, value)
+
+    # ------------------------------------------------------------------ what there is
+    def written(self, stored: int) -> Samples:
+        """Samples in the window."""
+        return self.window.until(max(stored, self.window.first))
+
+    def displacement(self, stored: int) -> NDArray | Column:
+        """Of all samples (stored, n, 3), m."""
+        columns = self._on_disk(stored)
+        return self.written(stored).displacement if columns is None else columns["displacement"]
+
+    def time(self, sample: int) -> float:
+        """Time (s) of a sample."""
+        if sample >= self.window.first:
+            return float(self.window.time[sample - self.window.first])
+        assert self._keeping is not None
+        return float(self._keeping.columns["time"][sample])
+
+    def first(self, stored: int) -> tuple[Samples, dict[str, tuple[Quantity, NDArray]]]:
+        """Samples with what the user samples: all or, of what is on the disk, the first one."""
+        columns, known = self._on_disk(stored), self._sampler.known
+        if columns is None:
+            own = self._sampler.columns(stored)
+            return self.written(stored), {name: (known[name], own[name]) for name in own}
+        shown = {name: columns[name][:1] for name in columns.names}
+        return (
+            Samples._make([*(shown[name] for name in Samples._fields[:-1]), 0]),
+            {name: (quantity, shown[name]) for name, quantity in known.items()},
+        )
+
+    def whole(self, result: xarray.Dataset, stored: int) -> xarray.Dataset:
+        """The result with all samples, read from the disk where they are used, made of `first`."""
+        columns = self._on_disk(stored)
+        if columns is None:
+            return result
+        lazy = {}
+        for name, variable in result.data_vars.items():
+            if "time" not in variable.dims:
+                continue
+            if name in self._names:
+                every = columns.variable("energy", ("time", "column"))
+                found = every[:, self._names.index(str(name))]
+            else:
+                found = columns.variable(str(name), tuple(map(str, variable.dims)))
+            found.attrs = variable.attrs
+            lazy[name] = found
+        time = result["time"].variable
+        coordinates: dict[Any, Any] = dict(result.drop_vars([*result.data_vars, "time"]).coords)
+        coordinates["time"] = ("time", columns["time"][:], time.attrs)
+        kept = {name: lazy.get(name, result[name].variable) for name in result.data_vars}
+        return type(result)(kept, coordinates, result.attrs)
+
+    def _on_disk(self, stored: int) -> Columns | None:
+        """Columns with all samples; None where these are in memory."""
+        keeping = self._keeping
+        if keeping is None or not keeping.begun:
+            return None
+        if stored > keeping.columns.count:
+            self.flush(stored)
+        return keeping.columns
+
+    def _energies(self, stored: int) -> Iterator[tuple[NDArray, NDArray]]:
+        """Energies and displacements of all samples, piece by piece."""
+        if self.window.first:
+            assert self._keeping is not None
+            energy, moved = (self._keeping.columns[name] for name in ("energy", "displacement"))
+            for rows in pieces(min(stored, len(energy)), moved[:1].nbytes):
+                yield energy[rows], moved[rows]
+        there = self.written(stored)
+        yield there.energy, there.displacement

@@ -1,0 +1,158 @@
+"""Columns of numbers that grow in files, one file each, and are read only where they are used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+PIECE = 2**23
+"""Bytes that are held at a time of what may be larger than memory."""
+NUMBER = np.dtype("<f8")
+
+
+class Column:
+    """Rows of numbers in a file, the first of them there.
+
+    Parameters
+    ----------
+    path : Path
+    row : tuple of int
+        Shape of a row.
+    count : int
+        Rows there are.
+    """
+
+    def __init__(self, path: Path, row: tuple[int, ...], count: int) -> None:
+        self._path, self._row, self._count = path, row, count
+        self.shape, self.dtype = (count, *row), NUMBER
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, rows: int | slice) -> NDArray:
+        """One row, or a copy of those of a slice."""
+        if not isinstance(rows, slice):
+            number = range(self._count)[rows]
+            return self._read(number, number + 1)[0]
+        start, stop, step = rows.indices(self._count)
+        if step == 1:
+            return self._read(start, max(start, stop))
+        chosen = [self._read(k, k + 1) for k in range(start, stop, step)]
+        return np.concatenate(chosen) if chosen else self._read(0, 0)
+
+    def _read(self, first: int, last: int) -> NDArray:
+        size = int(np.prod(self._row, dtype=int))
+        with self._path.open("rb") as file:
+            file.seek(NUMBER.itemsize * size * first)
+            found = np.fromfile(file, NUMBER, size * (last - first))
+        return found.reshape(last - first, *self._row)
+
+
+class _Lazy(BackendArray):
+    """A column as xarray takes it."""
+
+    def __init__(self, column: Column) -> None:
+        self.column, self.shape, self.dtype = column, column.shape, column.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.BASIC, self._basic
+        )
+
+    def _basic(self, key: tuple[int | slice, ...]) -> Any:
+        return self.column[key[0]][(..., *key[1:]) if isinstance(key[0], int) else (
+            slice(None), *key[1:]
+        )]  # fmt: skip
+
+
+class Columns:
+    """Columns of one length, each in a file of its own in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        It exists.
+    rows : mapping of str to tuple of int
+        Shape of a row of each column, by name.
+    """
+
+    def __init__(self, folder: Path, rows: Mapping[str, tuple[int, ...]]) -> None:
+        self._folder, self._rows = folder, dict(rows)
+        self.names = tuple(rows)
+        self.count = 0
+        for name in rows:
+            with self._path(name).open("ab"):
+                pass
+
+    def append(self, columns: Mapping[str, NDArray]) -> None:
+        """Add rows, the same number to each column.
+
+        Raises
+        ------
+        OSError
+            The disk is full, or fails; then there are as many rows as before.
+        """
+        (added,) = {len(array) for array in columns.values()}
+        for name, array in columns.items():
+            with self._path(name).open("r+b") as file:
+                file.seek(self._bytes(name) * self.count)
+                file.write(
+                    np.ascontiguousarray(array, NUMBER).data.cast("B") if array.size else b""
+                )
+                file.truncate()
+        self.count += added
+
+    def settle(self) -> None:
+        """Wait until all rows are on the disk."""
+        for name in self._rows:
+            with self._path(name).open("r+b") as file:
+                os.fsync(file.fileno())
+
+    def cut(self, count: int) -> None:
+        """Keep the first rows only; the files hold them."""
+        for name in self._rows:
+            os.truncate(self._path(name), self._bytes(name) * count)
+        self.count = count
+
+    def hold(self, count: int) -> bool:
+        """Whether the files hold so many rows."""
+        files = ((self._path(name), self._bytes(name) * count) for name in self._rows)
+        return all(path.is_file() and path.stat().st_size >= size for path, size in files)
+
+    def __getitem__(self, name: str) -> Column:
+        return Column(self._path(name), self._rows[name], self.count)
+
+    def variable(self, name: str, dims: tuple[str, ...]) -> xr.Variable:
+        """A column as a variable that is read where it is used."""
+        return xr.Variable(dims, indexing.LazilyIndexedArray(_Lazy(self[name])))
+
+    def _bytes(self, name: str) -> int:
+        return NUMBER.itemsize * int(np.prod(self._rows[name], dtype=int))
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}.f8"
+
+
+def pieces(length: int, row_bytes: int) -> Iterator[slice]:
+    """Slices of rows, in order, none larger than `PIECE`."""
+    step = max(1, PIECE // max(1, row_bytes))
+    for first in range(0, length, step):
+        yield slice(first, min(first + step, length))
+
+
+def pieces_of(variable: xr.Variable) -> Iterator[NDArray]:
+    """Values of a variable, piece by piece along its first dimension."""
+    if not variable.ndim or variable.nbytes <= PIECE:
+        yield variable.values
+        return
+    length = variable.shape[0]
+    for rows in pieces(length, variable.nbytes // length):
+        yield variable[rows].values

@@ -1,0 +1,124 @@
+"""`foldyn run` of motions that are cut off: --checkpoint, --resume."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.cli.main import main
+from foldyn.dynamics import Keeping, motion
+
+CASE = """
+[pattern]
+kind = "simple_fold"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1000.0
+[model]
+mass = ["centroid", "panel"]
+[[supports]]
+nodes = [2, 3]
+axes = "xyz"
+[[loads]]
+nodes = [0, 1]
+force = [0.01, 0, 0]
+history = { kind = "half_sine", duration = 0.1 }
+[analysis]
+kind = "dynamics"
+duration = 2.0
+[output]
+every = 0.01
+"""
+FILES = ["result-centroid.nc", "result-panel.nc"]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with the case; motions are looked after every few steps."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(motion, "CHUNK", 16)
+    monkeypatch.setattr(motion, "REPORT_EVERY", 0.0)
+    Path("case.toml").write_text(CASE)
+    return tmp_path
+
+
+def cut(monkeypatch, name: str) -> None:
+    """Have Ctrl-C come after the third checkpoint of a result."""
+    made, original = [], Keeping.checkpoint
+
+    def checkpoint(self, *given):
+        original(self, *given)
+        made.append(self.file.name)
+        if made.count(name) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Keeping, "checkpoint", checkpoint)
+
+
+def ran(*given: str) -> int:
+    return main(["run", "case.toml", "--quiet", "--no-figures", *given])
+
+
+def test_a_run_that_is_cut_off_goes_on(place, monkeypatch, capsys):
+    assert ran("--out", "whole") == 0
+    with monkeypatch.context() as patch:
+        cut(patch, FILES[0])
+        assert ran("--checkpoint", "1e-9") == 130
+    said = capsys.readouterr().err
+    assert "keeps it up to t = " in said
+    assert "go on by --resume" in said
+    results = place / "case-results"
+    assert (results / "result-centroid.nc.unfinished").is_dir()
+    assert ran() == 2
+    said = capsys.readouterr().err
+    assert "keeps a motion that was cut off" in said
+    assert "go on with it by --resume, or --replace to begin anew" in said
+    assert ran("--resume") == 0
+    assert sorted(name for name in os.listdir(results) if name[0] != ".") == FILES
+    for name in FILES:
+        found, wanted = fd.load(results / name), fd.load(place / "whole" / name)
+        assert "stopped_because" not in found.attrs
+        for variable in wanted.variables:
+            np.testing.assert_array_equal(found[variable].values, wanted[variable].values)
+
+
+def test_finished_results_are_not_computed_again(place, monkeypatch, capsys):
+    with monkeypatch.context() as patch:
+        cut(patch, FILES[1])
+        assert ran("--checkpoint", "1e-9") == 130
+    first = fd.load(place / "case-results" / FILES[0]).attrs["wall_seconds"]
+    assert (place / "case-results" / f"{FILES[1]}.unfinished").is_dir()
+    assert main(["run", "case.toml", "--resume"]) == 0
+    assert fd.load(place / "case-results" / FILES[0]).attrs["wall_seconds"] == first
+    assert (place / "case-results" / "report.html").is_file()
+
+
+def test_another_case_is_refused_or_replaces(place, monkeypatch, capsys):
+    with monkeypatch.context() as patch:
+        cut(patch, FILES[0])
+        assert ran("--checkpoint", "1e-9") == 130
+    Path("case.toml").write_text(CASE.replace("thickness = 0.01", "thickness = 0.02"))
+    capsys.readouterr()
+    assert ran("--resume") == 2
+    assert "was begun with sheet.thickness = 0.01, which is 0.02 now" in capsys.readouterr().err
+    assert ran("--replace") == 0
+    found = fd.load(place / "case-results" / FILES[0])
+    assert fd.case_of(found).structure.sheet.thickness == 0.02
+    assert not list((place / "case-results").glob("*.unfinished"))
+
+
+def test_what_has_no_checkpoints(place, capsys):
+    assert ran("--resume", "--replace") == 2
+    assert "leave out --replace" in capsys.readouterr().err
+    assert ran("--checkpoint", "0") == 2
+    assert "--checkpoint" in capsys.readouterr().err
+    head = CASE.partition("[[loads]]")[0]
+    Path("case.toml").write_text(f'{head}[analysis]\nkind = "modes"\n')
+    assert ran("--resume") == 2
+    assert "--resume: only motions have checkpoints" in capsys.readouterr().err

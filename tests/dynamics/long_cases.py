@@ -1,0 +1,65 @@
+"""Motions that are killed and go on; run as a script with a file and the arguments in JSON, one."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import numpy as np
+import xarray
+
+import foldyn as fd
+from foldyn.dynamics import motion
+from one_hinge import WING, one_hinge
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, 1000.0)
+
+
+def sheet(thickness: float = 0.01, force: float = 0.05) -> fd.Case:
+    """A cell that swings on a base that moves, under loads with jumps."""
+    pattern = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+    s = fd.discretize(pattern, fd.Sheet(1e6, 0.25, thickness, 1000.0))
+    base = fd.BaseMotion("x", fd.Harmonic(2.0), 0.001)
+    loads = [fd.Force([6, 7, 8], (force, 0, 0), fd.Pulse(duration=0.3))]
+    return fd.Case(s, [fd.Fix([0, 1, 2]), base], loads, fd.Rayleigh(2.0, 1e-5))
+
+
+def actuated() -> fd.Case:
+    """A fold with a law that depends on its rest angle, which moves."""
+    pattern = fd.patterns.simple_fold(dihedral=120)
+    s = fd.discretize(pattern, SHEET, fold_law=fd.EnhancedLinear(theta1=90, theta2=270))
+    swing = fd.Actuate("all", 220.0, fd.Ramp(0.5, smooth=True))
+    return fd.Case(s, [fd.Fix([2, 3])], [swing], fd.Rayleigh(alpha=0.5))
+
+
+def creeping() -> fd.Case:
+    """A hinge with memory under a constant force."""
+    law = fd.Prony([0.5, 0.2], [0.02, 0.3], law="linear")
+    return one_hinge(law, loads=[fd.Force([WING], (0, 0, 3e-4))], hold=False)
+
+
+CASES = {"sheet": sheet, "actuated": actuated, "creeping": creeping}
+
+
+def simulated(name: str, changes: dict[str, Any] | None = None, **options: Any) -> xarray.Dataset:
+    """The motion of one of them, looked after every few steps."""
+    motion.CHUNK, motion.REPORT_EVERY = 16, 0.0
+    return fd.simulate(CASES[name](**(changes or {})), **options)
+
+
+def same(one: xarray.Dataset, other: xarray.Dataset, also: tuple[str, ...] = ()) -> None:
+    """Two results have the same bits, and the same attributes but for the time that they took."""
+    assert set(one.variables) == set(other.variables)
+    assert set(one.coords) == set(other.coords)
+    for name in one.variables:
+        assert one[name].dims == other[name].dims
+        assert np.array_equal(one[name].values, other[name].values), name
+        assert one[name].attrs == other[name].attrs
+    aside = {"wall_seconds", "motion", *also}
+    first, second = ({k: v for k, v in ds.attrs.items() if k not in aside} for ds in (one, other))
+    assert first == second
+
+
+if __name__ == "__main__":
+    simulated(**json.loads(sys.argv[1]))
