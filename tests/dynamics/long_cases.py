@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray
+from contact_cases import folded_from_both_ends, on_slope
 
 import foldyn as fd
 from foldyn.dynamics import motion
@@ -39,7 +40,20 @@ def creeping() -> fd.Case:
     return one_hinge(law, loads=[fd.Force([WING], (0, 0, 3e-4))], hold=False)
 
 
-CASES = {"sheet": sheet, "actuated": actuated, "creeping": creeping}
+def sliding() -> fd.Case:
+    """A strip that slides down a slope, held back by friction."""
+    return on_slope(30.0, 0.3)
+
+
+def touching() -> fd.Case:
+    """A strip that folds onto itself."""
+    return folded_from_both_ends(fd.Contact())
+
+
+CASES = {
+    "sheet": sheet, "actuated": actuated, "creeping": creeping, "sliding": sliding,
+    "touching": touching,
+}  # fmt: skip
 
 
 def simulated(name: str, changes: dict[str, Any] | None = None, **options: Any) -> xarray.Dataset:

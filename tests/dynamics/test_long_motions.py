@@ -63,6 +63,8 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "fixed": (["newmark", "energy_momentum"], {"duration": 1.0, "every": 0.02, "dt": 0.005}),
     "actuated": (["rk4", "generalized_alpha"], {"duration": 0.6, "every": 0.01}),
     "creeping": (["rk4", "generalized_alpha"], {"duration": 1.0, "every": 0.01, "dt": 0.002}),
+    "sliding": (["newmark"], {"duration": 0.02, "every": 0.001}),
+    "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
 RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
 
@@ -71,7 +73,7 @@ RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in met
 @pytest.mark.parametrize(("kind", "method"), RUNS)
 def test_a_run_that_is_killed_again_and_again_gives_the_same_bits(tmp_path, kind, method):
     options = {"method": method, **KINDS[kind][1]}
-    name = kind if kind in ("actuated", "creeping") else "sheet"
+    name = "sheet" if kind in ("steps", "fixed") else kind
     whole = simulated(name, **options)
     calls = 6 if METHODS[method].implicit else 3
     found, kills = in_pieces(tmp_path / "run.nc", calls, name, **options)
