@@ -26,13 +26,14 @@ from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
 from foldyn.cli.track import add_track, track
 from foldyn.cli.view import add_view, run_view
+from foldyn.cli.warm_up import add_warm_up, run_warm_up
 from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
 from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {
     "convert": convert, "fit": run_fit, "fold": run_fold, "study": study, "track": track,
-    "view": run_view,
+    "view": run_view, "warm-up": run_warm_up,
 }  # fmt: skip
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
@@ -125,6 +126,7 @@ def parser() -> argparse.ArgumentParser:
     add_fit(commands)
     add_track(commands)
     add_view(commands)
+    add_warm_up(commands)
     commands.add_parser(
         "info",
         help="versions, threads, optional parts, shipped cases",

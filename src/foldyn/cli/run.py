@@ -204,8 +204,8 @@ def _introduction(
         say(f"{case_file.title or case_file.path.name}: {counted}")
         if case_file.analysis.compiles([one.compute for one in task]):
             say(
-                "compiling the kernels: first use, up to half a minute; they are kept for later "
-                "runs"
+                "compiling the kernels: first use, a minute or two; they are kept for later runs "
+                "(foldyn warm-up compiles those of other methods and models too)"
             )
 
     return introduce
