@@ -1,4 +1,4 @@
-"""The paper specimen with creases that relax: it drifts back after its release, and fits tell it."""
+"""The paper specimen with creases that relax: it drifts back, and fits tell by how much."""
 
 from __future__ import annotations
 
