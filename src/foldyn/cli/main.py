@@ -23,6 +23,7 @@ from foldyn.cli.options import add_figures, add_film, add_results
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
+from foldyn.cli.sweep import add_sweep, run_sweep
 from foldyn.cli.track import add_track, track
 from foldyn.cli.view import add_view, run_view
 from foldyn.errors import ComputationError, FoldynWarning, InputError, shortened
@@ -30,8 +31,8 @@ from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {
-    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study, "track": track,
-    "view": run_view,
+    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study,
+    "sweep": run_sweep, "track": track, "view": run_view,
 }  # fmt: skip
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
@@ -115,6 +116,7 @@ def parser() -> argparse.ArgumentParser:
     add_fold(commands)
     add_study(commands)
     add_fit(commands)
+    add_sweep(commands)
     add_track(commands)
     add_view(commands)
     commands.add_parser(

@@ -88,8 +88,8 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
     ds : xarray.Dataset
     measure : str
     at : mapping, optional
-        Where along dimensions of its own, {"mode": 2}: values of their coordinates; the first
-        unless given.
+        Where along its own dimensions, {"mode": 2}, by values of their coordinates, the first
+        unless given; and at which values of parameters of a grid, all unless given.
 
     Raises
     ------
@@ -97,13 +97,15 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
         Not a sweep, no such measure, dimension or value.
     """
     found = ds[choice("measure", measure, measures_of(ds))]
-    own = [str(dim) for dim in found.dims if dim != POINT and dim not in parameters_of(ds)]
+    own = [dim for dim in map(str, found.dims) if dim != POINT and dim not in parameters_of(ds)]
     given = dict(at or {})
     for dim in given:
-        choice("at: dimension", dim, own)
-    for dim in own:
+        choice("at: dimension", dim, [dim for dim in map(str, found.dims) if dim != POINT])
+    for dim in (*own, *(dim for dim in given if dim not in own)):
         values = found[dim].values.tolist()
-        value = given.get(dim, values[0] if values else None)
+        if not values:
+            raise InputError(f" = {measure}: has no values at any point", "measure")
+        value = given.get(dim, values[0])
         if value not in values:
             raise InputError(f" = {value!r}: {measure} has {values}", f"at[{dim!r}]")
         found = found.sel({dim: value})
@@ -155,7 +157,8 @@ def main_effects(
         As of `measured`.
     """
     found = measured(ds, measure, at)
-    return tuple(_effect(found, name) for name in parameters_of(ds))
+    left = [name for name in parameters_of(ds) if name not in (at or {})]
+    return tuple(_effect(found, name) for name in left)
 
 
 def _effect(found: xr.DataArray, name: str) -> MainEffect:
