@@ -67,7 +67,7 @@ class Varied:
         if self.values:
             return self.values
         middle = _between(self.lower, self.upper, np.array([0.3819660112501051]), self.log)
-        return (self.lower, float(middle[0]), self.upper)
+        return (self.lower, self.upper, float(middle[0]))
 
 
 def varied(given: Any, sampled: bool) -> tuple[Varied, ...]:
@@ -124,16 +124,15 @@ def _range(key: str, text: str, sampled: bool) -> Varied:
         if sampled:
             return Varied(key, (), lower, upper, log)
         steps = whole("N", _word(words[2]), least=2, most=MOST_VALUES)
-    values = _between(lower, upper, np.linspace(0.0, 1.0, steps), log)
+    values = (np.geomspace if log else np.linspace)(lower, upper, steps)
     if all(isinstance(end, int) for end in ends) and not np.any(values % 1.0):
         return Varied(key, tuple(map(int, values)))
     return Varied(key, tuple(values.tolist()))
 
 
 def _between(lower: float, upper: float, share: NDArray, log: bool) -> NDArray[np.float64]:
-    """Values at shares of the way from one end to the other, which are met exactly."""
-    inner = lower * (upper / lower) ** share if log else lower + share * (upper - lower)
-    return np.where(share == 1.0, upper, np.where(share == 0.0, lower, inner))
+    """Values at shares of the way from one end to the other."""
+    return lower * (upper / lower) ** share if log else lower + share * (upper - lower)
 
 
 def _word(word: str) -> Value:

@@ -28,7 +28,7 @@ from foldyn.values import choice
 MOST_LINES = 12
 """Curves in one figure."""
 COLUMNS = 3
-_SHADES = LinearSegmentedColormap.from_list("sweep", ["#F2F6FA", style.SKY, style.BLUE, "#0B2A4A"])
+_SHADES = LinearSegmentedColormap.from_list("sweep", ["#FFFFFF", style.SKY, style.BLUE])
 _FAILED: dict[str, Any] = {"marker": "x", "color": style.VERMILLION, "linestyle": "none"}
 _RATIO = 30.0
 """Ratio of the largest to the smallest value from which evenly spaced ratios have such an axis."""
@@ -86,7 +86,7 @@ def plot_sweep_map(
             across, down, mesh, cmap=_SHADES, shading="nearest", rasterized=True
         )
         if min(values.shape) > 2 and np.ptp(mesh) > 0.0:
-            lines = axes.contour(across, down, mesh, levels=6, colors="white", linewidths=0.8)
+            lines = axes.contour(across, down, mesh, levels=6, colors=style.BLACK, linewidths=0.7)
             axes.clabel(lines, fontsize=style.NOTE, fmt=lambda value: f"{value:.4g}")
         missing = np.argwhere(~np.isfinite(values))
         axes.plot(across[missing[:, 1]], down[missing[:, 0]], **_FAILED)

@@ -34,7 +34,7 @@ class Cluster(Generic[Item, Result]):
     Raises
     ------
     InputError
-        Dask is not installed, or nothing answers there.
+        Dask is not installed, nothing answers there, or a worker computes on several threads.
     """
 
     def __init__(self, do: Callable[[Item], Result], address: str) -> None:
@@ -49,6 +49,14 @@ class Cluster(Generic[Item, Result]):
                 "when it starts, as in tcp://10.0.0.1:8786",
                 "scheduler",
             ) from None
+        several = [one for one, threads in self._client.nthreads().items() if threads > 1]
+        if several:  # warnings and libraries of one process would mix
+            self._client.close()
+            raise InputError(
+                f" = {address}: its worker {several[0]} computes on several threads; start workers "
+                "with --nthreads 1, and more of them",
+                "scheduler",
+            )
 
     def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
         """Compute an item on one worker, so that the others find its kernels compiled."""
@@ -62,7 +70,7 @@ class Cluster(Generic[Item, Result]):
     ) -> None:
         """Compute something for each item; see `foldyn.workers.Workers.each`."""
         left, waiting = iter(items), dict[Any, Item]()
-        finished = self._dask.as_completed()
+        finished = self._dask.as_completed(loop=self._client.loop)
         self._hand_out(left, waiting, finished)
         try:
             for future in finished:
@@ -85,9 +93,8 @@ class Cluster(Generic[Item, Result]):
 
     def _hand_out(self, left: Any, waiting: dict[Any, Item], finished: Any) -> None:
         """Hand out so many items that no worker is idle."""
-        threads = sum(self._client.nthreads().values()) if not waiting else 0
-        self._room = max(AHEAD * threads, AT_LEAST, getattr(self, "_room", 0))
-        for item in islice(left, max(self._room - len(waiting), 0)):
+        room = max(AHEAD * len(self._client.nthreads()), AT_LEAST)
+        for item in islice(left, max(room - len(waiting), 0)):
             future = self._client.submit(self.do, item, pure=False)
             waiting[future] = item
             finished.add(future)

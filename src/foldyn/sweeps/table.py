@@ -22,6 +22,9 @@ from foldyn.sweeps.measure import Asked
 from foldyn.sweeps.plan import Plan
 from foldyn.sweeps.points import GRID
 
+DEGREES = ("dihedral", "panel_angle", "theta1", "theta2", "twist")
+"""Words of keys that are angles."""
+UNITS_OF_KEYS: Mapping[str, str] = {**UNITS, **dict.fromkeys(DEGREES, "degrees")}
 ABOUT: Mapping[str, str] = {
     "failure": "why the point has no values",
     "warnings": "what was warned of",
@@ -69,14 +72,16 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
         values = one.values if on_grid else [point[k] for point in plan.points]
         word = one.key.rpartition(".")[2]
         about = {"key": one.key, "long_name": name.replace("_", " ")}
-        about |= {"units": UNITS[word]} if word in UNITS else {}
+        about |= {"units": UNITS_OF_KEYS[word]} if word in UNITS_OF_KEYS else {}
         coordinates[name] = (name if on_grid else POINT, np.array(values), about)
     data: dict[str, Any] = {}
     checked = list(found)
     for one in measures:
         array, checked = _stacked(one, checked)
         inner = one.measure.dims or tuple(f"{one.name}_{k}" for k in range(array.ndim - 1))
-        about = {"units": one.measure.units, "long_name": one.measure.doc or one.name}
+        where = [f"{what} {value}" for what, value in one.arguments.items()]
+        text = ", ".join([one.measure.doc or one.name, *where])
+        about = {"units": one.measure.units, "long_name": text}
         about |= {"measure": one.text}
         about = {key: text for key, text in about.items() if text}
         data[one.name] = ((*dims, *inner), array.reshape(*shape, *array.shape[1:]), about)
