@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import random
 import signal
+import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +39,11 @@ def kept(folder: Path) -> dict[str, tuple[int, int]]:
     }
 
 
+def more(points: Path, there: int, process: subprocess.Popen[str]) -> bool:
+    """Whether there are more points, or the sweep has ended."""
+    return len(kept(points)) > there or process.poll() is not None
+
+
 def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> None:
     """Sweep, killed at random moments after new points were kept."""
     (folder / "case.toml").write_text(MODES)
@@ -47,8 +54,7 @@ def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> 
     points, moments, before = folder / "case-sweep" / "points", random.Random(0), {}
     for _ in range(kills):
         one = start(folder, *command)
-        there = len(before)
-        wait_for(lambda there=there: len(kept(points)) > there or one.poll() is not None)
+        wait_for(partial(more, points, len(before), one))
         time.sleep(seconds * moments.uniform(0.0, 0.6 * count / kills))
         workers = children(one.pid)
         one.send_signal(signal.SIGKILL)

@@ -144,9 +144,7 @@ def test_ones_own_measures(case):
     assert found["shape"].dims == ("thickness", "shape_0", "shape_1")
     named = fd.sweep(case, {"sheet.thickness": [0.01]}, {"tip": shape, "n": count}, processes=1)
     assert "no number or array" in str(named["failure"].values[0])
-    with pytest.raises(
-        InputError, match=r"shape cannot be sent to other processes .* top of a mod"
-    ):
+    with pytest.raises(InputError, match=r"shape cannot be sent to other proc.* top of a mod"):
         fd.sweep(case, {"sheet.thickness": [0.01, 0.02]}, [shape], processes=2)
 
 

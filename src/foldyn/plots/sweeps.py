@@ -308,9 +308,10 @@ def _check_some(values: NDArray, measure: str) -> None:
 
 def _named(found: xr.DataArray, by: str | None = None) -> str:
     """Label of a measure, with where it is along its own dimensions."""
-    own = {str(dim): found[dim] for dim in found.coords if "key" not in found[dim].attrs}
     places = [
-        f"{dim} {_short(one.item())}" for dim, one in own.items() if one.ndim == 0 and dim != by
+        f"{one.attrs.get('long_name', name)} {_short(one.item())}"
+        for name, one in found.coords.items()
+        if one.ndim == 0 and name != by
     ]
     text = str(found.attrs.get("long_name", found.name))
     return label(found, ", ".join([text, *places]))
