@@ -98,6 +98,15 @@ def test_the_design_for_sobol_indices_exchanges_one_key_at_a_time():
     assert not (blocks[0] == blocks[1]).any()
 
 
+def test_a_key_with_one_value_takes_no_points():
+    keys = varied({"a": "0:1", "b": [7], "c": "0:1"}, True)
+    points = samples(keys, 8, "saltelli", 0)
+    assert len(points) == 8 * (2 + 2)
+    assert {b for _, b, _ in points} == {7}
+    alone = samples(varied({"a": "0:1", "c": "0:1"}, True), 8, "saltelli", 0)
+    assert [(a, c) for a, _, c in points] == alone
+
+
 @pytest.mark.parametrize("method", ["sobol", "saltelli"])
 def test_a_sobol_sequence_needs_a_power_of_two(method):
     with pytest.raises(InputError, match=r"samples = 100: .* take 128"):

@@ -17,6 +17,7 @@ from foldyn.plots import style
 from foldyn.results.swept import (
     SobolIndices,
     is_grid,
+    keys_of,
     label,
     main_effects,
     measured,
@@ -146,7 +147,7 @@ def plot_sweep_lines(
     names = [name for name in parameters_of(sweep) if name not in (at or {})]
     along = choice("x", x, names) if x is not None else (names or parameters_of(sweep))[0]
     others = [name for name in names if name != along]
-    own = [str(dim) for dim in sweep[measure].dims if dim not in (*names, "point")]
+    own = [str(dim) for dim in sweep[measure].dims if dim not in (*keys_of(sweep), "point")]
     if by is not None:
         choice("by", by, [*others, *own])
     elif is_grid(sweep) and others:
@@ -332,6 +333,11 @@ def _places(axes: Axes, one: xr.DataArray, which: str) -> NDArray:
         return np.asarray(place, float)
     if _by_ratio(np.unique(values)):
         getattr(axes, f"set_{which}scale")("log")
+    else:
+        axes.ticklabel_format(axis=which, scilimits=(-2, 4), useMathText=True)
+        axes.locator_params(axis=which, nbins=6)
+        side = getattr(axes, f"{which}axis")
+        side.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
     return values.astype(float)
 
 

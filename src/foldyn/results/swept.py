@@ -57,10 +57,16 @@ def check_sweep(ds: xr.Dataset) -> None:
         raise InputError("sweep: give a result of foldyn.sweep")
 
 
-def parameters_of(ds: xr.Dataset) -> list[str]:
-    """Names of what a sweep varied, in its order."""
+def keys_of(ds: xr.Dataset) -> list[str]:
+    """Names of all keys of a sweep, in its order, those with one value too."""
     check_sweep(ds)
     return [str(name) for name, one in ds.coords.items() if "key" in one.attrs]
+
+
+def parameters_of(ds: xr.Dataset) -> list[str]:
+    """Names of what a sweep varied: keys with several values, or all where none has."""
+    names = keys_of(ds)
+    return [name for name in names if np.unique(ds[name].values).size > 1] or names
 
 
 def measures_of(ds: xr.Dataset) -> list[str]:
@@ -97,8 +103,10 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
         Not a sweep, no such measure, dimension or value.
     """
     found = ds[choice("measure", measure, measures_of(ds))]
-    own = [dim for dim in map(str, found.dims) if dim != POINT and dim not in parameters_of(ds)]
-    given = dict(at or {})
+    keys, left = keys_of(ds), parameters_of(ds)
+    own = [dim for dim in map(str, found.dims) if dim != POINT and dim not in keys]
+    given = {dim: ds[dim].values[0] for dim in keys if dim in found.dims and dim not in left}
+    given |= at or {}
     for dim in given:
         choice("at: dimension", dim, [dim for dim in map(str, found.dims) if dim != POINT])
     for dim in (*own, *(dim for dim in given if dim not in own)):
@@ -108,7 +116,7 @@ def measured(ds: xr.Dataset, measure: str, at: Mapping[str, Any] | None = None) 
         value = given.get(dim, values[0])
         if value not in values:
             raise InputError(f" = {value!r}: {measure} has {values}", f"at[{dim!r}]")
-        found = found.sel({dim: value})
+        found = found.sel({dim: value}, drop=dim in keys and dim not in (at or {}))
     return found
 
 

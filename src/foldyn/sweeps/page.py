@@ -22,6 +22,7 @@ from foldyn.results.swept import (
     POINT,
     SALTELLI,
     is_grid,
+    keys_of,
     label,
     main_effects,
     measured,
@@ -79,12 +80,11 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
         yield Text("Has no value at any point.")
         return
     names = parameters_of(sweep)
-    own = [str(dim) for dim in one.dims if dim not in (*names, POINT)]
+    own = [str(dim) for dim in one.dims if dim not in (*keys_of(sweep), POINT)]
     at = {dim: sweep[dim].values[0].item() for dim in own}
     where = "".join(f", {dim} {value}" for dim, value in at.items())
     text = f"{one.attrs['long_name']}{where}".capitalize()
     if len(names) > 1:
-        varied = [name for name in names if sweep[name].size > 1] or names
         if is_grid(sweep) and len(names) == 2:
             caption = f"{text}, over both parameters."
             draw = partial(plots.plot_sweep_map, sweep, name, at=at)
@@ -95,7 +95,7 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
             else f"{text}: the points over each parameter, and their means."
         )
         draw = partial(plots.plot_main_effects, sweep, name, at)
-        charts = Charts([_effect(sweep, name, at, each) for each in varied], caption)
+        charts = Charts([_effect(sweep, name, at, each) for each in names], caption)
         yield from album.figure(f"effects-{name}", caption, draw, charts)
     if is_grid(sweep) and len(names) <= 2:
         by = names[1] if len(names) == 2 else (own[0] if own else None)
@@ -182,7 +182,7 @@ def _points(sweep: xr.Dataset) -> Iterator[Section]:
     """Table of the points."""
     table = _flat(sweep)
     columns: dict[str, np.ndarray] = {}
-    for name in parameters_of(sweep):
+    for name in keys_of(sweep):
         columns[label(sweep[name])] = table[name].values
     for name in measures_of(sweep):
         one = table[name]
@@ -206,12 +206,12 @@ def _flat(sweep: xr.Dataset) -> xr.Dataset:
     kept = sweep[[*measures_of(sweep), "failure", "seconds"]]
     if not is_grid(sweep):
         return kept
-    return kept.stack({POINT: parameters_of(sweep)}, create_index=False)
+    return kept.stack({POINT: keys_of(sweep)}, create_index=False)
 
 
 def _failures(sweep: xr.Dataset) -> Table:
     table = _flat(sweep)
-    names = parameters_of(sweep)
+    names = keys_of(sweep)
     failed = [k for k, reason in enumerate(table["failure"].values.tolist()) if reason]
     rows = [
         [*(table[name].values[k].item() for name in names), str(table["failure"].values[k])]
@@ -229,7 +229,7 @@ def _rows(
     facts = sweep.attrs
     yield "case file", str(case_file.path.name)
     yield "analysis", str(facts["kind"])
-    for name in parameters_of(sweep):
+    for name in keys_of(sweep):
         values = sweep[name].values
         listed = ", ".join(str(value) for value in np.unique(values).tolist()[:12])
         if values.dtype.kind in "iuf" and len(np.unique(values)) > 12:

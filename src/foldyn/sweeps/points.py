@@ -35,6 +35,7 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
     Parameters
     ----------
     varied : sequence of Varied
+        Those with one value have that at all points, and count for nothing.
     count : int
         How many. With "saltelli" the base of a design for Sobol indices, which has as many points
         for each of two independent samples, and for the first one with each key from the second
@@ -47,10 +48,14 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
     InputError
         The count is no power of 2 where a Sobol sequence needs it, or too large.
     """
-    d = len(varied)
+    free = [one.key for one in varied if len(one.values) != 1]
+    d = max(len(free), 1)
     _check_count(count * (d + 2) if method == SALTELLI else count)
     share = _shares(d, count, method, seed)
-    columns = [one.at(share[:, k]) for k, one in enumerate(varied)]
+    still = np.zeros(len(share))
+    columns = [
+        one.at(share[:, free.index(one.key)] if one.key in free else still) for one in varied
+    ]
     return list(zip(*columns, strict=True))
 
 
