@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -322,7 +322,7 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _places(axes: Axes, one: xr.DataArray, which: str) -> NDArray:
+def _places(axes: Axes, one: xr.DataArray, which: Literal["x", "y"]) -> NDArray:
     """Where the values of a parameter stand along an axis, which gets its ticks or its scale."""
     values = one.values
     if values.dtype.kind not in "iuf":
@@ -333,11 +333,11 @@ def _places(axes: Axes, one: xr.DataArray, which: str) -> NDArray:
         return np.asarray(place, float)
     if _by_ratio(np.unique(values)):
         getattr(axes, f"set_{which}scale")("log")
-    else:
-        axes.ticklabel_format(axis=which, scilimits=(-2, 4), useMathText=True)
-        axes.locator_params(axis=which, nbins=6)
-        side = getattr(axes, f"{which}axis")
-        side.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
+        return values.astype(float)
+    axes.ticklabel_format(axis=which, scilimits=(-2, 4), useMathText=True)
+    axes.locator_params(axis=which, nbins=6)
+    side = axes.xaxis if which == "x" else axes.yaxis
+    side.get_offset_text().set(fontsize=style.TICK, color=style.BLACK)
     return values.astype(float)
 
 
