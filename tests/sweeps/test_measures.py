@@ -150,3 +150,12 @@ def test_own_measures_are_found_by_module_and_by_file(tmp_path, results):
     for text in ("mine.py:two", "nowhere:one", "none.py:one"):
         with pytest.raises(InputError, match=r"has no function|cannot be imported"):
             own_measure(text, tmp_path)
+
+
+def test_the_table_of_the_page_can_be_read(tmp_path):
+    page = (DOCS / "sweeps.md").read_text("utf-8")
+    (table,) = re.findall(r"^```toml\n(.*?)^```$", page, re.M | re.S)
+    (tmp_path / "case.toml").write_text(MODES + table)
+    found = fd.sweep(tmp_path / "case.toml", samples=2, processes=1)
+    assert set(found.data_vars) >= {"frequencies", "effective_mass_1_z"}
+    assert found.attrs["failed"] == 0
