@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import time
+
+from numba.core.dispatcher import Dispatcher
 
 from case_texts import FOLD_TEXT, HELD_MIURA_TEXT
 
@@ -57,6 +61,12 @@ def slow_measure(result, case) -> float:
     """A frequency, after a while."""
     time.sleep(0.1)
     return float(result["frequency"][0])
+
+
+def compiled_here(result, case) -> list[float]:
+    """The process, and how many kernels it has compiled instead of loading them."""
+    found = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+    return [os.getpid(), sum(sum(one.stats.cache_misses.values()) for one in found)]
 
 
 def fails_sometimes(result, case) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from swept_cases import FRF, MODES, PATH, fails_sometimes
+from swept_cases import FRF, MODES, PATH, compiled_here, fails_sometimes
 
 import foldyn as fd
 from foldyn.analyses.keys import replaced
@@ -61,8 +62,12 @@ def test_the_result_is_saved_and_carries_its_case_and_its_sweep(case, tmp_path):
 
 def test_processes_give_the_same_and_do_not_compile(case):
     alone = of(case)
-    for one in (of(case, processes=2), of(case, processes=2)):
-        np.testing.assert_array_equal(one["frequencies"], alone["frequencies"])
+    found = of(case, ["frequencies", compiled_here], processes=2)
+    np.testing.assert_array_equal(found["frequencies"], alone["frequencies"])
+    process, compiled = found["compiled_here"].values.reshape(-1, 2).T
+    others = process != os.getpid()  # the first point is computed here
+    assert others.sum() == 5
+    assert (compiled[others] == 0).all()
 
 
 def test_the_table_in_the_file(case):

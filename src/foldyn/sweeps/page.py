@@ -100,7 +100,8 @@ def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]
     if is_grid(sweep) and len(names) <= 2:
         by = names[1] if len(names) == 2 else (own[0] if own else None)
         kept = {dim: value for dim, value in at.items() if dim != by}
-        caption = f"{text}, over {sweep[names[0]].attrs['long_name']}."
+        lines = text if by not in own else str(one.attrs["long_name"]).capitalize()
+        caption = f"{lines}, over {sweep[names[0]].attrs['long_name']}."
         draw = partial(plots.plot_sweep_lines, sweep, name, names[0], by, kept)
         charts = Charts([_lines(sweep, name, names[0], by, kept)], caption)
         yield from album.figure(f"lines-{name}", caption, draw, charts)
