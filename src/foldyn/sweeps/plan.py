@@ -86,46 +86,56 @@ def plan_of(
         raise InputError(f"case: got {type(case).__name__}, give the path of a case file") from None
     document = read_document(path)
     case_file = case_of_document(path, document)
-    table: SweepSection | None = case_file._schema.sweep
-    wanted = list(table.measures) if measures is None and table is not None else measures
-    if vary is None and table is None:
-        raise InputError(": missing; name what to vary, here or in a table [sweep]", "vary", path)
-    if vary is None and table is not None:
-        given = {"samples": count, "method": method, "seed": seed}
+    table = case_file.sweep
+    if measures is None and table is not None:
+        measures = table.measures
+    if vary is not None:
+        chosen = _chosen(vary, count, method, seed, ties)
+    elif table is not None:
+        given = {"samples": count, "method": method, "seed": seed, "ties": ties}
         changed = {key: value for key, value in given.items() if value is not None}
-        if changed:
-            own = {**document["sweep"], **changed}
-            table = validated(path, {**document, "sweep": own}).sweep
-        assert table is not None
-        count, method, seed = table.samples, table.method, table.seed
-        keys, tied = table.vary, table.ties if ties is None else _ties(ties)
+        own = {**document["sweep"], **changed}
+        chosen = validated(path, {**document, "sweep": own}).sweep if changed else table
     else:
-        if count is not None:
-            whole("samples", count, least=1)
-        elif method is not None or seed is not None:
-            raise InputError(
-                ": is of samples; give samples too, or leave it out for a grid",
-                "method" if method is not None else "seed",
-            )
-        with within("vary"):
-            keys = varied(vary, count is not None)
-        tied = _ties(ties or {})
-    method = choice("method", method or SAMPLINGS[0], SAMPLINGS)
-    seed = whole("seed", seed or 0, least=0, most=MOST)
-    keys = _with_masses(keys, case_file, count is not None)
-    points = grid(keys) if count is None else samples(keys, count, method, seed)
-    found = _measures(wanted)
-    job = Job(path, document, tuple(k.key for k in keys), tied, found, this_program())
+        raise InputError(": missing; name what to vary, here or in a table [sweep]", "vary", path)
+    sampled = chosen.samples is not None
+    keys = _with_masses(chosen.vary, case_file, sampled)
+    how = chosen.samples or 0, chosen.method, chosen.seed
+    points = samples(keys, *how) if sampled else grid(keys)
+    names = tuple(one.key for one in keys)
+    job = Job(path, document, names, tuple(chosen.ties), _measures(measures), this_program())
     _check_keys(job, keys, points[0])
     faults = Faults()
-    for one in found:
+    for one in job.measures:
         with faults.collected():
             one.check(case_file)
     faults.tell()
     case_file.computation()  # which refuses what cannot be computed as it is
-    return Plan(
-        case_file, keys, GRID if count is None else method, count or 0, seed, points, job
-    )  # fmt: skip
+    number, drawn, start = how
+    return Plan(case_file, keys, drawn if sampled else GRID, number, start, points, job)
+
+
+def _chosen(
+    vary: Mapping[str, Any], count: int | None, method: str | None, seed: int | None,
+    ties: Mapping[str, str] | None,
+) -> SweepSection:  # fmt: skip
+    """A table [sweep] of arguments."""
+    if count is None and (method is not None or seed is not None):
+        raise InputError(
+            ": is of samples; give samples too, or leave it out for a grid",
+            "method" if method is not None else "seed",
+        )
+    if count is not None:
+        whole("samples", count, least=1)
+    with within("vary"):
+        keys = varied(vary, count is not None)
+    return SweepSection.model_construct(
+        samples=count,
+        method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
+        seed=whole("seed", seed or 0, least=0, most=MOST),
+        vary=keys,
+        ties=_ties(ties or {}),
+    )
 
 
 def _ties(given: Mapping[str, str]) -> tuple[Any, ...]:
