@@ -22,6 +22,7 @@ from foldyn import (
     statics as statics,
     structures as structures,
     studies as studies,
+    sweeps as sweeps,
 )
 from foldyn.analyses import read_case as read_case
 from foldyn.cases import (
@@ -110,5 +111,7 @@ from foldyn.structures import (
     Structure as Structure,
     discretize as discretize,
 )
+
+from foldyn.sweeps import sweep as sweep
 
 __version__: str

@@ -8,44 +8,64 @@ at once.
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
-from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from threading import Thread
-from typing import Any, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from foldyn import memory
 from foldyn.errors import ComputationError
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+AHEAD = 2
+"""Items that wait for each process, so that none is idle."""
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+"""Variables by which a process beside others is told to run on one thread."""
+GONE = "the process that computed it was ended from outside, perhaps for lack of memory"
 
 
-class Workers:
-    """Processes to which work is submitted; a context manager.
+def processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Workers(Generic[Item, Result]):
+    """Processes to which work is given; a context manager.
+
+    Each runs on one thread, and refuses what takes more than its share of the memory.
 
     Parameters
     ----------
+    do : callable
+        What is computed for an item; it is sent to each process once.
     count : int
         Of processes.
-    begin : callable, optional
-        Called in each process at its beginning, with the arguments that follow.
     """
 
-    def __init__(
-        self, count: int, begin: Callable[..., object] | None = None, *given: object
-    ) -> None:
-        context = get_context("spawn")
-        line, self._end = context.Pipe(duplex=False)
+    def __init__(self, do: Callable[[Item], Result], count: int) -> None:
+        self.do, self.count = do, count
+        self._context = get_context("spawn")
+        line, self._end = self._context.Pipe(duplex=False)
         self._line = line  # open here too: a process that starts later gets it
-        self._pool = ProcessPoolExecutor(
-            count, context, initializer=_live, initargs=(line, memory.share(), begin, *given)
-        )
+        self._pool = self._started()
 
-    def submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
+    def _started(self) -> ProcessPoolExecutor:
+        given = (self._line, memory.share() / self.count, pickle.dumps(self.do))
+        return ProcessPoolExecutor(self.count, self._context, initializer=_live, initargs=given)
+
+    def _submit(self, do: Callable[..., Any], *given: object) -> Future[Any]:
         """Have something computed.
 
         A process that starts for it does not hear of the terminal's Ctrl-C, which is for this one.
@@ -58,35 +78,98 @@ class Workers:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
+    def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
+        """Compute an item here while the processes start, which then find its kernels compiled."""
+        for _ in range(self.count):
+            self._submit(_nothing)
+        keep(item, self.do(item))
+
     def each(
-        self, do: Callable[[Item], Any], items: Iterable[Item], keep: Callable[[Item, Any], None]
+        self,
+        items: Iterable[Item],
+        keep: Callable[[Item, Result], None],
+        lost: Callable[[Item, str], Result] | None = None,
     ) -> None:
         """Compute something for each item; each result is kept as soon as it is ready.
 
         When Ctrl-C interrupts this, the results that are ready are kept, too.
 
+        Parameters
+        ----------
+        items : iterable
+        keep : callable
+            Called with an item and its result.
+        lost : callable, optional
+            Result for an item whose process was ended from outside twice, the second time while it
+            computed nothing else; called with the item and the reason. Others are computed all the
+            same. Only where one thread asks at a time.
+
         Raises
         ------
         ComputationError
-            A process was ended from outside.
+            A process was ended from outside, and there is no `lost`.
         """
+        left, doubtful = iter(items), deque[Item]()
+        while True:
+            broken = self._each(left, keep)
+            if not broken:
+                break
+            if lost is None:
+                raise ComputationError(
+                    "a process that computes was ended from outside: perhaps for lack of memory, "
+                    "then what was kept need not be computed again; or, in a script, because this "
+                    'was not called below if __name__ == "__main__" (processes=1 needs no other '
+                    "process)"
+                )
+            doubtful.extend(broken)
+            self._restart()
+            while doubtful:  # one by one, so that the one to blame is found
+                item = doubtful.popleft()
+                if self._each(iter([item]), keep):
+                    keep(item, lost(item, GONE))
+                    self._restart()
+
+    def _each(self, left: Iterator[Item], keep: Callable[[Item, Result], None]) -> list[Item]:
+        """Compute what is left; the items that were under way where a process was ended."""
         waiting: dict[Future[Any], Item] = {}
+        broken: list[Item] = []
         try:
-            waiting = {self.submit(do, item): item for item in items}
-            for future in as_completed(list(waiting)):
-                keep(waiting[future], future.result())
-                del waiting[future]
-        except BrokenProcessPool:
-            raise ComputationError(
-                "a process that computes was ended from outside: perhaps for lack of memory, then "
-                "what was kept need not be computed again; or, in a script, because this was not "
-                'called below if __name__ == "__main__" (processes=1 needs no other process)'
-            ) from None
+            while True:
+                for item in islice(left, AHEAD * self.count - len(waiting)):
+                    try:
+                        waiting[self._submit(_do, item)] = item
+                    except BrokenProcessPool:
+                        broken.append(item)
+                        break
+                if broken or not waiting:
+                    break
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    broken += self._kept(future, waiting, keep)
+            for future in list(waiting) if broken else ():
+                broken += self._kept(future, waiting, keep)
         except KeyboardInterrupt:
             for future, item in waiting.items():
                 if future.done() and not future.cancelled() and future.exception() is None:
                     keep(item, future.result())
             raise
+        return broken
+
+    def _kept(
+        self, future: Future[Any], waiting: dict[Future[Any], Item],
+        keep: Callable[[Item, Result], None],
+    ) -> list[Item]:  # fmt: skip
+        """Keep the result of a future; its item where a process was ended."""
+        try:
+            result = future.result()
+        except BrokenProcessPool:
+            return [waiting.pop(future)]
+        keep(waiting[future], result)
+        del waiting[future]
+        return []
+
+    def _restart(self) -> None:
+        self._pool.shutdown(cancel_futures=True)
+        self._pool = self._started()
 
     def stop(self) -> None:
         """End all processes at once, whatever they compute."""
@@ -103,17 +186,33 @@ class Workers:
         self._line.close()
 
 
-def _live(
-    line: Connection, share: float, begin: Callable[..., object] | None, *given: object
-) -> None:
-    """Begin a process that ends when the line does, and has its parent's share of the memory."""
+_own: list[Callable[[Any], Any]] = []  # what a process computes
+
+
+def _do(item: Any) -> Any:
+    return _own[0](item)
+
+
+def _nothing() -> None:
+    pass
+
+
+def _live(line: Connection, share: float, do: bytes) -> None:
+    """Begin a process that ends when the line does, with its share of the memory and one thread.
+
+    What it does comes as bytes: reading it loads libraries, which look at the variables then.
+    """
     Thread(target=_follow, args=(line,), daemon=True).start()
     _arm(line)
     if line.poll():  # it ended before that
         os._exit(1)
     memory.allow(share)
-    if begin is not None:
-        begin(*given)
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    _own[:] = [pickle.loads(do)]
+    if "numpy" in sys.modules:  # loaded before, with the script that started all this
+        from threadpoolctl import threadpool_limits
+
+        threadpool_limits(1, user_api="blas")
 
 
 def _follow(line: Connection) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
-from foldyn.experiment.calibration.parameters import replaced
 
 CASE = """
 [pattern]

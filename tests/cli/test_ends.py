@@ -186,13 +186,13 @@ import ctypes, os
 from pathlib import Path
 from foldyn.workers import Workers
 
-def hold():
+def hold(item):
     Path(f"{os.getpid()}.begun").touch()
     ctypes.PyDLL(None).sleep(100)  # with the interpreter's lock, as compiled code may
 
 if __name__ == "__main__":
-    with Workers(2) as workers:
-        [workers.submit(hold) for _ in range(2)][0].result()
+    with Workers(hold, 2) as workers:
+        workers.each(range(2), print)
 """
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from foldyn.analyses.keys import parts, replaced, value_at
+from foldyn.analyses.ties import Tie
 from foldyn.errors import InputError
 from foldyn.experiment import Parameter
-from foldyn.experiment.calibration.parameters import Tie, parts, replaced, space, value_at
+from foldyn.experiment.calibration.parameters import space
 
 DOCUMENT = {
     "sheet": {"thickness": 0.01, "length_scale_ratio": 2.0},

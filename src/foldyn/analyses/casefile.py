@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.analyses.provenance import Call, provenance
-from foldyn.analyses.sections import CaseSchema
+from foldyn.analyses.sections import CaseSchema, SweepSection
 from foldyn.analyses.start import Start, start_of
 from foldyn.cases import Case, State
 from foldyn.cases.models import MODELS
@@ -233,6 +233,11 @@ class CaseFile:
     def heading(self) -> str:
         """Title of its page: its own, or the name of the file."""
         return self.title or self.path.stem
+
+    @property
+    def sweep(self) -> SweepSection | None:
+        """Its table [sweep], None where it has none."""
+        return self._schema.sweep
 
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""

@@ -15,6 +15,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
+from foldyn.analyses.ranges import SAMPLINGS, varied
+from foldyn.analyses.ties import ties_of
 from foldyn.cases.contact import contact_from
 from foldyn.cases.damping import (
     STATES,
@@ -374,6 +376,19 @@ class DampingSection(Section):
             return Rayleigh.from_ratios(f1, z1, f2, z2, self.state)
 
 
+class SweepSection(Section):
+    """[sweep]: arguments of `sweep`."""
+
+    samples: Count | None = None
+    method: Annotated[str, one_of(SAMPLINGS)] = SAMPLINGS[0]
+    seed: Annotated[int, Field(ge=0, le=MOST)] = 0
+    vary: Annotated[
+        Any, PlainValidator(lambda v, info: varied(v, info.data.get("samples") is not None))
+    ]
+    ties: Annotated[Any, PlainValidator(ties_of)] = ()
+    measures: list[str] = []
+
+
 class CaseSchema(Section):
     """The sections that every case file may have."""
 
@@ -386,3 +401,4 @@ class CaseSchema(Section):
     loads: list[Annotated[Any, part(load_from)]] = []
     masses: list[Annotated[Any, part(mass_from)]] = []
     contact: Annotated[Any, contact_part()] = None
+    sweep: SweepSection | None = None

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from importlib import metadata
 
 from foldyn import __version__
-from foldyn.errors import InputError
+from foldyn.errors import InputError, optional
 from foldyn.studies import shipped_cases
 
 REQUIRED = (
@@ -43,6 +43,7 @@ def info() -> str:
 
     video = _part(find_ffmpeg, "imageio-ffmpeg")
     camera = _part(lambda: opencv().__version__, "opencv-python-headless")
+    clusters = _part(_dask, "distributed")
     drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
     lines = [
         f"foldyn {__version__}",
@@ -58,6 +59,7 @@ def info() -> str:
         f"optional parts: ffmpeg for MP4 animations, {video}",
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",
+        f"optional part for sweeps on clusters: Dask, {clusters}",
         *(
             f"optional solver for large structures: {name}, "
             f"{'found' if solver.present else f'missing: pip install {solver.module}'}"
@@ -84,6 +86,10 @@ def _part(look: Callable[[], object], package: str) -> str:
         return f"found: {look()}"
     except InputError:
         return f"missing: pip install {package}"
+
+
+def _dask() -> str:
+    return optional("distributed", "", "").__version__
 
 
 def _version(name: str) -> str:

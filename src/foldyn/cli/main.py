@@ -24,6 +24,7 @@ from foldyn.cli.options import add_figures, add_film, add_results, flag
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, steady_streams
 from foldyn.cli.study import add_study, study
+from foldyn.cli.sweep import add_sweep, run_sweep
 from foldyn.cli.track import add_track, track
 from foldyn.cli.view import add_view, run_view
 from foldyn.cli.warm_up import add_warm_up, run_warm_up
@@ -32,8 +33,8 @@ from foldyn.memory import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {
-    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study, "track": track,
-    "view": run_view, "warm-up": run_warm_up,
+    "convert": convert, "fit": run_fit, "fold": run_fold, "study": study,
+    "sweep": run_sweep, "track": track, "view": run_view, "warm-up": run_warm_up,
 }  # fmt: skip
 """Commands that do not take just a case file."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
@@ -124,6 +125,7 @@ def parser() -> argparse.ArgumentParser:
     add_fold(commands)
     add_study(commands)
     add_fit(commands)
+    add_sweep(commands)
     add_track(commands)
     add_view(commands)
     add_warm_up(commands)

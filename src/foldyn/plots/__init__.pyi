@@ -27,6 +27,12 @@ from foldyn.plots.readings import (
     total_reaction as total_reaction,
 )
 from foldyn.plots.structure import draw_structure as draw_structure
+from foldyn.plots.sweeps import (
+    plot_main_effects as plot_main_effects,
+    plot_sobol_indices as plot_sobol_indices,
+    plot_sweep_lines as plot_sweep_lines,
+    plot_sweep_map as plot_sweep_map,
+)
 from foldyn.plots.tracks import (
     draw_overlay as draw_overlay,
     plot_steps as plot_steps,

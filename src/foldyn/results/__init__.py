@@ -12,10 +12,13 @@ from foldyn.results.dataset import (
 from foldyn.results.frames import Shapes, States, frames_of, shapes_of, state_of
 from foldyn.results.netcdf import load, save
 from foldyn.results.quantities import Quantity
+from foldyn.results.swept import MainEffect, SobolIndices, main_effects, sobol_indices
 
 __all__ = [
+    "MainEffect",
     "Quantity",
     "Shapes",
+    "SobolIndices",
     "States",
     "case_of",
     "check_result",
@@ -24,10 +27,12 @@ __all__ = [
     "frames_of",
     "frf_dataset",
     "load",
+    "main_effects",
     "modes_dataset",
     "path_dataset",
     "save",
     "shapes_of",
+    "sobol_indices",
     "state_of",
     "trajectory_dataset",
 ]

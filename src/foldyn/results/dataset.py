@@ -314,7 +314,7 @@ def folding_dataset(
     }
     data = variables(FOLDING, "step", values)
     attributes = own_attributes("folding", document.obstacles) | facts(statistics)
-    return xr.Dataset({**data, **_case_variables(document)}, coordinates, attributes)
+    return xr.Dataset({**data, **case_variables(document)}, coordinates, attributes)
 
 
 def result_dataset(
@@ -353,7 +353,7 @@ def result_dataset(
         "support_axis": ("support", AXIS[support % 3]),
     }
     reasoned = {name: with_reason(name, values) for name, values in data.items()}
-    return xr.Dataset({**reasoned, **_case_variables(document)}, coordinates, attributes)
+    return xr.Dataset({**reasoned, **case_variables(document)}, coordinates, attributes)
 
 
 def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
@@ -368,7 +368,8 @@ def stage_times(statistics: Mapping[str, Any]) -> NDArray[np.float64] | None:
     return times
 
 
-def _case_variables(document: Document) -> dict[str, Any]:
+def case_variables(document: Document) -> dict[str, Any]:
+    """Variables of a case, as it was written down."""
     variables: dict[str, Any] = {
         "case": (
             DOCUMENT["case"],

@@ -7,10 +7,9 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from dataclasses import dataclass
-from pathlib import Path
-from threading import Lock
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +20,9 @@ from foldyn.experiment.calibration.fit_problem import Problem, problem
 from foldyn.experiment.calibration.fitted import Descent, Fit, Uncertainty, score, spread
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter
-from foldyn.store import Store, name_of
+from foldyn.sweeps.evaluations import Evaluation, Evaluations
+from foldyn.sweeps.pool import Pool, pool_of
 from foldyn.values import number, whole
-from foldyn.workers import Workers
-from foldyn.writing import remove_leftovers
-from foldyn.writing import whole as whole_file
 
 STEP = 1e-3
 """Change of a parameter, in its scale, for a difference quotient: well above the solvers' noise."""
@@ -47,6 +44,8 @@ WHY = {
 MOST_PROCESSES = 1024
 """Processes at a time: more are a slip of the finger."""
 
+PREDICTED = "predicted"
+"""Name of what an evaluation holds."""
 Outcome = NDArray[np.float64] | str
 """All predictions in a row, or why there are none."""
 Values = tuple[float, ...]
@@ -133,11 +132,9 @@ def fit(
     made = problem(case, data, parameters, ties or {})
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
-    pool = Workers(processes, _begin, made) if processes > 1 else None
-    with pool or nullcontext():
-        evaluations = Evaluations(made, pool, folder, progress)
-        search = _Search(made, evaluations)
-        if pool is not None and starts > 1:
+    with pool_of(partial(_evaluate, made), processes) as pool:
+        search = _Search(made, pool, folder, progress)
+        if processes > 1 and starts > 1:
             descents = _at_a_time(min(starts, processes), pool, search, points)
         else:
             descents = [search.descend(point) for point in points]
@@ -146,19 +143,19 @@ def fit(
             raise ComputationError(f"no search converged: {lowest.message}")
         values = np.array(lowest.values)
         known = search.uncertainty(values, confidence)
-        (best,) = evaluations.at([values])
+        (best,) = search.at([values])
         ends = np.cumsum([len(one) for one in made.observed()])
         predicted = np.split(np.asarray(best), ends[:-1])
     return Fit(
         known.estimates(made.space.keys, values), known.correlation, known.singular_values,
         known.directions, confidence, known.freedom, known.misfit,
         tuple(map(score, made.measurements, predicted)), tuple(descents), made, tuple(predicted),
-        evaluations.computed + evaluations.found, time.perf_counter() - began,
+        search.count, time.perf_counter() - began,
     )  # fmt: skip
 
 
 def _at_a_time(
-    count: int, pool: Workers, search: _Search, points: NDArray[np.float64]
+    count: int, pool: Pool, search: _Search, points: NDArray[np.float64]
 ) -> list[Descent]:
     """Search from several starts in threads, which end where this one is interrupted."""
     with ThreadPoolExecutor(count) as threads:
@@ -173,8 +170,13 @@ def _at_a_time(
 class _Search:
     """A search for the smallest misfit, in parameters over their scales."""
 
-    def __init__(self, made: Problem, evaluations: Evaluations) -> None:
-        self.made, self.evaluations = made, evaluations
+    def __init__(
+        self, made: Problem, pool: Pool, folder: str | os.PathLike[str] | None,
+        progress: Callable[[Course], None] | None,
+    ) -> None:  # fmt: skip
+        self.made, self.progress, self.cost = made, progress, math.inf
+        stamp = partial(_stamp, made.digest())
+        self.evaluations = Evaluations[Values](pool, stamp, folder, self._tell)
         space = made.space
         self.scale = space.column("scale")
         self.lower, self.upper = space.column("lower"), space.column("upper")
@@ -187,10 +189,25 @@ class _Search:
         self.chosen = self.weight > 0.0
         self.observed = np.concatenate(observed)
 
+    @property
+    def count(self) -> int:
+        """Evaluations of the model."""
+        return self.evaluations.computed + self.evaluations.found
+
+    def _tell(self, *_: object) -> None:
+        if self.progress is not None:
+            computed, found = self.evaluations.computed, self.evaluations.found
+            self.progress(Course(computed, found, self.cost))
+
+    def at(self, points: Sequence[NDArray]) -> list[Outcome]:
+        """Predictions at several points, at the same time where there are processes for it."""
+        found = self.evaluations.at([tuple(map(float, point)) for point in points])
+        return [one.failure or one.values[PREDICTED] for one in found]
+
     def descend(self, start: NDArray[np.float64]) -> Descent:
         """Search from a start."""
         begin = tuple(start.tolist())
-        (first,) = self.evaluations.at([start])
+        (first,) = self.at([start])
         try:
             if isinstance(first, str):
                 raise ComputationError(first)
@@ -218,12 +235,12 @@ class _Search:
     def _residual(self, points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
         """Weighted residuals; infinite where the model fails, so that a search steps back."""
         residuals = []
-        for predicted in self.evaluations.at(points):
+        for predicted in self.at(points):
             if isinstance(predicted, str):
                 residuals.append(np.full(int(self.chosen.sum()), np.inf))
                 continue
             residual = ((predicted - self.observed) * self.weight)[self.chosen]
-            self.evaluations.cost = min(self.evaluations.cost, 0.5 * float(residual @ residual))
+            self.cost = min(self.cost, 0.5 * float(residual @ residual))
             residuals.append(residual)
         return residuals
 
@@ -249,112 +266,22 @@ class _Search:
             columns = [(residuals[i] - residuals[j]) / step for i, j, step in pairs]
         if not np.isfinite(columns).all():
             place = next(k for k, one in enumerate(columns) if not np.isfinite(one).all())
-            (why,) = self.evaluations.at([points[pairs[place][0]]])
+            (why,) = self.at([points[pairs[place][0]]])
             raise ComputationError(
                 f"{self.made.space.keys[place]}: the model fails beside {values[place]:.6g}: {why}"
             )
         return np.stack(columns, axis=1)
 
 
-class Evaluations:
-    """Predictions of a model at values of its parameters, each computed once.
-
-    Several threads may ask at a time.
-
-    Parameters
-    ----------
-    problem : Problem
-    pool : Workers, optional
-        Evaluate; by default this process does.
-    folder : path, optional
-        Keeps every evaluation; those that are there are not computed again.
-    progress : callable, optional
-        Called with a `Course` after each.
-    """
-
-    def __init__(
-        self,
-        problem: Problem,
-        pool: Workers | None = None,
-        folder: str | os.PathLike[str] | None = None,
-        progress: Callable[[Course], None] | None = None,
-    ) -> None:
-        self.problem, self.pool, self.progress = problem, pool, progress
-        self.folder = None if folder is None else Path(folder)
-        self.computed, self.found, self.cost = 0, 0, math.inf
-        self._known: dict[Values, Outcome] = {}
-        self._lock = Lock()
-        self._digest = problem.digest()
-        if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            remove_leftovers(self.folder)
-
-    def at(self, points: Sequence[NDArray]) -> list[Outcome]:
-        """Predictions at several points, at the same time where there is a pool."""
-        wanted = [tuple(map(float, point)) for point in points]
-        new = [values for values in dict.fromkeys(wanted) if not self._look(values)]
-        if self.pool is None:
-            for values in new:
-                self._keep(values, _evaluate(self.problem, values))
-        else:
-            self.pool.each(_evaluate_own, new, self._keep)
-        return [self._known[values] for values in wanted]
-
-    def _look(self, values: Values) -> bool:
-        """Whether a point is known, or kept in the folder."""
-        if values not in self._known and self.folder is not None:
-            name = name_of([self._digest, values])
-            outcome = KEPT.find(self.folder / f"{name}.npz", name)
-            if outcome is not None:
-                self._count(values, outcome, found=1)
-        return values in self._known
-
-    def _keep(self, values: Values, outcome: Outcome) -> None:
-        if self.folder is not None:
-            name = name_of([self._digest, values])
-            KEPT.keep(self.folder / f"{name}.npz", name, outcome)
-        self._count(values, outcome, computed=1)
-
-    def _count(self, values: Values, outcome: Outcome, computed: int = 0, found: int = 0) -> None:
-        self._known[values] = outcome
-        with self._lock:
-            self.computed += computed
-            self.found += found
-            if self.progress is not None:
-                self.progress(Course(self.computed, self.found, self.cost))
+def _stamp(digest: str, values: Values) -> list[Any]:
+    """All that predictions depend on."""
+    return [digest, list(values)]
 
 
-def _read(file: Path) -> tuple[str, Outcome]:
-    with np.load(file) as kept:
-        predicted = kept["predicted"]
-        if predicted.dtype != np.float64 or predicted.ndim != 1:
-            raise ValueError
-        return str(kept["stamp"]), str(kept["failure"]) or predicted
-
-
-def _write(file: Path, stamp: str, outcome: Outcome) -> None:
-    failed = isinstance(outcome, str)
-    predicted, failure = (np.zeros(0), outcome) if failed else (outcome, "")
-    with whole_file(file) as part:
-        np.savez(part, predicted=predicted, failure=np.array(failure), stamp=np.array(stamp))
-
-
-KEPT: Store[Outcome] = Store(_read, _write, warns=False)
-
-
-_own: list[Problem] = []  # the one problem of a process that evaluates
-
-
-def _begin(problem: Problem) -> None:
-    _own[:] = [problem]
-
-
-def _evaluate_own(values: Values) -> Outcome:
-    return _evaluate(_own[0], values)
-
-
-def _evaluate(problem: Problem, values: Values) -> Outcome:
+def _evaluate(problem: Problem, values: Values) -> Evaluation:
+    began = time.perf_counter()
     try:
-        return np.concatenate(problem.predict(values))
+        found, why = {PREDICTED: np.concatenate(problem.predict(values))}, ""
     except (InputError, ComputationError) as error:
-        return str(error)
+        found, why = {}, str(error)
+    return Evaluation(found, why, seconds=time.perf_counter() - began)

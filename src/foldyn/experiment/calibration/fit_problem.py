@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.analyses import CaseFile
+from foldyn.analyses.keys import files_of, replaced, value_at
 from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.cases import Case
 from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.parameters import Parameter, Space, replaced, space, value_at
+from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.program import program
 from foldyn.values import show
 
@@ -117,7 +118,7 @@ class Problem:
             state = self.case_file(run, self.space.column("start")).initial()
             for array in () if state is None else (state.displacement, state.velocity):
                 digest.update(b"" if array is None else np.asarray(array).tobytes())
-            for file in sorted(_files(run.document)):
+            for file in sorted(files_of(run.document, "initial")):
                 there = run.path.parent / file
                 digest.update(there.read_bytes() if there.is_file() else b"")
         for one in self.measurements:
@@ -275,14 +276,3 @@ def _steady(case_file: CaseFile) -> dict[str, Any]:
                 )
             given["dt"] = given["every"]
     return given
-
-
-def _files(value: Any) -> list[str]:
-    """Paths of all files that a case file names, but for the result that it starts from."""
-    if isinstance(value, Mapping):
-        own = [value["file"]] if isinstance(value.get("file"), str) else []
-        inner = [item for key, item in value.items() if key != "initial"]
-        return own + [file for item in inner for file in _files(item)]
-    if isinstance(value, list):
-        return [file for item in value for file in _files(item)]
-    return []

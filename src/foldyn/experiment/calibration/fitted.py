@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 import foldyn
+from foldyn.analyses.keys import replaced
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement
-from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import netcdf
 from foldyn.values import brief
 from foldyn.writing import write_text

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.analyses.keys import parts
 from foldyn.cases import Case
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
-from foldyn.experiment.calibration.parameters import parts
 from foldyn.values import number, numbers
 
 

@@ -21,9 +21,9 @@ from scipy.interpolate import CubicSpline
 
 from foldyn import experiment
 from foldyn.analyses import CaseFile, read_case
+from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.experiment.calibration.fit_page import write_fit
-from foldyn.experiment.calibration.parameters import replaced
 from foldyn.results import save
 from foldyn.signals import matrix_pencil
 from foldyn.statics import Settings

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from foldyn.errors import FoldynError, FoldynWarning
-from foldyn.workers import Workers
+from foldyn.sweeps.pool import pool_of
 
 
 class Task(Protocol):
@@ -91,12 +91,8 @@ def run(
             end(Done(task, skipped=True))
         else:
             left.append(task)
-    if processes <= 1 or len(left) <= 1:
-        for task in left:
-            end(_make(task, folder))
-    else:
-        with Workers(processes) as workers:
-            workers.each(partial(_make, folder=folder), left, lambda _, done: end(done))
+    with pool_of(partial(_make, folder=folder), min(processes, max(len(left), 1))) as pool:
+        pool.each(left, lambda _, done: end(done))
     return ended
 
 

@@ -16,10 +16,10 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from foldyn.analyses import read_case
+from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
 from foldyn.experiment import Fit, ForceDisplacement, Measurement, Shapes, TimeHistory
-from foldyn.experiment.calibration.parameters import replaced
 from foldyn.signals import log_decrement, spectrum
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import BAND, FRONT, FULL, SUPPORTS, WATCHED

@@ -1,0 +1,103 @@
+"""Keys of case files: paths such as "sheet.thickness" or "loads[0].force[2]", and their values."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+from foldyn.errors import InputError
+from foldyn.values import show
+
+LONGEST = 200
+"""Characters of a key: no case file nests its tables that deep."""
+_KEY = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*\Z")
+
+
+def parts(key: Any) -> tuple[str | int, ...]:
+    """Keys and indices of a path: "loads[0].force" becomes ("loads", 0, "force").
+
+    Raises
+    ------
+    InputError
+        The text is no path.
+    """
+    if not isinstance(key, str) or len(key) > LONGEST or not _KEY.match(key):
+        raise InputError(
+            f"{show(key)}: is no key of a case file; write the section and the key, as in "
+            '"sheet.thickness" or "loads[0].force[2]"'
+        )
+    return tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", key))
+
+
+def value_at(document: Mapping[str, Any], key: str) -> Any:
+    """Value of a key in a case file; None where the file does not have it."""
+    here: Any = document
+    for part in parts(key):
+        if isinstance(part, int):
+            here = here[part] if isinstance(here, list) and part < len(here) else None
+        else:
+            here = here.get(part) if isinstance(here, Mapping) else None
+    return here
+
+
+def number_keys(document: Mapping[str, Any]) -> list[str]:
+    """Keys of all numbers in a case file, except for those in lists."""
+    keys: list[str] = []
+    for key, value in document.items():
+        if isinstance(value, Mapping):
+            keys += [f"{key}.{inner}" for inner in number_keys(value)]
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            keys.append(key)
+    return keys
+
+
+def replaced(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of a case file with the values of some keys replaced or added.
+
+    Missing tables are made, and a law given by its name becomes a table of that kind; whether a
+    case file may have such a key is for its reader to decide.
+
+    Raises
+    ------
+    InputError
+        A path leads through something that is no table or list, or beyond the end of a list.
+    """
+    result = copy.deepcopy(dict(document))
+    for key, value in changes.items():
+        here: Any = result
+        for part, following in pairwise(parts(key)):
+            holder = _step(here, part, key)
+            if isinstance(holder[part], str) and isinstance(following, str):
+                holder[part] = {"kind": holder[part]}
+            here = holder[part]
+        last = parts(key)[-1]
+        _step(here, last, key)[last] = value
+    return result
+
+
+def _step(here: Any, part: str | int, key: str) -> Any:
+    """The table or list that holds the next part of a path."""
+    if isinstance(part, int):
+        if not isinstance(here, list):
+            raise InputError(f"{key}: [{part}] needs a list, but there is {show(here)}")
+        if part >= len(here):
+            raise InputError(f"{key}: there are only {len(here)} entries, [0] to [{len(here) - 1}]")
+        return here
+    if not isinstance(here, dict):
+        raise InputError(f"{key}: .{part} needs a table, but there is {show(here)}")
+    here.setdefault(part, {})
+    return here
+
+
+def files_of(value: Any, *without: str) -> list[str]:
+    """Paths of all files that a case file names, but for those in some of its tables."""
+    if isinstance(value, Mapping):
+        own = [value["file"]] if isinstance(value.get("file"), str) else []
+        inner = [item for key, item in value.items() if key not in without]
+        return own + [file for item in inner for file in files_of(item, *without)]
+    if isinstance(value, list):
+        return [file for item in value for file in files_of(item, *without)]
+    return []

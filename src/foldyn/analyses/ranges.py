@@ -1,0 +1,167 @@
+"""What a sweep varies: keys of a case file, each with its values or a range to sample from.
+
+A range is written A:B:N, from A to B in N equal steps of value, or A:B:N:log, of ratio; a sampled
+one is A:B or A:B:log. Values are written one by one: 1,2,5.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.analyses.keys import parts
+from foldyn.errors import InputError, within
+from foldyn.values import number, plain, show, whole
+
+MOST_VALUES = 1_000_000
+"""Values of a key: more are a slip of the finger."""
+LOG = "log"
+SAMPLINGS = ("latin_hypercube", "sobol", "saltelli")
+"""How points are drawn."""
+_REMEDY = "write A:B:N (N values from A to B), A:B:N:log, or values as in 1,2,5"
+_SAMPLED = "with samples, write A:B (from A to B), A:B:log, or values as in 1,2,5"
+
+Value = float | int | str | bool
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A key of a case file and what a sweep gives it.
+
+    Attributes
+    ----------
+    key : str
+    values : tuple
+        Its values; empty where it is drawn from a range.
+    lower, upper : float
+        Ends of that range.
+    log : bool
+        Whether it is drawn evenly in the logarithm.
+    """
+
+    key: str
+    values: tuple[Value, ...] = ()
+    lower: float = math.nan
+    upper: float = math.nan
+    log: bool = False
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all its values are numbers."""
+        return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
+
+    def at(self, share: NDArray[np.float64]) -> list[Value]:
+        """Values at shares of the way, from 0 to below 1: of its range, or of its list."""
+        if self.values:
+            return [self.values[int(part * len(self.values))] for part in share]
+        return _between(self.lower, self.upper, share, self.log).tolist()
+
+    def tried(self) -> tuple[Value, ...]:
+        """Values that show whether the case file can hold all of them."""
+        if self.values:
+            return self.values
+        middle = _between(self.lower, self.upper, np.array([0.3819660112501051]), self.log)
+        return (self.lower, self.upper, float(middle[0]))
+
+
+def varied(given: Any, sampled: bool) -> tuple[Varied, ...]:
+    """What a sweep varies, from its table.
+
+    Parameters
+    ----------
+    given : mapping of str to str, number or list
+        Key, and its range or values.
+    sampled : bool
+        Whether points are drawn, so that a range is without a count.
+
+    Raises
+    ------
+    InputError
+        The field begins with the key.
+    """
+    if not isinstance(given, Mapping):
+        raise InputError(f" = {show(given)}: must be a table of keys, each with a range or values")
+    if not given:
+        raise InputError(": names nothing; give at least one key of the case file")
+    found = []
+    for key, spec in given.items():
+        parts(key)
+        with within(f'["{key}"]'):
+            found.append(_varied(key, spec, sampled))
+    return tuple(found)
+
+
+def _varied(key: str, spec: Any, sampled: bool) -> Varied:
+    if isinstance(spec, str) and ":" in spec:
+        return _range(key, spec, sampled)
+    if isinstance(spec, str):
+        return Varied(key, _values([_word(word) for word in spec.split(",")]))
+    if isinstance(spec, np.ndarray):
+        spec = spec.tolist()
+    return Varied(key, _values(spec if isinstance(spec, list | tuple | range) else [spec]))
+
+
+def _range(key: str, text: str, sampled: bool) -> Varied:
+    """A range A:B:N or A:B, with or without :log."""
+    words = [word.strip() for word in text.split(":")]
+    log = words[-1] == LOG
+    count = len(words) - log
+    if count != (2 if sampled else 3):
+        raise InputError(f" = {show(text)}: {_SAMPLED if sampled else _REMEDY}")
+    ends = [_word(word) for word in words[:2]]
+    with within(f" = {show(text)}: "):
+        lower, upper = (number(name, end) for name, end in zip("AB", ends, strict=True))
+        if lower == upper:
+            raise InputError(": both ends are the same", "A, B")
+        if log and (lower <= 0.0 or upper <= 0.0):
+            raise InputError(": a logarithmic range needs ends above 0", "A, B")
+        if sampled:
+            return Varied(key, (), lower, upper, log)
+        steps = whole("N", _word(words[2]), least=2, most=MOST_VALUES)
+    values = (np.geomspace if log else np.linspace)(lower, upper, steps)
+    if all(isinstance(end, int) for end in ends) and not np.any(values % 1.0):
+        return Varied(key, tuple(map(int, values)))
+    return Varied(key, tuple(values.tolist()))
+
+
+def _between(lower: float, upper: float, share: NDArray, log: bool) -> NDArray[np.float64]:
+    """Values at shares of the way from one end to the other."""
+    return lower * (upper / lower) ** share if log else lower + share * (upper - lower)
+
+
+def _word(word: str) -> Value:
+    """A number, true or false, or else the text itself."""
+    word = word.strip()
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(word, word)
+
+
+def _values(listed: Iterable[Any]) -> tuple[Value, ...]:
+    values = [plain(value) for value in listed]
+    if not values:
+        raise InputError(" = []: names no values; give at least one")
+    if len(values) > MOST_VALUES:
+        raise InputError(f": {len(values)} values; give at most {MOST_VALUES}")
+    for k, value in enumerate(values):
+        if isinstance(value, str | bool):
+            if value == "":
+                raise InputError(f": value {k + 1} is empty; {_REMEDY}")
+        else:
+            number(f"[{k}]", value)
+    kinds = {str if isinstance(v, str) else bool if isinstance(v, bool) else float for v in values}
+    if len(kinds) > 1:
+        raise InputError(f" = {show(values)}: must be all numbers, all texts, or true and false")
+    if len(set(values)) < len(values):
+        twice = next(value for value, count in Counter(values).items() if count > 1)
+        raise InputError(f": {show(twice)} is listed twice")
+    return tuple(values)

@@ -1,0 +1,229 @@
+"""`foldyn sweep`: a case file at many values of its keys, from reading to report."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from foldyn.cli.clock import Clock
+from foldyn.cli.folder import Results, drawing, held
+from foldyn.cli.options import BOTH, add_figures, add_results
+from foldyn.cli.stamp import Owner
+from foldyn.cli.streams import noted_warnings, progress_bar, speech
+from foldyn.errors import ComputationError, InputError
+from foldyn.plots import FIGURES
+
+if TYPE_CHECKING:
+    import xarray
+
+    from foldyn.sweeps.plan import Plan
+    from foldyn.sweeps.swept import Course
+
+RESULT, KEPT = "sweep.nc", "points"
+DRAWN = [
+    "report.html",
+    *(f"{name}-*.{form}" for name in ("map", "lines", "effects", "indices") for form in FIGURES),
+]
+OFTEN = 30.0
+"""Seconds between lines that tell how far a sweep is, where nobody watches a bar."""
+MOST_NAMED = 5
+"""Points that failed of which the reasons are printed."""
+
+
+def add_sweep(commands: Any) -> None:
+    """Add the command and its arguments."""
+    sweep = commands.add_parser(
+        "sweep",
+        help="a case file at many values of its numbers, each measured",
+        description="Compute a case file at many values of its keys, and measure each result. All "
+        "processors work on it; what is computed is kept point by point, so that a sweep that was "
+        "cut off goes on. One dataset, figures and report.html go to a folder. What is not given "
+        "is that of the table [sweep] of the file.",
+    )
+    sweep.add_argument("case", help="case file (TOML), or the name of a shipped one")
+    sweep.add_argument(
+        "--vary",
+        action="append",
+        metavar="KEY=RANGE",
+        help="a key of the case file with A:B:N (N values from A to B), A:B:N:log, or values as in "
+        "1,2,5; with --samples A:B or A:B:log",
+    )
+    sweep.add_argument(
+        "--measure",
+        action="append",
+        metavar="NAME",
+        help="what is measured, as frequencies or peak_frequency[8]; or a function of your own, "
+        "[NAME=]module:function or [NAME=]file.py:function",
+    )
+    sweep.add_argument("--samples", type=int, metavar="N", help="draw N points instead of a grid")
+    sweep.add_argument(
+        "--method",
+        metavar="latin_hypercube|sobol|saltelli",
+        help="how points are drawn (default: latin_hypercube); saltelli is for Sobol indices, and "
+        "takes N times the number of keys and two",
+    )
+    sweep.add_argument("--seed", type=int, help="of the samples (default: 0)")
+    sweep.add_argument(
+        "--tie",
+        action="append",
+        metavar="KEY=EXPRESSION",
+        help="a key that follows others, as b=360 - a",
+    )
+    sweep.add_argument(
+        "--processes", type=int, metavar="N", help="points at a time (default: one per processor)"
+    )
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead"
+    )
+    add_results(sweep, "NAME-sweep")
+    add_figures(sweep)
+
+
+def run_sweep(given: argparse.Namespace) -> Path:
+    """Sweep what the arguments of `add_sweep` ask for; returns the folder of the results.
+
+    Raises
+    ------
+    InputError
+        Something cannot be used; nothing was written.
+    ComputationError
+        All points failed; their reasons are kept.
+    """
+    from foldyn.results import save
+    from foldyn.studies import find_case
+
+    clock = Clock.now()
+    if given.figures and given.no_figures:
+        raise InputError(BOTH)
+    path = find_case(given.case)
+    plan = _plan(path, given)
+    folder = Path(f"{path.stem}-sweep" if given.out is None else given.out)
+    names = [RESULT, *([] if given.no_figures else ["report.html"])]
+    owner = Owner.of("sweep", path, folder)
+    say = speech(given.quiet)
+    say(_introduction(plan))
+    with held(folder, given.out, names, owner, given.replace, DRAWN, [KEPT]) as results:
+        with noted_warnings() as noted:
+            found = _swept(plan, given, results, say)
+        spent = clock.spent()
+        results.keep(RESULT, partial(save, found))
+        _tell_failed(found, say)
+        say(f"wrote {folder / RESULT}")
+        if found.attrs["failed"] == found.attrs["points"]:
+            raise ComputationError(
+                f"all {found.attrs['points']} points failed, the first with: "
+                f"{found['failure'].values.flat[0]}"
+            )
+        if not given.no_figures:
+            from foldyn.analyses.provenance import Call
+            from foldyn.sweeps.page import write_sweep
+
+            with drawing(folder):
+                call = Call(given.typed, tuple(noted), **spent)
+                page = write_sweep(found, folder, plan.case_file, call, given.figures)
+                say(f"wrote {page}")
+    return folder
+
+
+def _plan(path: Path, given: argparse.Namespace) -> Plan:
+    """What to sweep, checked whole."""
+    from foldyn.sweeps.measure import own_measure
+    from foldyn.sweeps.plan import plan_of
+
+    vary = None if given.vary is None else _table(given.vary, "--vary")
+    ties = None if given.tie is None else _table(given.tie, "--tie")
+    measures: list[Any] | None = None
+    if given.measure is not None:
+        here = Path.cwd()
+        if str(here) not in sys.path:
+            sys.path.insert(0, str(here))  # as `python -m` has it: for modules of the user
+        measures = []
+        for text in given.measure:
+            try:
+                measures.append(own_measure(text, here) or text)
+            except InputError as error:
+                raise InputError(f"--measure{error}") from None
+    return plan_of(path, vary, measures, given.samples, given.method, given.seed, ties)
+
+
+def _table(texts: Sequence[str], option: str) -> dict[str, str]:
+    """Keys and what follows their "="."""
+    table: dict[str, str] = {}
+    for text in texts:
+        key, equals, rest = text.partition("=")
+        if not equals or not rest.strip():
+            raise InputError(f'{option} "{text}": write KEY=..., with a key of the case file')
+        if key.strip() in table:
+            raise InputError(f'{option} "{text}": {key.strip()} is named twice')
+        table[key.strip()] = rest.strip()
+    return table
+
+
+def _introduction(plan: Plan) -> str:
+    if plan.method == "grid":
+        how = " x ".join(str(len(one.values)) for one in plan.varied)
+        how = f"{how} points" if len(plan.varied) == 1 else f"{how} = {len(plan.points)} points"
+    else:
+        how = f"{len(plan.points)} points ({plan.method})"
+    keys = ", ".join(one.key for one in plan.varied)
+    return f"{plan.case_file.heading}: {plan.case_file.analysis.kind} at {how} of {keys}"
+
+
+def _swept(
+    plan: Plan, given: argparse.Namespace, results: Results, say: Callable[[str], None]
+) -> xarray.Dataset:
+    """Compute with a bar, or with a line now and then."""
+    from foldyn.sweeps.swept import swept
+
+    total = len(set(plan.points))
+    with progress_bar(given.quiet, total=total, unit="point") as bar:
+        told = time.monotonic()
+
+        def tell(course: Course) -> None:
+            nonlocal told
+            if not results.kept:
+                results.begin(KEPT)
+            if course.failed:
+                bar.set_postfix_str(f"{course.failed} failed", refresh=False)
+            if course.done == course.found:
+                bar.initial = course.found  # the pace is that of points that are computed
+            bar.update(course.done - bar.n)
+            if bar.disable and course.done < total and time.monotonic() - told > OFTEN:
+                told = time.monotonic()
+                failed = f", {course.failed} failed" if course.failed else ""
+                say(f"  {course.done} of {total} points{failed}, {_left(course.left)}")
+
+        folder = results.folder / KEPT
+        found = swept(plan, given.processes, given.scheduler, folder, tell)
+    return found
+
+
+def _left(seconds: float) -> str:
+    """Time left, in words."""
+    if not seconds >= 0.0:
+        return "time left unknown"
+    if seconds < 100.0:
+        return f"about {seconds:.0f} s left"
+    return f"about {seconds / 60.0:.0f} min left" if seconds < 6000.0 else (
+        f"about {seconds / 3600.0:.1f} h left"
+    )  # fmt: skip
+
+
+def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
+    """Say how many points failed, and why."""
+    failed = found.attrs["failed"]
+    if not failed:
+        return
+    say(f"{failed} of {found.attrs['points']} points failed:")
+    reasons: dict[str, int] = {}
+    for reason in filter(None, found["failure"].values.ravel().tolist()):
+        reasons[reason] = reasons.get(reason, 0) + 1
+    for reason, count in list(reasons.items())[:MOST_NAMED]:
+        say(f"  {count} of them: {reason}")
+    if len(reasons) > MOST_NAMED:
+        say(f"  and {len(reasons) - MOST_NAMED} other reasons: see {RESULT}")

@@ -1,0 +1,7 @@
+"""Many analyses: a case file at many values of its numbers, and what all that computes shares."""
+
+from __future__ import annotations
+
+from foldyn.facade import lazy
+
+__getattr__, __dir__, __all__ = lazy(__name__, __file__)

@@ -1,0 +1,147 @@
+"""Evaluations of a model: each is computed once, and kept in a file of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.store import Store, name_of
+from foldyn.sweeps.pool import Pool
+from foldyn.writing import remove_leftovers, whole
+
+Point = TypeVar("Point")
+_VALUE = "value "  # before the names of values, in files
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What a model gives at a point.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray
+    failure : str
+        Why there are none, or "".
+    warnings : str
+        What was warned of, or "".
+    seconds : float
+        Computing time.
+    lasting : bool
+        Whether it would be the same again; otherwise it is not kept, as a lack of memory.
+    """
+
+    values: Mapping[str, NDArray] = field(default_factory=dict)
+    failure: str = ""
+    warnings: str = ""
+    seconds: float = 0.0
+    lasting: bool = True
+
+
+class Evaluations(Generic[Point]):
+    """Evaluations at points, each computed once. Several threads may ask at a time.
+
+    Parameters
+    ----------
+    pool : Pool
+        Computes an `Evaluation` for a point.
+    stamp : callable
+        All that an evaluation depends on, of a point, as JSON holds it.
+    folder : path, optional
+        Keeps every evaluation; those that are there are not computed again.
+    tell : callable, optional
+        Called with each point, its evaluation, and whether it was found in the folder.
+    """
+
+    def __init__(
+        self,
+        pool: Pool[Point, Evaluation],
+        stamp: Callable[[Point], Any],
+        folder: str | os.PathLike[str] | None = None,
+        tell: Callable[[Point, Evaluation, bool], None] | None = None,
+    ) -> None:
+        self.pool, self.stamp, self.tell = pool, stamp, tell
+        self.folder = None if folder is None else Path(folder)
+        self.computed = self.found = 0
+        self._known: dict[Point, Evaluation] = {}
+        self._lock = Lock()
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            remove_leftovers(self.folder)
+
+    def at(
+        self,
+        points: Sequence[Point],
+        lost: Callable[[Point, str], Evaluation] | None = None,
+        first: bool = False,
+    ) -> list[Evaluation]:
+        """Evaluations at several points, at the same time as far as the pool can.
+
+        Parameters
+        ----------
+        points : sequence
+        lost : callable, optional
+            As of `Pool.each`.
+        first : bool
+            Whether one is computed before the others, which then find its kernels compiled.
+        """
+        new = [point for point in dict.fromkeys(points) if not self._look(point)]
+        if first and len(new) > 1:
+            self.pool.first(new[0], self._keep)
+            del new[0]
+        if new:
+            self.pool.each(new, self._keep, lost)
+        return [self._known[point] for point in points]
+
+    def _look(self, point: Point) -> bool:
+        """Whether a point is known, or kept in the folder."""
+        if point not in self._known and self.folder is not None:
+            name = name_of(self.stamp(point))
+            found = KEPT.find(self.folder / f"{name}.npz", name)
+            if found is not None:
+                self._count(point, found, True)
+        return point in self._known
+
+    def _keep(self, point: Point, found: Evaluation) -> None:
+        if self.folder is not None and found.lasting:
+            name = name_of(self.stamp(point))
+            KEPT.keep(self.folder / f"{name}.npz", name, found)
+        self._count(point, found, False)
+
+    def _count(self, point: Point, found: Evaluation, kept: bool) -> None:
+        with self._lock:
+            self._known[point] = found
+            self.found += kept
+            self.computed += not kept
+            if self.tell is not None:
+                self.tell(point, found, kept)
+
+
+def _read(file: Path) -> tuple[str, Evaluation]:
+    with np.load(file) as kept:
+        values = {
+            name.removeprefix(_VALUE): kept[name] for name in kept.files if name.startswith(_VALUE)
+        }
+        if any(array.dtype.kind not in "iuf" for array in values.values()):
+            raise ValueError
+        failure, warnings = str(kept["failure"]), str(kept["warnings"])
+        found = Evaluation(values, failure, warnings, float(kept["seconds"]))
+        return str(kept["stamp"]), found
+
+
+def _write(file: Path, stamp: str, found: Evaluation) -> None:
+    texts = {"stamp": stamp, "failure": found.failure, "warnings": found.warnings}
+    values: dict[str, Any] = {f"{_VALUE}{name}": array for name, array in found.values.items()}
+    facts: dict[str, Any] = {name: np.array(text) for name, text in texts.items()}
+    with whole(file) as part:
+        np.savez(part, seconds=np.array(found.seconds), **facts, **values)
+
+
+KEPT: Store[Evaluation] = Store(_read, _write, warns=False)
+"""Files hold checksums: what is damaged counts as not there."""

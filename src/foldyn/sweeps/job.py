@@ -1,0 +1,132 @@
+"""What a sweep computes at a point: the case file with other values, its result, its measures."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from foldyn.analyses import CaseFile
+from foldyn.analyses.keys import files_of, replaced
+from foldyn.analyses.reading import case_of_document
+from foldyn.analyses.ties import Tie
+from foldyn.errors import ComputationError, FoldynWarning, InputError
+from foldyn.program import program
+from foldyn.sweeps.evaluations import Evaluation
+from foldyn.sweeps.measure import Asked, Loaded
+from foldyn.sweeps.points import Point
+
+COMPUTING = ("algebra", "analyses", "results", "sweeps")
+"""Folders that measures depend on, besides the solvers."""
+ASIDE = ("sweep", "title")
+"""Tables and keys of a case file that change no result."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """Computes a point of a sweep; it can be sent to another process.
+
+    Attributes
+    ----------
+    path : Path
+        The case file.
+    document : dict
+        Its content.
+    keys : tuple of str
+        What is varied.
+    ties : tuple of Tie
+    measures : tuple of Asked
+    program : str
+        Digest of the program that asks.
+    """
+
+    path: Path
+    document: dict[str, Any]
+    keys: tuple[str, ...]
+    ties: tuple[Tie, ...]
+    measures: tuple[Asked, ...]
+    program: str
+
+    def changes(self, point: Point) -> dict[str, Any]:
+        """Values of all keys at a point, ties among them."""
+        own: dict[str, Any] = dict(zip(self.keys, point, strict=True))
+        numbers = {
+            key: float(value)
+            for key, value in own.items()
+            if isinstance(value, int | float) and not isinstance(value, bool)
+        }
+        return own | {tie.key: tie.value(numbers) for tie in self.ties}
+
+    def changed(self, point: Point) -> dict[str, Any]:
+        """Content of the case file at a point."""
+        whole = replaced(self.document, self.changes(point))
+        return {key: value for key, value in whole.items() if key not in ASIDE}
+
+    def case_file(self, point: Point) -> CaseFile:
+        """Case file at a point."""
+        return case_of_document(self.path, self.changed(point))
+
+    def stamp(self, point: Point) -> list[Any]:
+        """All that the evaluation of a point depends on."""
+        document = self.changed(point)
+        there = [self.path.parent / file for file in sorted(files_of(document))]
+        files = {str(file): _digest(str(file)) for file in there}
+        measures = [[one.name, one.text, code_of(one.measure.function)] for one in self.measures]
+        return [self.program, document, files, measures]
+
+    def __call__(self, point: Point) -> Evaluation:
+        """Evaluate a point: what goes wrong is what is found there."""
+        began = time.perf_counter()
+        values, failure, lasting = {}, "", True
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            try:
+                values = self._values(point)
+            except (InputError, ComputationError) as error:
+                failure = str(error).removeprefix(f"{self.path}: ")
+            except Exception as error:  # of one point; the others are computed all the same
+                failure, lasting = f"{type(error).__name__}: {error}", False
+        said = [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
+        seconds = time.perf_counter() - began
+        return Evaluation(values, failure, "; ".join(dict.fromkeys(said)), seconds, lasting)
+
+    def _values(self, point: Point) -> dict[str, Any]:
+        if self.program != this_program():
+            raise RuntimeError("this worker has another version of Foldyn than who asks it")
+        case_file = self.case_file(point)
+        result, case, shared = case_file.computation().result(), case_file.case(), {}
+        return {one.name: one.of(result, case, shared) for one in self.measures}
+
+
+def this_program() -> str:
+    """Digest of the program."""
+    return program(*COMPUTING)
+
+
+@cache
+def _digest(file: str) -> str:
+    """Digest of a file that a case file names; "" where there is none."""
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def code_of(function: Callable[..., Any]) -> str:
+    """Digest of the sources of a user's function; "" for one of the registry."""
+    found = function.load() if isinstance(function, Loaded) else function
+    if getattr(found, "__module__", "").startswith("foldyn."):
+        return ""
+    try:
+        file = inspect.getsourcefile(found)
+        text = Path(file).read_text("utf-8") if file else inspect.getsource(found)
+    except (OSError, TypeError):  # typed into a session
+        code = getattr(found, "__code__", None)
+        text = repr(found) if code is None else f"{code.co_code!r}{code.co_consts!r}"
+    return hashlib.sha256(text.encode()).hexdigest()

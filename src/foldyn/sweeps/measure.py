@@ -1,0 +1,251 @@
+"""A measure: a named function of a result, and how it is asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from foldyn.analyses import CaseFile
+from foldyn.cases import Case
+from foldyn.cases.directions import AXES
+from foldyn.errors import FoldynError, InputError
+from foldyn.values import choice, show, suggest
+
+NODE, AXIS, MODE, MODEL = "node", "axis", "mode", "model"
+"""Arguments that a measure may have."""
+_ASKED = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]*)\])?\Z")
+_NAME = re.compile(r"[A-Za-z_]\w*\Z")
+_OWN = re.compile(r"(?:([A-Za-z_]\w*)=)?(.+):([A-Za-z_]\w*)\Z")
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A named function of a result.
+
+    Parameters
+    ----------
+    name : str
+    kinds : tuple of str
+        Kinds of analysis whose results it can be taken of; empty: all.
+    function : callable
+        ``function(result, case)``, with the values of `takes` as named arguments; a number or an
+        array.
+    units : str
+        "1" where it has none, "" where it is not known.
+    doc : str
+        What it is, as labels of figures say it.
+    dims : tuple of str
+        Dimensions of an array; their lengths may differ from point to point.
+    takes : tuple of str
+        Arguments, in their order: "node", "axis", "mode", "model".
+    needs : int
+        How many of them must be given.
+    through : callable, optional
+        ``through(result, case)`` comes first, once for all measures that share it; what it gives
+        takes the place of the result.
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    function: Callable[..., Any]
+    units: str = "1"
+    doc: str = ""
+    dims: tuple[str, ...] = ()
+    takes: tuple[str, ...] = ()
+    needs: int = 0
+    through: Callable[[xr.Dataset, Case], Any] | None = None
+
+    @property
+    def asked(self) -> str:
+        """How it is asked for: "peak_frequency[node,axis]"."""
+        shown = [*self.takes[: self.needs], *(f"{word}?" for word in self.takes[self.needs :])]
+        return f"{self.name}[{','.join(shown)}]" if shown else self.name
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A measure with its arguments.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the result of a sweep.
+    measure : Measure
+    arguments : dict
+    text : str
+        What was asked for.
+    """
+
+    name: str
+    measure: Measure
+    arguments: Mapping[str, Any]
+    text: str
+
+    def of(self, result: xr.Dataset, case: Case, shared: dict[Any, Any]) -> NDArray:
+        """Its value.
+
+        Parameters
+        ----------
+        result : xarray.Dataset
+        case : Case
+        shared : dict
+            What measures of this result have come through, by the function; it is added to.
+
+        Raises
+        ------
+        FoldynError
+            It cannot be taken of this result.
+        """
+        try:
+            through, subject = self.measure.through, result
+            if through is not None:
+                if through not in shared:
+                    shared[through] = through(result, case)
+                subject = shared[through]
+            found = self.measure.function(subject, case, **self.arguments)
+        except FoldynError as error:
+            raise type(error)(f"{self.text}: {error}") from None
+        except Exception as error:  # of a user's function, of any kind
+            raise InputError(f"{self.text}: {type(error).__name__}: {error}") from error
+        try:
+            value = np.asarray(found, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{self.text}: gave {show(found)}, no number or array") from None
+        if self.measure.dims and value.ndim != len(self.measure.dims):
+            raise InputError(
+                f"{self.text}: gave an array of shape {value.shape}, not one over "
+                f"{', '.join(self.measure.dims)}"
+            )
+        return value
+
+    def check(self, case_file: CaseFile) -> None:
+        """Refuse what cannot be taken of the results of a case file."""
+        kind, kinds = case_file.analysis.kind, self.measure.kinds
+        if kinds and kind not in kinds:
+            raise InputError(
+                f"{self.text}: is for analysis.kind = {' or '.join(show(one) for one in kinds)}, "
+                f"but {case_file.path} is of kind {show(kind)}"
+            )
+        node, count = self.arguments.get(NODE), len(case_file.case().structure.nodes)
+        if node is not None and node >= count:
+            raise InputError(f"{self.text}: there is no node {node}, but 0 to {count - 1}")
+
+
+def asked(text: str, known: Mapping[str, Measure]) -> Asked:
+    """Measure of the registry from its text, "peak_frequency[8,x]".
+
+    Raises
+    ------
+    InputError
+        There is none of this name, or its arguments are others.
+    """
+    found = _ASKED.match(text.strip()) if isinstance(text, str) else None
+    if found is None:
+        raise InputError(f" = {show(text)}: write a name, as frequencies or peak_frequency[8]")
+    name, inside = found[1], found[2]
+    if name not in known:
+        raise InputError(
+            f" = {show(text)}: there is no measure {name}; {suggest(name, known)}choose one of "
+            f"{', '.join(known)}"
+        )
+    measure = known[name]
+    given = [word.strip() for word in inside.split(",")] if inside is not None else []
+    if not measure.needs <= len(given) <= len(measure.takes):
+        raise InputError(f" = {show(text)}: write {measure.asked} (? may be left out)")
+    pairs = zip(measure.takes, given, strict=False)
+    arguments = {what: _argument(text, what, word) for what, word in pairs}
+    own = "_".join([name, *map(str, arguments.values())])
+    return Asked(own, measure, arguments, text.strip())
+
+
+def _argument(text: str, what: str, word: str) -> Any:
+    if what == AXIS:
+        return choice(f" = {show(text)}: axis", word, AXES)
+    if what == MODEL:
+        return word
+    least = 1 if what == MODE else 0
+    if not word.isdecimal() or int(word) < least:
+        raise InputError(f" = {show(text)}: {what} = {show(word)}: give a number from {least} on")
+    return int(word)
+
+
+def own_measure(text: str, folder: Path) -> Asked | None:
+    """A user's function, from "module:function" or "file.py:function"; None if it is not such."""
+    found = _OWN.match(text.strip())
+    if found is None:
+        return None
+    name, place, function = found[1] or found[3], found[2], found[3]
+    loaded = Loaded(str(folder / place) if place.endswith(".py") else place, function)
+    loaded.load()
+    return Asked(name, Measure(name, (), loaded), {}, text.strip())
+
+
+def of_callable(name: str, function: Callable[..., Any]) -> Asked:
+    """A user's function as a measure."""
+    if not _NAME.match(name):
+        raise InputError(
+            f" = {show(name)}: is no name for a measure; give functions by name, as in "
+            '{"tip": function}',
+            "measures",
+        )
+    return Asked(name, Measure(name, (), function), {}, name)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A function by the place where it is found, so that it can be sent to other processes."""
+
+    place: str
+    function: str
+
+    def load(self) -> Callable[..., Any]:
+        """The function.
+
+        Raises
+        ------
+        InputError
+            The module cannot be imported, or has no such function.
+        """
+        try:
+            module = _module(self.place)
+        except Exception as error:  # whatever a user's module raises
+            raise InputError(
+                f" = {show(f'{self.place}:{self.function}')}: cannot be imported "
+                f"({type(error).__name__}: {error}); write module:function or file.py:function"
+            ) from None
+        found = getattr(module, self.function, None)
+        if not callable(found):
+            raise InputError(
+                f" = {show(f'{self.place}:{self.function}')}: {self.place} has no function "
+                f"{self.function}"
+            )
+        return found
+
+    def __call__(self, result: xr.Dataset, case: Case) -> Any:
+        """Value of the function."""
+        return self.load()(result, case)
+
+
+_modules: dict[str, Any] = {}  # what was loaded from files, once in a process
+
+
+def _module(place: str) -> Any:
+    if not place.endswith(".py"):
+        return import_module(place)
+    if place not in _modules:
+        spec = spec_from_file_location(Path(place).stem, place)
+        if spec is None or spec.loader is None:
+            raise ImportError(place)
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        _modules[place] = module
+    return _modules[place]

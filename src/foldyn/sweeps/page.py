@@ -1,0 +1,245 @@
+"""The page of a sweep: what was measured over what was varied, the points, those that failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from foldyn import plots
+from foldyn.analyses import CaseFile
+from foldyn.analyses.provenance import Call, cost_rows, inputs_table
+from foldyn.errors import InputError
+from foldyn.report.album import Album
+from foldyn.report.charts import Chart, Charts, Curve
+from foldyn.report.page import write_report
+from foldyn.report.sections import Heading, Listing, Section, Table, Text, cell
+from foldyn.results.swept import (
+    POINT,
+    SALTELLI,
+    is_grid,
+    keys_of,
+    label,
+    main_effects,
+    measured,
+    measures_of,
+    parameters_of,
+    sobol_indices,
+)
+
+MOST_CURVES = 8
+"""Curves of a chart."""
+MOST_ROWS = 1000
+"""Points that a table lists."""
+MOST_REASONS = 50
+"""Reasons of failures that a table lists."""
+MOST_COLUMNS = 6
+"""Values of one measure in a row."""
+
+
+def write_sweep(
+    sweep: xr.Dataset, folder: str | Path, case_file: CaseFile, call: Call | None = None,
+    figures: str | None = None,
+) -> Path:  # fmt: skip
+    """Write the page of a sweep into a folder that exists; returns its path.
+
+    Parameters
+    ----------
+    sweep : xarray.Dataset
+        A result of `foldyn.sweep`.
+    folder : path
+    case_file : CaseFile
+        What was varied.
+    call : Call, optional
+        How it was asked for.
+    figures : {"png", "svg", "pdf"}, optional
+        What figures are written as; none are drawn by default.
+    """
+    album = Album(folder, figures)
+    sections: list[Section] = []
+    for name in measures_of(sweep):
+        sections += _of_measure(sweep, name, album)
+    if sweep.attrs["failed"]:
+        sections += [Heading("Points that failed"), _failures(sweep)]
+    sections += [Heading("The points"), *_points(sweep)]
+    sections += [Heading("How it was computed"), inputs_table(_rows(sweep, case_file, call))]
+    sections.append(Listing("The case file, with its sweep", str(sweep["case_file"].values)))
+    title = f"{case_file.heading}: a sweep"
+    return write_report(Path(folder) / "report.html", title, sections)
+
+
+def _of_measure(sweep: xr.Dataset, name: str, album: Album) -> Iterator[Section]:
+    """Charts or figures of a measure, and its Sobol indices."""
+    one = sweep[name]
+    yield Heading(str(one.attrs["measure"]))
+    if not np.isfinite(one.values).any():
+        yield Text("Has no value at any point.")
+        return
+    names = parameters_of(sweep)
+    own = [str(dim) for dim in one.dims if dim not in (*keys_of(sweep), POINT)]
+    at = {dim: sweep[dim].values[0].item() for dim in own}
+    where = "".join(f", {dim} {value}" for dim, value in at.items())
+    text = f"{one.attrs['long_name']}{where}".capitalize()
+    if len(names) > 1:
+        if is_grid(sweep) and len(names) == 2:
+            caption = f"{text}, over both parameters."
+            draw = partial(plots.plot_sweep_map, sweep, name, at=at)
+            yield from album.figure(f"map-{name}", caption, draw)
+        caption = (
+            f"{text}: mean over all other parameters, at values of one."
+            if is_grid(sweep)
+            else f"{text}: the points over each parameter, and their means."
+        )
+        draw = partial(plots.plot_main_effects, sweep, name, at)
+        charts = Charts([_effect(sweep, name, at, each) for each in names], caption)
+        yield from album.figure(f"effects-{name}", caption, draw, charts)
+    if is_grid(sweep) and len(names) <= 2:
+        by = names[1] if len(names) == 2 else (own[0] if own else None)
+        kept = {dim: value for dim, value in at.items() if dim != by}
+        lines = text if by not in own else str(one.attrs["long_name"]).capitalize()
+        caption = f"{lines}, over {sweep[names[0]].attrs['long_name']}."
+        draw = partial(plots.plot_sweep_lines, sweep, name, names[0], by, kept)
+        charts = Charts([_lines(sweep, name, names[0], by, kept)], caption)
+        yield from album.figure(f"lines-{name}", caption, draw, charts)
+    elif len(names) == 1:
+        caption = f"{text}, at all points."
+        draw = partial(plots.plot_sweep_lines, sweep, name, names[0], None, at)
+        charts = Charts([_effect(sweep, name, at, names[0])], caption)
+        yield from album.figure(f"lines-{name}", caption, draw, charts)
+    if sweep.attrs["method"] == SALTELLI:
+        yield from _indices(sweep, name, at, album, text)
+
+
+def _indices(
+    sweep: xr.Dataset, name: str, at: dict[str, Any], album: Album, text: str
+) -> Iterator[Section]:  # fmt: skip
+    try:
+        found = sobol_indices(sweep, name, at)
+    except InputError as error:
+        yield Text(f"No Sobol indices: {error}")
+        return
+    caption = (
+        f"{text}: shares of its variance that parameters explain, alone and with all their "
+        f"interactions, with intervals of 95 % by the bootstrap; from {found.points} rows of the "
+        "design."
+    )
+    header = ["parameter", "alone", "from", "to", "with interactions", "from", "to"]
+    rows = [
+        [word, found.first[k], *found.first_interval[k], found.total[k], *found.total_interval[k]]
+        for k, word in enumerate(found.names)
+    ]
+    yield Table(header, rows, caption, digits=3)
+    draw = partial(plots.plot_sobol_indices, found)
+    yield from album.figure(f"indices-{name}", caption, draw)
+
+
+def _effect(sweep: xr.Dataset, name: str, at: dict[str, Any], each: str) -> Chart:
+    """Chart of a measure over one parameter."""
+    found, values = measured(sweep, name, at), sweep[each].values
+    (effect,) = (one for one in main_effects(sweep, name, at) if one.name == each)
+    curves = [Curve("mean", _numbers(effect.values, effect.values), effect.mean)]
+    if not is_grid(sweep):
+        curves.append(Curve("points", _numbers(values, effect.values), found.values, dots=True))
+    return Chart(_axis(sweep[each], effect.values), label(found), curves)
+
+
+def _lines(
+    sweep: xr.Dataset, name: str, along: str, by: str | None, at: dict[str, Any]
+) -> Chart:  # fmt: skip
+    """Chart of a measure over a parameter, a curve for each value of something else."""
+    x = _numbers(sweep[along].values, sweep[along].values)
+    values = [None] if by is None else sweep[by].values.tolist()
+    chosen = np.linspace(0, len(values) - 1, min(len(values), MOST_CURVES)).astype(int)
+    curves = []
+    for k in chosen.tolist():
+        found = measured(sweep, name, at if by is None else {**at, by: values[k]})
+        word = f"{values[k]:.4g}" if isinstance(values[k], float) else str(values[k])
+        text = name if by is None else f"{sweep[by].attrs.get('long_name', by)} {word}"
+        curves.append(Curve(text, x, found.values))
+    return Chart(_axis(sweep[along], sweep[along].values), label(sweep[name]), curves)
+
+
+def _numbers(values: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Values as numbers: texts by their place in a list."""
+    if values.dtype.kind in "iuf":
+        return values.astype(float)
+    order = levels.tolist()
+    return np.array([order.index(value) for value in values.tolist()], float)
+
+
+def _axis(one: xr.DataArray, levels: np.ndarray) -> str:
+    """Label of an axis; of texts with what its numbers stand for."""
+    if one.values.dtype.kind in "iuf":
+        return label(one)
+    words = ", ".join(f"{k}: {word}" for k, word in enumerate(levels.tolist()))
+    return f"{label(one)}: {words}"
+
+
+def _points(sweep: xr.Dataset) -> Iterator[Section]:
+    """Table of the points."""
+    table = _flat(sweep)
+    columns: dict[str, np.ndarray] = {}
+    for name in keys_of(sweep):
+        columns[label(sweep[name])] = table[name].values
+    for name in measures_of(sweep):
+        one = table[name]
+        values = one.transpose(POINT, ...).values.reshape(one.sizes[POINT], -1)
+        several = values.shape[1] > 1
+        for k in range(min(values.shape[1], MOST_COLUMNS)):
+            units = one.attrs.get("units", "1")
+            title = f"{name}{f' {k + 1}' if several else ''}"
+            columns[f"{title} ({units})" if units not in ("", "1") else title] = values[:, k]
+    count = table.sizes[POINT]
+    rows = [
+        [cell(value) if isinstance(value, float) else value for value in row]
+        for row in zip(*(column[:MOST_ROWS].tolist() for column in columns.values()), strict=True)
+    ]
+    more = f" The first {MOST_ROWS} of {count}." if count > MOST_ROWS else ""
+    yield Table(list(columns), rows, f"What was measured at each point.{more}", digits=5)
+
+
+def _flat(sweep: xr.Dataset) -> xr.Dataset:
+    """The sweep with its points in a row."""
+    kept = sweep[[*measures_of(sweep), "failure", "seconds"]]
+    if not is_grid(sweep):
+        return kept
+    return kept.stack({POINT: keys_of(sweep)}, create_index=False)
+
+
+def _failures(sweep: xr.Dataset) -> Table:
+    table = _flat(sweep)
+    names = keys_of(sweep)
+    failed = [k for k, reason in enumerate(table["failure"].values.tolist()) if reason]
+    rows = [
+        [*(table[name].values[k].item() for name in names), str(table["failure"].values[k])]
+        for k in failed[:MOST_REASONS]
+    ]
+    more = f", the first {MOST_REASONS}" if len(failed) > MOST_REASONS else ""
+    caption = f"{len(failed)} of {sweep.attrs['points']} points{more}, with their reasons."
+    return Table([*(label(sweep[name]) for name in names), "why"], rows, caption)
+
+
+def _rows(
+    sweep: xr.Dataset, case_file: CaseFile, call: Call | None
+) -> Iterator[tuple[str, str]]:  # fmt: skip
+    """How it was computed."""
+    facts = sweep.attrs
+    yield "case file", str(case_file.path.name)
+    yield "analysis", str(facts["kind"])
+    for name in keys_of(sweep):
+        values = sweep[name].values
+        listed = ", ".join(str(value) for value in np.unique(values).tolist()[:12])
+        if values.dtype.kind in "iuf" and len(np.unique(values)) > 12:
+            listed = f"{values.min():.6g} to {values.max():.6g}"
+        yield str(sweep[name].attrs["key"]), listed
+    how = "all combinations of values"
+    if not is_grid(sweep):
+        how = f"{facts['method']}, {facts['samples']} samples, seed {facts['seed']}"
+    yield "points", f"{facts['points']}, {facts['failed']} of them failed; {how}"
+    yield "processes", str(facts["processes"])
+    seconds = float(np.nansum(sweep["seconds"].values))
+    yield from cost_rows(str(facts["foldyn_version"]), call or Call(), seconds)

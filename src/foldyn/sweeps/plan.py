@@ -1,0 +1,215 @@
+"""What a sweep is to compute, checked whole before anything runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from foldyn.analyses import CaseFile
+from foldyn.analyses.keys import parts
+from foldyn.analyses.ranges import SAMPLINGS, Varied, varied
+from foldyn.analyses.reading import case_of_document, read_document, validated
+from foldyn.analyses.sections import SweepSection
+from foldyn.analyses.ties import ties_of
+from foldyn.errors import Faults, InputError, within
+from foldyn.sweeps.job import ASIDE, Job, this_program
+from foldyn.sweeps.measure import Asked, Measure, asked, of_callable
+from foldyn.sweeps.measures import MEASURES
+from foldyn.sweeps.points import GRID, Point, grid, samples
+from foldyn.values import MOST, choice, show, whole
+
+MASS = "model.mass"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A sweep that was checked.
+
+    Attributes
+    ----------
+    case_file : CaseFile
+        The file as it is.
+    varied : tuple of Varied
+    method : str
+        "grid", or how points are drawn.
+    count : int
+        How many are drawn, or of the base of their design; 0 of a grid.
+    seed : int
+    points : list of tuple
+        Values of the keys, as `varied`.
+    job : Job
+    """
+
+    case_file: CaseFile
+    varied: tuple[Varied, ...]
+    method: str
+    count: int
+    seed: int
+    points: list[Point]
+    job: Job
+
+    @property
+    def section(self) -> dict[str, Any]:
+        """Table [sweep] that asks for the same."""
+        table: dict[str, Any] = {}
+        if self.method != GRID:
+            table = {"samples": self.count, "method": self.method, "seed": self.seed}
+        if self.job.ties:
+            table["ties"] = {tie.key: tie.expression for tie in self.job.ties}
+        table["measures"] = [one.text for one in self.job.measures]
+        table["vary"] = {one.key: _written(one) for one in self.varied}
+        return table
+
+
+def _written(one: Varied) -> Any:
+    if one.values:
+        return list(one.values)
+    return f"{one.lower!r}:{one.upper!r}{':log' if one.log else ''}"
+
+
+def plan_of(
+    case: str | os.PathLike[str],
+    vary: Mapping[str, Any] | None,
+    measures: Sequence[Any] | Mapping[str, Any] | None,
+    count: int | None,
+    method: str | None,
+    seed: int | None,
+    ties: Mapping[str, str] | None,
+) -> Plan:
+    """Check the arguments of `foldyn.sweep`; raises `InputError`."""
+    try:
+        path = Path(case)
+    except TypeError:
+        raise InputError(f"case: got {type(case).__name__}, give the path of a case file") from None
+    document = read_document(path)
+    case_file = case_of_document(path, document)
+    table = case_file.sweep
+    if measures is None and table is not None:
+        measures = table.measures
+    if vary is not None:
+        chosen = _chosen(vary, count, method, seed, ties)
+    elif table is not None:
+        given = {"samples": count, "method": method, "seed": seed, "ties": ties}
+        changed = {key: value for key, value in given.items() if value is not None}
+        own = {**document["sweep"], **changed}
+        chosen = validated(path, {**document, "sweep": own}).sweep if changed else table
+    else:
+        raise InputError(": missing; name what to vary, here or in a table [sweep]", "vary", path)
+    sampled = chosen.samples is not None
+    keys = _with_masses(chosen.vary, case_file, sampled)
+    how = chosen.samples or 0, chosen.method, chosen.seed
+    points = samples(keys, *how) if sampled else grid(keys)
+    names = tuple(one.key for one in keys)
+    job = Job(path, document, names, tuple(chosen.ties), _measures(measures), this_program())
+    _check_keys(job, keys, points[0])
+    faults = Faults()
+    for one in job.measures:
+        with faults.collected():
+            one.check(case_file)
+    faults.tell()
+    case_file.computation()  # which refuses what cannot be computed as it is
+    number, drawn, start = how
+    return Plan(case_file, keys, drawn if sampled else GRID, number, start, points, job)
+
+
+def _chosen(
+    vary: Mapping[str, Any], count: int | None, method: str | None, seed: int | None,
+    ties: Mapping[str, str] | None,
+) -> SweepSection:  # fmt: skip
+    """A table [sweep] of arguments."""
+    if count is None and (method is not None or seed is not None):
+        raise InputError(
+            ": is of samples; give samples too, or leave it out for a grid",
+            "method" if method is not None else "seed",
+        )
+    if count is not None:
+        whole("samples", count, least=1)
+    with within("vary"):
+        keys = varied(vary, count is not None)
+    return SweepSection.model_construct(
+        samples=count,
+        method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
+        seed=whole("seed", seed or 0, least=0, most=MOST),
+        vary=keys,
+        ties=_ties(ties or {}),
+    )
+
+
+def _ties(given: Mapping[str, str]) -> tuple[Any, ...]:
+    with within("ties"):
+        return ties_of(given)
+
+
+def _with_masses(
+    keys: tuple[Varied, ...], case_file: CaseFile, sampled: bool
+) -> tuple[Varied, ...]:
+    """The keys, and the mass rules of the file where it lists several."""
+    masses = case_file.masses
+    if len(masses) == 1 or any(one.key == MASS for one in keys):
+        return keys
+    if sampled:
+        raise InputError(
+            f" lists {len(masses)} rules, and samples would not tell them apart: name one of them",
+            MASS,
+            case_file.path,
+        )
+    return (*keys, Varied(MASS, tuple(masses)))
+
+
+def _measures(wanted: Sequence[Any] | Mapping[str, Any] | None) -> tuple[Asked, ...]:
+    if isinstance(wanted, str) or callable(wanted):
+        wanted = [wanted]
+    if not wanted:
+        raise InputError(
+            f": none; give at least one of {', '.join(MEASURES)}, or a function", "measures"
+        )
+    if isinstance(wanted, Mapping):
+        found = [of_callable(name, function) for name, function in wanted.items()]
+    else:
+        found = [_measure(one, k) for k, one in enumerate(wanted)]
+    names = [one.name for one in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f": {name} is asked for twice", "measures")
+    return tuple(found)
+
+
+def _measure(one: Any, k: int) -> Asked:
+    if isinstance(one, Asked):
+        return one
+    if isinstance(one, Measure):
+        return Asked(one.name, one, {}, one.name)
+    if callable(one):
+        return of_callable(getattr(one, "__name__", show(one)), _function(one))
+    with within(f"measures[{k}]"):
+        return asked(one, MEASURES)
+
+
+def _function(one: Callable[..., Any]) -> Callable[..., Any]:
+    if getattr(one, "__name__", "") == "<lambda>":
+        raise InputError(
+            ': a function without a name; give it one, as in {"tip": function}', "measures"
+        )
+    return one
+
+
+def _check_keys(job: Job, keys: Sequence[Varied], first: Point) -> None:
+    """Refuse keys and values that no case file of this kind has, before anything is computed."""
+    names = [*job.keys, *(tie.key for tie in job.ties)]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f": {name} is named twice, to vary or to tie", "vary")
+        if parts(name)[0] in ASIDE:
+            raise InputError(f": {name} changes no result; leave it out", "vary")
+    faults = Faults()
+    for k, one in enumerate(keys):
+        for value in one.tried():
+            point = (*first[:k], value, *first[k + 1 :])
+            with faults.collected():
+                validated(job.path, job.changed(point))
+            if faults.found:
+                break
+    faults.tell()

@@ -1,0 +1,91 @@
+"""The points of a sweep: a grid, or samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.analyses.ranges import SAMPLINGS, Value, Varied
+from foldyn.errors import InputError
+
+LATIN, SOBOL, SALTELLI = SAMPLINGS
+GRID = "grid"
+MOST_POINTS = 1_000_000
+"""Points of a sweep: more are a slip of the finger."""
+MOST_SOBOL = 21201
+"""Dimensions of SciPy's Sobol sequence."""
+
+Point = tuple[Value, ...]
+
+
+def grid(varied: Sequence[Varied]) -> list[Point]:
+    """All combinations of values, those of the last key changing first."""
+    count = math.prod(len(one.values) for one in varied)
+    _check_count(count)
+    return list(product(*(one.values for one in varied)))
+
+
+def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> list[Point]:
+    """Points that are drawn.
+
+    Parameters
+    ----------
+    varied : sequence of Varied
+        Those with one value have that at all points, and count for nothing.
+    count : int
+        How many. With "saltelli" the base of a design for Sobol indices, which has as many points
+        for each of two independent samples, and for the first one with each key from the second
+        (Saltelli et al., Comput. Phys. Commun. 181, 2010).
+    method : {"latin_hypercube", "sobol", "saltelli"}
+    seed : int
+
+    Raises
+    ------
+    InputError
+        The count is no power of 2 where a Sobol sequence needs it, or too large.
+    """
+    free = [one.key for one in varied if len(one.values) != 1]
+    d = max(len(free), 1)
+    _check_count(count * (d + 2) if method == SALTELLI else count)
+    share = _shares(d, count, method, seed)
+    still = np.zeros(len(share))
+    columns = [
+        one.at(share[:, free.index(one.key)] if one.key in free else still) for one in varied
+    ]
+    return list(zip(*columns, strict=True))
+
+
+def _shares(d: int, count: int, method: str, seed: int) -> NDArray[np.float64]:
+    """Points of the unit cube, shape (points, d)."""
+    from scipy.stats import qmc
+
+    drawn = np.random.default_rng(seed)
+    if method == LATIN:
+        return qmc.LatinHypercube(d, seed=drawn).random(count)
+    if count & (count - 1):
+        near = 2 ** round(math.log2(count))
+        raise InputError(
+            f" = {count}: a Sobol sequence is balanced where there are a power of 2 of its points; "
+            f"take {near}",
+            "samples",
+        )
+    size = 2 * d if method == SALTELLI else d
+    if size > MOST_SOBOL:
+        raise InputError(f": {d} keys are too many for a Sobol sequence", "vary")
+    share = qmc.Sobol(size, seed=drawn).random(count)
+    if method == SOBOL:
+        return share
+    one, other = share[:, :d], share[:, d:]
+    mixed = [np.where(np.arange(d) == k, other, one) for k in range(d)]
+    return np.vstack([one, other, *mixed])
+
+
+def _check_count(count: int) -> None:
+    if count > MOST_POINTS:
+        raise InputError(
+            f": {count} points; give at most {MOST_POINTS}, fewer values or samples", "vary"
+        )

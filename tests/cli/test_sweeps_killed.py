@@ -1,0 +1,115 @@
+"""Sweeps that are killed and go on: every point once, the same as without."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from processes import children, running, start, wait_for
+
+import foldyn as fd
+from case_texts import HELD_MIURA_TEXT
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+MODES = HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 4\n'
+MEASURE = """
+import time
+
+def slow(result, case):
+    time.sleep({seconds})
+    return result["frequency"].values
+"""
+
+
+def kept(folder: Path) -> dict[str, tuple[int, int]]:
+    """Whole files, each with what changes if it is written again."""
+    found = folder.glob("*.npz") if folder.is_dir() else ()
+    return {
+        one.name: (one.stat().st_ino, one.stat().st_mtime_ns)
+        for one in found
+        if not one.name.startswith(".")
+    }
+
+
+def more(points: Path, there: int, process: subprocess.Popen[str]) -> bool:
+    """Whether there are more points, or the sweep has ended."""
+    return len(kept(points)) > there or process.poll() is not None
+
+
+def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> None:
+    """Sweep, killed at random moments after new points were kept."""
+    (folder / "case.toml").write_text(MODES)
+    (folder / "mine.py").write_text(MEASURE.format(seconds=seconds))
+    vary = f"sheet.thickness=0.005:0.02:{count}"
+    command = ("sweep", "case.toml", "--vary", vary, "--measure", "mine.py:slow")
+    command = (*command, "--measure", "frequencies", "--processes", "2", "--no-figures")
+    points, moments, before = folder / "case-sweep" / "points", random.Random(0), {}
+    for _ in range(kills):
+        one = start(folder, *command)
+        wait_for(partial(more, points, len(before), one))
+        time.sleep(seconds * moments.uniform(0.0, 0.6 * count / kills))
+        workers = children(one.pid)
+        one.send_signal(signal.SIGKILL)
+        one.communicate(timeout=30)
+        wait_for(lambda workers=workers: not any(map(running, workers)), 10.0)
+        after = kept(points)
+        assert after.items() >= before.items()  # nothing lost, nothing computed again
+        assert len(after) > len(before) or len(before) == count
+        before = after
+    assert len(before) > 0
+    last = start(folder, *command)
+    _, err = last.communicate(timeout=240)
+    assert last.returncode == 0, err
+    assert kept(points).items() >= before.items()
+    assert len(kept(points)) == count
+    assert not [one for one in points.iterdir() if one.suffix != ".npz"]
+    found = fd.load(folder / "case-sweep" / "sweep.nc")
+    thickness = np.linspace(0.005, 0.02, count)
+    alone = fd.sweep(folder / "case.toml", {"sheet.thickness": thickness}, ["frequencies"],
+                     processes=1)  # fmt: skip
+    np.testing.assert_array_equal(found["thickness"], alone["thickness"])
+    np.testing.assert_array_equal(found["frequencies"], alone["frequencies"])
+    np.testing.assert_array_equal(found["slow"], alone["frequencies"])
+    assert found.attrs["failed"] == 0
+
+
+def test_a_sweep_that_is_killed_goes_on(tmp_path):
+    killed_and_resumed(tmp_path, 20, 2, 0.1)
+
+
+@pytest.mark.slow
+def test_a_sweep_of_200_points_killed_ten_times(tmp_path):
+    killed_and_resumed(tmp_path, 200, 10, 0.1)
+
+
+DEADLY = """
+import os, signal
+from pathlib import Path
+
+def deadly(result, case):
+    if case.structure.sheet.thickness > 0.019:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1.0
+"""
+
+
+def test_a_point_that_ends_its_process_does_not_stop_the_rest(tmp_path):
+    (tmp_path / "case.toml").write_text(MODES)
+    (tmp_path / "mine.py").write_text(DEADLY)
+    command = ("sweep", "case.toml", "--vary", "sheet.thickness=0.005:0.02:6")
+    one = start(tmp_path, *command, "--measure", "mine.py:deadly", "--processes", "2")
+    out, err = one.communicate(timeout=240)
+    assert one.returncode == 0, err
+    assert "1 of 6 points failed" in out
+    found = fd.load(tmp_path / "case-sweep" / "sweep.nc")
+    np.testing.assert_array_equal(found["deadly"], [1.0, 1.0, 1.0, 1.0, 1.0, np.nan])
+    assert "ended from outside" in str(found["failure"].values[-1])
+    assert len(kept(tmp_path / "case-sweep" / "points")) == 5  # it is tried again next time

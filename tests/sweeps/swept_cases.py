@@ -1,0 +1,76 @@
+"""Case files of each kind of analysis that take milliseconds, to be swept."""
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+
+from numba.core.dispatcher import Dispatcher
+
+from case_texts import FOLD_TEXT, HELD_MIURA_TEXT
+
+MODES = HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 4\n'
+DAMPED = HELD_MIURA_TEXT + "[damping]\nalpha = 0.2\n"
+FRF = (
+    DAMPED
+    + """[[drive]]
+nodes = [8]
+force = [0, 0, 1]
+[analysis]
+kind = "frf"
+frequencies = { first = 0.1, last = 3, count = 291 }
+"""
+)
+MOTION = (
+    DAMPED
+    + """[[loads]]
+nodes = [8]
+force = [0, 0, 1e-4]
+history = { kind = "pulse", duration = 0.1 }
+[analysis]
+kind = "dynamics"
+duration = 40.0
+dt = 0.02
+method = "newmark"
+[output]
+every = 0.02
+"""
+)
+PATH = (
+    FOLD_TEXT
+    + """[model]
+bend_law = "linear"
+fold_law = "linear"
+[[supports]]
+nodes = [4, 5]
+[[supports]]
+nodes = [0, 1]
+axes = "z"
+[[loads]]
+nodes = [0, 1]
+force = [-1e-3, 0, 0]
+[analysis]
+kind = "statics"
+steps = 4
+"""
+)
+
+
+def slow_measure(result, case) -> float:
+    """A frequency, after a while."""
+    time.sleep(0.1)
+    return float(result["frequency"][0])
+
+
+def compiled_here(result, case) -> list[float]:
+    """The process, and how many kernels it has compiled instead of loading them."""
+    found = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+    return [os.getpid(), sum(sum(one.stats.cache_misses.values()) for one in found)]
+
+
+def fails_sometimes(result, case) -> float:
+    """No number for some sheets."""
+    if case.structure.sheet.thickness > 0.015:
+        raise ZeroDivisionError("too thick")
+    return 1.0

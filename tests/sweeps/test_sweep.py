@@ -1,0 +1,255 @@
+"""Sweeps: what they compute, keep, refuse and record."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from swept_cases import FRF, MODES, PATH, compiled_here, fails_sometimes
+
+import foldyn as fd
+from foldyn.analyses.keys import replaced
+from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.errors import InputError
+from foldyn.sweeps import Measure, job
+
+VARY = {"pattern.dihedral": "60:120:3", "sheet.length_scale_ratio": [1, 5]}
+
+
+@pytest.fixture
+def case(tmp_path) -> Path:
+    path = tmp_path / "case.toml"
+    path.write_text(MODES)
+    return path
+
+
+def of(case: Path, measures=("frequencies",), vary=None, **how):
+    return fd.sweep(case, vary or VARY, list(measures), **{"processes": 1, **how})
+
+
+def frequency(result, case):
+    return result["frequency"].values[0]
+
+
+def test_every_point_is_the_case_file_with_its_values(case):
+    found = of(case, ["frequencies", "frequency[2]"])
+    assert found["frequencies"].dims == ("dihedral", "length_scale_ratio", "mode")
+    assert found["frequencies"].shape == (3, 2, 4)
+    document = read_document(case)
+    for dihedral in (60, 90, 120):
+        for ratio in (1, 5):
+            changes = {"pattern.dihedral": dihedral, "sheet.length_scale_ratio": ratio}
+            alone = case_of_document(case, replaced(document, changes)).run()
+            here = found.sel(dihedral=dihedral, length_scale_ratio=ratio)
+            np.testing.assert_array_equal(here["frequencies"], alone["frequency"])
+            assert float(here["frequency_2"]) == float(alone["frequency"][1])
+    assert (found["failure"] == "").all()
+    assert found["dihedral"].attrs["key"] == "pattern.dihedral"
+
+
+def test_the_result_is_saved_and_carries_its_case_and_its_sweep(case, tmp_path):
+    found = of(case)
+    fd.save(found, tmp_path / "sweep.nc")
+    again = fd.load(tmp_path / "sweep.nc")
+    assert again.identical(found)
+    assert len(fd.case_of(again).structure.nodes) == len(fd.read_case(case).case().structure.nodes)
+    (tmp_path / "again.toml").write_text(str(again["case_file"].values))
+    repeated = fd.sweep(tmp_path / "again.toml", processes=1)
+    np.testing.assert_array_equal(repeated["frequencies"], found["frequencies"])
+
+
+def test_processes_give_the_same_and_do_not_compile(case):
+    alone = of(case)
+    found = of(case, ["frequencies", compiled_here], processes=2)
+    np.testing.assert_array_equal(found["frequencies"], alone["frequencies"])
+    process, compiled = found["compiled_here"].values.reshape(-1, 2).T
+    others = process != os.getpid()  # the first point is computed here
+    assert others.sum() == 5
+    assert (compiled[others] == 0).all()
+
+
+def test_the_table_in_the_file(case):
+    table = '[sweep]\nmeasures = ["frequencies"]\n[sweep.vary]\n"sheet.thickness" = "0.01:0.02:3"\n'
+    case.write_text(MODES + table)
+    found = fd.sweep(case, processes=1)
+    assert found["frequencies"].dims == ("thickness", "mode")
+    assert found["thickness"].attrs["units"] == "m"
+    other = fd.sweep(case, measures=["frequency[1]"], processes=1)
+    np.testing.assert_array_equal(other["frequency_1"], found["frequencies"][:, 0])
+    drawn = case.read_text().replace('"0.01:0.02:3"', '"0.01:0.02"').replace(
+        "[sweep]\n", '[sweep]\nsamples = 4\nmethod = "sobol"\n'
+    )  # fmt: skip
+    case.write_text(drawn)
+    found = fd.sweep(case, samples=2, seed=1, processes=1)
+    assert found["frequencies"].dims == ("point", "mode")
+    assert (found.attrs["samples"], found.attrs["seed"], found.attrs["method"]) == (2, 1, "sobol")
+    assert fd.read_case(case).run()["frequency"].size == 4  # any other command leaves it alone
+
+
+def test_mass_rules_of_the_file_are_an_axis(case):
+    case.write_text(MODES + '[model]\nmass = ["panel", "centroid"]\n')
+    found = of(case, vary={"sheet.thickness": [0.01]})
+    assert found["mass"].values.tolist() == ["panel", "centroid"]
+    results = [fd.read_case(case).run(rule)["frequency"].values for rule in ("panel", "centroid")]
+    np.testing.assert_array_equal(found["frequencies"][0], results)
+    with pytest.raises(InputError, match=r"model\.mass lists 2 rules"):
+        of(case, vary={"sheet.thickness": "0.01:0.02"}, samples=4)
+    chosen = of(case, vary={"sheet.thickness": "0.01:0.02", "model.mass": ["panel"]}, samples=4)
+    assert chosen["mass"].values.tolist() == ["panel"] * 4
+
+
+def test_ties_follow(case):
+    law = '[model]\nfold_law = { kind = "enhanced", theta1 = 45, theta2 = 315 }\n'
+    case.write_text(MODES + law)
+    ties = {"model.fold_law.theta2": "360 - model.fold_law.theta1"}
+    tied = of(case, vary={"model.fold_law.theta1": [30, 100]}, ties=ties)
+    free = of(case, vary={"model.fold_law.theta1": [30, 100]})
+    np.testing.assert_array_equal(tied["frequencies"][0], free["frequencies"][0])
+    assert (tied["frequencies"][1] != free["frequencies"][1]).any()  # mountains lock, too
+
+
+def test_names_stay_apart(case):
+    case.write_text(FRF)
+    vary = {"drive[0].force[2]": [1, 2], "damping.alpha": [0.2], "damping.beta": [0.0]}
+    found = of(case, ["peak_frequency[8]", "peak_height[8,z]"], vary)
+    assert set(found.dims) >= {"force_2", "alpha", "beta"}
+    assert set(found["peak_frequency_8"].dims) == {"force_2", "alpha", "beta"}
+    ratio = found["peak_height_8_z"].values.ravel()
+    assert ratio[0] == pytest.approx(ratio[1], rel=1e-12)  # of a receptance
+
+
+def test_points_that_fail_are_recorded_and_the_others_computed(case):
+    found = of(case, vary={"pattern.dihedral": [90, 500, 120]})
+    failed = found["failure"].values
+    assert failed[0] == failed[2] == ""
+    assert "dihedral = 500" in failed[1]
+    assert str(case) not in failed[1]
+    assert found.attrs["failed"] == 1
+    assert np.isnan(found["frequencies"][1]).all() and np.isfinite(found["frequencies"][::2]).all()
+
+
+def test_a_users_function_that_fails_is_recorded_with_its_error(case):
+    found = of(case, [fails_sometimes], {"sheet.thickness": [0.01, 0.02]})
+    np.testing.assert_array_equal(found["fails_sometimes"], [1.0, np.nan])
+    assert "fails_sometimes: ZeroDivisionError: too thick" in str(found["failure"].values[1])
+
+
+def test_ones_own_measures(case):
+    def shape(result, case):
+        return result["shape"].values[0]
+
+    def count(result, case):
+        return {1}
+
+    mine = Measure("lowest", ("modes",), frequency, "Hz", "lowest frequency")
+    found = fd.sweep(case, {"sheet.thickness": [0.01]}, [mine, shape], processes=1)
+    assert found["lowest"].attrs["units"] == "Hz"
+    assert found["shape"].dims == ("thickness", "shape_0", "shape_1")
+    named = fd.sweep(case, {"sheet.thickness": [0.01]}, {"tip": shape, "n": count}, processes=1)
+    assert "no number or array" in str(named["failure"].values[0])
+    with pytest.raises(InputError, match=r"shape cannot be sent to other proc.* top of a mod"):
+        fd.sweep(case, {"sheet.thickness": [0.01, 0.02]}, [shape], processes=2)
+
+
+def kept(folder: Path) -> dict[str, tuple[int, int]]:
+    return {one.name: (one.stat().st_ino, one.stat().st_mtime_ns) for one in folder.iterdir()}
+
+
+def test_what_is_kept_is_not_computed_again(case, tmp_path):
+    folder = tmp_path / "points"
+    first = of(case, folder=folder)
+    before, told = kept(folder), []
+    assert len(before) == 6
+    again = of(case, folder=folder, progress=told.append)
+    assert kept(folder) == before
+    np.testing.assert_array_equal(again["frequencies"], first["frequencies"])
+    np.testing.assert_array_equal(again["seconds"], first["seconds"])
+    assert (told[-1].done, told[-1].found, told[-1].total) == (6, 6, 6)
+    wider = {**VARY, "pattern.dihedral": "60:150:4"}  # six of its eight points are there
+    of(case, vary=wider, folder=folder, progress=told.append)
+    assert told[-1].found == 6 and told[-1].done == 8
+    victim = sorted(folder.iterdir())[0]
+    victim.write_bytes(victim.read_bytes()[:-20] + bytes(20))  # damaged: computed again
+    mended = of(case, folder=folder, progress=told.append)
+    np.testing.assert_array_equal(mended["frequencies"], first["frequencies"])
+
+
+@pytest.mark.parametrize(
+    "changed", [MODES.replace("0.25", "0.3"), MODES.replace("count = 4", "count = 3")]
+)
+def test_another_case_is_computed_anew(case, tmp_path, changed):
+    of(case, folder=tmp_path / "points")
+    case.write_text(changed)
+    told = []
+    of(case, folder=tmp_path / "points", progress=told.append)
+    assert told[-1].found == 0
+    case.write_text('title = "the same"\n' + changed)
+    of(case, folder=tmp_path / "points", progress=told.append)
+    assert told[-1].found == 6
+
+
+def test_a_file_that_the_case_names_counts_with_its_content(case, tmp_path):
+    fd.write_pattern(tmp_path / "a.fold", fd.patterns.miura(dihedral=60))
+    start = MODES.index("[sheet]")
+    case.write_text('[pattern]\nfile = "a.fold"\n' + MODES[start:])
+    thickness, told = {"sheet.thickness": [0.01, 0.02]}, []
+    first = of(case, vary=thickness, folder=tmp_path / "points")
+    fd.write_pattern(tmp_path / "a.fold", fd.patterns.miura(dihedral=100))
+    job._digest.cache_clear()  # of one sweep to the next, as a new process has it
+    other = of(case, vary=thickness, folder=tmp_path / "points", progress=told.append)
+    assert told[-1].found == 0
+    assert (first["frequencies"] != other["frequencies"]).any()
+
+
+def test_shapes_of_different_lengths_stand_in_one_table(case):
+    case.write_text(MODES)
+    found = of(case, ["frequencies"], {"analysis.count": [2, 3]})
+    assert found["frequencies"].shape == (2, 3)
+    np.testing.assert_array_equal(found["frequencies"][0, :2], found["frequencies"][1, :2])
+    assert np.isnan(found["frequencies"][0, 2])
+
+
+REFUSED = [
+    ({"shet.thickness": [1]}, ["frequencies"], {}, "did you mean 'sheet'?"),
+    ({"sheet.thicknes": [1]}, ["frequencies"], {}, "did you mean 'thickness'?"),
+    ({"pattern.dihedrl": [90]}, ["frequencies"], {}, "did you mean 'dihedral'?"),
+    ({"sheet.thickness": [0.01, -1]}, ["frequencies"], {}, "sheet.thickness = -1"),
+    ({"sheet.thickness": "0.01:-1"}, ["frequencies"], {"samples": 4}, "sheet.thickness = -1"),
+    ({"analysis.count": "1:5"}, ["frequencies"], {"samples": 4}, "must be a whole number"),
+    ({"loads[0].force[2]": [1]}, ["frequencies"], {}, "loads"),
+    ({"title": ["a", "b"]}, ["frequencies"], {}, "title changes no result"),
+    (VARY, ["frequncies"], {}, "did you mean 'frequencies'?"),
+    (VARY, ["peak_frequency[8]"], {}, 'is for analysis.kind = "frf" or "dynamics"'),
+    (VARY, ["frequency"], {}, "write frequency[mode]"),
+    (VARY, ["frequency[0]"], {}, "give a number from 1 on"),
+    (VARY, ["frequencies", "frequencies"], {}, "asked for twice"),
+    (VARY, [], {}, "measures: none"),
+    (VARY, [lambda result, case: 1.0], {}, "without a name"),
+    (VARY, ["frequencies"], {"method": "sobol"}, "method: is of samples"),
+    ({"sheet.thickness": "1:2"}, ["frequencies"], {"samples": 4, "method": "sobl"}, "'sobol'"),
+    (VARY, ["frequencies"], {"ties": {"sheet.density": "2 * sheet.thickness"}}, "no parameter"),
+    (VARY, ["frequencies"], {"ties": {"pattern.dihedral": "3"}}, "named twice"),
+    (VARY, ["frequencies"], {"processes": 0}, "processes = 0"),
+    ({}, ["frequencies"], {}, "names nothing"),
+]
+
+
+@pytest.mark.parametrize(("vary", "measures", "how", "message"), REFUSED)
+def test_bad_input_is_refused_before_anything_runs(case, tmp_path, vary, measures, how, message):
+    with pytest.raises(InputError) as caught:
+        fd.sweep(case, vary, measures, **{"folder": tmp_path / "points", **how})
+    assert message in str(caught.value)
+    assert not (tmp_path / "points").exists()
+
+
+def test_nothing_to_vary_is_said(case):
+    with pytest.raises(InputError, match=r"vary: missing; .* table \[sweep\]"):
+        fd.sweep(case)
+
+
+def test_a_mechanism_is_told_at_its_points(case):
+    case.write_text(PATH.replace("[[supports]]\nnodes = [4, 5]\n", ""))
+    found = fd.sweep(case, {"sheet.thickness": [0.01]}, ["largest_load"], processes=1)
+    assert "can move freely" in str(found["failure"].values[0])
