@@ -57,8 +57,8 @@ def info() -> str:
         f"optional part for camera tracking: OpenCV, {camera}",
         f"optional part for pattern files in DXF: {drawings}",
         *(
-            f"optional solver for large structures: {name}, "
-            f"{'found' if solver.present else f'missing: pip install {solver.module}'}"
+            f"linear solver from {solver.worthwhile:,} directions: {name}, "
+            f"{'found' if solver.found() else f'missing: pip install {solver.package}'}"
             for name, solver in SOLVERS.items()
             if solver.worthwhile > 0
         ),
