@@ -61,7 +61,7 @@ def main() -> None:
     options = parser.parse_args()
     case, divisions, dt = options.case, options.divisions, options.dt
     print("\n".join(f"- {line}" for line in machine.describe(None)))
-    print(f"- opensees {machine.version('opensees')}, pypardiso {machine.version('pypardiso')}")
+    print(f"- opensees {machine.version('opensees')}, mkl {machine.version('mkl')}")
     compare.our_motion(case, 2, 0.01)  # loads what is compiled
 
     theirs = f"OpenSees, {divisions} divisions"

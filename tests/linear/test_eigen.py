@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import numpy as np
 import pytest
 from scipy import sparse
 
 from foldyn.algebra import eigen
 from foldyn.algebra.eigen import Pencil
+from foldyn.algebra.solvers import SOLVERS
 from foldyn.errors import ComputationError, InputError
 
 N = 150
-SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(
-    find_spec("pypardiso") is None, reason="pypardiso is not installed"))]  # fmt: skip
+PRESENT = [name for name, backend in SOLVERS.items() if backend.found()]
 NOTHING = np.zeros((N, 0))
 
 
@@ -42,7 +40,7 @@ def always_sparse(monkeypatch):
     monkeypatch.setattr(eigen, "DENSE", 10)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", PRESENT)
 def test_a_chain(solver):
     stiffness, mass, values = chain()
     found = eigen.lowest(Pencil(stiffness, mass, solver), 12, NOTHING)
@@ -85,7 +83,7 @@ def test_a_singular_stiffness_without_known_modes():
     np.testing.assert_allclose(found.values[1:], values[1:5], rtol=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", PRESENT)
 @pytest.mark.parametrize("below", [0.5, 1.5, 30.5])
 def test_unstable_modes_are_found_whatever_their_number(below, solver):
     stiffness, mass, values = chain()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib import import_module
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from scipy.linalg import eigh
 
 import foldyn as fd
 from foldyn.algebra import eigen
+from foldyn.algebra.solvers import SOLVERS
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import linearize, modes
 
@@ -57,7 +57,7 @@ def test_the_specimen_against_a_dense_solver():
             .diagonal() > 1 - 1e-9).all()  # fmt: skip
 
 
-@pytest.mark.skipif(find_spec("pypardiso") is None, reason="pypardiso is not installed")
+@pytest.mark.skipif(not SOLVERS["pardiso"].found(), reason="mkl is not installed")
 def test_backends_agree():
     case = paper_specimen()
     one, other = (modes(case, 8, secant=1.0, solver=name) for name in ("superlu", "pardiso"))

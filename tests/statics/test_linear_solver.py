@@ -7,13 +7,14 @@ import pytest
 from scipy import sparse
 from sheets import compression
 
+from foldyn.algebra import pardiso
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.errors import InputError
 from foldyn.statics import SOLVERS, OrigamiProblem, Settings, Solver, trace
 
-PRESENT = [name for name, backend in SOLVERS.items() if backend.present]
+PRESENT = [name for name, backend in SOLVERS.items() if backend.found()]
 
 
 def symmetric(size, negative, seed=0):
@@ -31,7 +32,7 @@ def symmetric(size, negative, seed=0):
 @pytest.mark.parametrize("negative", [0, 1, 7, 100])
 def test_solution_and_count(name, negative):
     matrix = symmetric(200, negative)
-    factors = SOLVERS[name].factorize(matrix)
+    factors = SOLVERS[name].make()(matrix)
     b = np.random.default_rng(1).standard_normal(200)
     np.testing.assert_allclose(matrix @ factors.solve(b), b, atol=1e-8)
     assert factors.negative() == negative
@@ -42,16 +43,81 @@ def test_solution_and_count(name, negative):
 def test_a_zero_on_the_diagonal(name):
     """Its pivot has to leave the diagonal; the count still holds."""
     matrix = sparse.csc_array(np.array([[0.0, 2.0, 0.0], [2.0, 0.0, 1.0], [0.0, 1.0, 3.0]]))
-    factors = SOLVERS[name].factorize(matrix)
+    factors = SOLVERS[name].make()(matrix)
     assert factors.negative() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum() == 1
     np.testing.assert_allclose(matrix @ factors.solve(np.ones(3)), np.ones(3), atol=1e-12)
 
 
-def test_singular_and_not_finite():
-    with pytest.raises(SingularTangentError, match="singular"):
-        SuperLU(sparse.csc_array(np.diag([1.0, 0.0, 2.0])))
+@pytest.mark.parametrize("name", PRESENT)
+def test_singular_and_not_finite(name):
+    factorize = SOLVERS[name].make()
+    for singular in (np.diag([1.0, 0.0, 2.0]), np.ones((2, 2))):
+        with pytest.raises(SingularTangentError, match="singular"):
+            factorize(sparse.csc_array(singular))
     with pytest.raises(SingularTangentError, match="not finite"):
-        SuperLU(sparse.csc_array(np.diag([1.0, np.nan])))
+        factorize(sparse.csc_array(np.diag([1.0, np.nan])))
+
+
+@pytest.mark.parametrize("name", PRESENT)
+def test_several_sides_at_once(name):
+    matrix, sides = symmetric(200, 3), np.random.default_rng(1).standard_normal((200, 5))
+    found = SOLVERS[name].make()(matrix).solve(sides)
+    assert found.shape == sides.shape
+    np.testing.assert_allclose(matrix @ found, sides, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", PRESENT)
+def test_factors_keep_their_matrix(name):
+    """One factorizer, matrices of one pattern and of another: each of the factors is its own's."""
+    factorize, b = SOLVERS[name].make(), np.ones(200)
+    one, other = symmetric(200, 3), symmetric(200, 8, seed=1)
+    matrices = [one, 2.0 * one, one - 0.1 * sparse.eye_array(200, format="csc"), other, one]
+    living = [factorize(sparse.csc_array(matrix)) for matrix in matrices]
+    del living[1], matrices[1]  # its memory serves the next
+    matrices.append(3.0 * one)
+    living.append(factorize(matrices[-1]))
+    for matrix, factors in zip(matrices, living, strict=True):
+        np.testing.assert_allclose(matrix @ factors.solve(b), b, atol=1e-8)
+        assert factors.negative() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum()
+
+
+@pytest.mark.skipif("pardiso" not in PRESENT, reason="mkl is not installed")
+def test_a_pattern_is_ordered_once(monkeypatch):
+    """Factors that follow each other take the order of the first; two at a time need two."""
+    phases, real = [], pardiso._call
+
+    def call(phase, *arguments):
+        phases.append(phase)
+        return real(phase, *arguments)
+
+    monkeypatch.setattr(pardiso, "_call", call)
+    factorize, matrix = pardiso.Pardiso(), symmetric(200, 0)
+    first = factorize(matrix)
+    for factor in (2.0, 3.0):
+        del first
+        first = factorize(factor * matrix)
+    assert (phases.count(pardiso.ANALYSIS), phases.count(pardiso.NUMERIC)) == (1, 3)
+    second = factorize(4.0 * matrix)
+    assert phases.count(pardiso.ANALYSIS) == 2
+    np.testing.assert_allclose(first.solve(np.ones(200)), 4.0 / 3.0 * second.solve(np.ones(200)))
+    factorize(symmetric(200, 0, seed=1))
+    assert phases.count(pardiso.ANALYSIS) == 3
+
+
+@pytest.mark.skipif("pardiso" not in PRESENT, reason="mkl is not installed")
+def test_the_same_bits_again():
+    matrix, b = symmetric(3000, 0), np.ones(3000)
+    found = [pardiso.Pardiso()(matrix).solve(b) for _ in range(3)]
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_a_library_that_is_not_there(monkeypatch):
+    """Nothing but SuperLU is taken then, and the message says what to install."""
+    monkeypatch.setitem(SOLVERS, "pardiso", SOLVERS["pardiso"]._replace(found=lambda: False))
+    assert factorizer("auto", 10**6)[0] == "superlu"
+    with pytest.raises(InputError, match="needs the package mkl"):
+        factorizer("pardiso", 10)
 
 
 def test_reduction_follows_the_pattern():
@@ -68,12 +134,6 @@ def test_choice_of_the_backend():
     assert factorizer("superlu", 10**6)[0] == "superlu"
     best = [name for name in PRESENT if SOLVERS[name].worthwhile <= 10**6][-1]
     assert factorizer("auto", 10**6)[0] == best
-
-
-@pytest.mark.parametrize("name", [name for name in SOLVERS if name not in PRESENT])
-def test_backend_that_is_not_installed(name):
-    with pytest.raises(InputError, match="is not installed"):
-        factorizer(name, 10)
 
 
 @pytest.mark.parametrize("name", PRESENT)

@@ -1,50 +1,177 @@
-"""Factorization by Intel MKL's PARDISO (package pypardiso), for large structures.
+"""Factorization by PARDISO of Intel's Math Kernel Library, for large structures.
 
-The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows. PARDISO counts
-the eigenvalues by sign but keeps its pivots to itself: critical points are then located by
-bisection on the count.
+The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows: as quick as the
+factorization of a definite one, and it counts the eigenvalues by sign. Pivots stay within blocks of
+the diagonal (Bunch and Kaufman), so the count alone is known: critical points are then located by
+bisection on it.
+
+Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
+belong to the places of the entries: as long as these stay, they are done once, for factors that
+live at the same time once more each. Parameters are those of `iparm` in the Developer Reference of
+oneMKL, counted from 0.
 """
 
 from __future__ import annotations
 
+import ctypes
 import weakref
-from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.mkl import library, threads
 from foldyn.algebra.superlu import SingularTangentError
+from foldyn.errors import ComputationError
 
 SYMMETRIC_INDEFINITE = -2
-NEGATIVE = 23  # number of the entry of iparm with the count of negative eigenvalues
+ANALYSIS, NUMERIC, SOLVE, RELEASE = 11, 22, 33, -1
+OWN_VALUES, ORDERING, PERTURBATION, REPLACED, NEGATIVE, REPRODUCIBLE = 0, 1, 9, 13, 22, 33
+NESTED_DISSECTION = 2
+SMALL = 16  # pivots below 10^-16 of the matrix are replaced: they are zero to rounding
+NO_MEMORY = {-2, -9}
+_NONE = np.zeros(1)
+
+
+class _Pattern:
+    """Places of entries of a symmetric matrix, and its upper triangle as PARDISO takes it."""
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        self._indptr, self._indices = matrix.indptr, matrix.indices
+        size, count = matrix.shape[0], len(matrix.indices)
+        # by rows: a symmetric matrix by columns, read by rows, is the same
+        row = np.repeat(np.arange(size), np.diff(matrix.indptr))
+        kept = np.flatnonzero(matrix.indices >= row)
+        # the diagonal must be there: where it is not, an entry behind the others, of zero
+        there = np.zeros(size, bool)
+        there[row[matrix.indices == row]] = True
+        none = np.flatnonzero(~there)
+        row = np.r_[row[kept], none]
+        column = np.r_[matrix.indices[kept], none]
+        take = np.r_[kept, np.full(len(none), count)]
+        if len(none) or not matrix.has_sorted_indices:
+            order = np.lexsort((column, row))
+            row, column, take = row[order], column[order], take[order]
+        self._take, self._pad, self.size = take, len(none) > 0, size
+        self.first = np.searchsorted(row, np.arange(size + 1)).astype(np.int32) + np.int32(1)
+        self.column = column.astype(np.int32) + np.int32(1)
+
+    def values(self, matrix: sparse.csc_array) -> NDArray:
+        """Entries of the upper triangle."""
+        data = np.r_[matrix.data, 0.0] if self._pad else matrix.data
+        return data[self._take].astype(float, copy=False)
+
+    def fits(self, matrix: sparse.csc_array) -> bool:
+        """Whether the entries of a matrix are at these places."""
+        pairs = (matrix.indptr, self._indptr), (matrix.indices, self._indices)
+        return all(one is other or np.array_equal(one, other) for one, other in pairs)
+
+
+class _Memory:
+    """Memory of PARDISO for one matrix at a time, with what it knows of a pattern."""
+
+    def __init__(self, pattern: _Pattern) -> None:
+        self.pattern = pattern
+        self._handle, self.parameters = np.zeros(64, np.int64), np.zeros(64, np.int32)
+        self.parameters[OWN_VALUES] = 1
+        self.parameters[ORDERING] = NESTED_DISSECTION
+        self.parameters[PERTURBATION] = SMALL
+        self.parameters[REPRODUCIBLE] = threads()
+        end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
+        end.atexit = False  # the process gives all memory back
+
+    def call(self, phase: int, values: NDArray, b: NDArray = _NONE, x: NDArray = _NONE) -> None:
+        """One phase of a solution."""
+        error = _call(phase, self._handle, self.parameters, self.pattern, values, b, x)
+        if error in NO_MEMORY:
+            raise ComputationError(
+                f"PARDISO finds no memory for the factors of {self.pattern.size} directions: take "
+                "fewer panels, or a machine with more memory"
+            )
+        if error:
+            raise SingularTangentError(f"PARDISO cannot factorize the tangent (error {error})")
 
 
 class Pardiso:
-    """Factorization by PARDISO."""
+    """Factorizes symmetric matrices; what belongs to the places of their entries it keeps."""
 
-    def __init__(self, matrix: sparse.csc_array) -> None:
+    def __init__(self) -> None:
+        self._spare: list[_Memory] = []
+        self._pattern: _Pattern | None = None
+
+    def __call__(self, matrix: sparse.csc_array) -> PardisoFactors:
+        """Factorize a matrix (n, n).
+
+        Raises
+        ------
+        SingularTangentError
+            It is singular or not finite.
+        ComputationError
+            There is no memory for its factors.
+        """
         if not np.isfinite(matrix.data).all():
             raise SingularTangentError("the tangent is not finite")
-        # by rows: a symmetric matrix by columns, read by rows, is the same
-        rows = sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._upper = sparse.triu(rows, format="csr")
-        self._upper.sort_indices()
-        self._solver = import_module("pypardiso").PyPardisoSolver(mtype=SYMMETRIC_INDEFINITE)
-        weakref.finalize(self, self._solver.free_memory, everything=True)
-        try:
-            self._solver.factorize(self._upper)
-        except Exception as error:  # its own class, raised for zero pivots and for lack of memory
-            raise SingularTangentError(f"PARDISO cannot factorize the tangent: {error}") from error
+        if self._pattern is None or not self._pattern.fits(matrix):
+            self._pattern, self._spare = _Pattern(matrix), []
+        values = self._pattern.values(matrix)
+        if self._spare:
+            memory = self._spare.pop()
+        else:
+            memory = _Memory(self._pattern)
+            memory.call(ANALYSIS, values)
+        memory.call(NUMERIC, values)
+        if memory.parameters[REPLACED]:
+            raise SingularTangentError("the tangent is singular")
+        factors = PardisoFactors(memory, values)
+        weakref.finalize(factors, _hand_back, self._spare, memory).atexit = False
+        return factors
+
+
+class PardisoFactors:
+    """Factors by PARDISO; their memory is used again when they are no more."""
+
+    def __init__(self, memory: _Memory, values: NDArray) -> None:
+        self._memory, self._values = memory, values
+        self._negative = int(memory.parameters[NEGATIVE])
 
     def solve(self, b: NDArray) -> NDArray:
-        """Solution x of A x = b."""
-        return np.asarray(self._solver.solve(self._upper, b)).reshape(b.shape)
+        """Solution x of A x = b, (n,) or (n, k)."""
+        b = np.asarray(b, float, order="F")
+        x = np.empty_like(b)
+        self._memory.call(SOLVE, self._values, b, x)
+        return x
 
     def pivots(self) -> None:
-        """None: PARDISO does not show its pivots."""
+        """None: those that were combined do not show."""
         return
 
     def negative(self) -> int:
         """Count of negative eigenvalues."""
-        return int(self._solver.get_iparm(NEGATIVE))
+        return self._negative
+
+
+def _hand_back(spare: list[_Memory], memory: _Memory) -> None:
+    """Keep the memory of factors that are no more for the next ones."""
+    if not spare:
+        spare.append(memory)
+
+
+def _call(
+    phase: int, handle: NDArray, parameters: NDArray, pattern: _Pattern, values: NDArray,
+    b: NDArray = _NONE, x: NDArray = _NONE,
+) -> int:  # fmt: skip
+    """Call PARDISO; returns its error, 0 for none."""
+    error = ctypes.c_int32(0)
+    whole = [ctypes.c_int32(value) for value in (1, 1, SYMMETRIC_INDEFINITE, phase, pattern.size)]
+    none, sides, quiet = np.zeros(1, np.int32), ctypes.c_int32(b[0].size), ctypes.c_int32(0)
+    arguments: list[Any] = [handle, *whole, values, pattern.first, pattern.column, none, sides]
+    arguments += [parameters, quiet, b, x, error]
+    library().pardiso(*map(_reference, arguments))
+    return error.value
+
+
+def _reference(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.ctypes.data_as(ctypes.c_void_p)
+    return ctypes.byref(value)

@@ -3,60 +3,68 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from importlib.util import find_spec
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from scipy import sparse
+
+from foldyn.algebra.mkl import library
 from foldyn.algebra.pardiso import Pardiso
-from foldyn.algebra.superlu import Factorizer, SuperLU
+from foldyn.algebra.superlu import Factorization, Factorizer, SuperLU
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
 
 
 class Backend(NamedTuple):
-    """A factorizer, the module that it needs, and the rows from which it is worth its overhead."""
+    """A linear solver of symmetric matrices."""
 
-    factorize: Factorizer
-    module: str
-    worthwhile: int
-
-    @property
-    def present(self) -> bool:
-        """Whether its module is installed."""
-        return find_spec(self.module) is not None
+    make: Callable[[], Factorizer]  # for matrices one after the other, best of the same pattern
+    package: str  # that it comes with
+    found: Callable[[], bool]  # whether that is installed
+    worthwhile: int  # rows from which it is worth its overhead
+    band: float  # products of a band's factorization up to which that is quicker
+    memory: float  # of its factors, as a share of SuperLU's
 
 
 SOLVERS: Mapping[str, Backend] = {
-    "superlu": Backend(SuperLU, "scipy", 0),
-    "pardiso": Backend(Pardiso, "pypardiso", 10_000),
+    "superlu": Backend(lambda: SuperLU, "scipy", lambda: True, 0, 8e9, 1.0),
+    "pardiso": Backend(Pardiso, "mkl", lambda: library() is not None, 3_000, 2e9, 0.3),
 }
 
 
 def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
-    """Name and function of a backend for matrices of so many rows.
+    """Name of a backend, and what factorizes matrices of so many rows.
 
     "auto" is the last of `SOLVERS` that is installed and worthwhile for the size.
     """
     if name == "auto":
-        fit = [key for key, item in SOLVERS.items() if size >= item.worthwhile and item.present]
+        fit = [key for key, item in SOLVERS.items() if size >= item.worthwhile and item.found()]
         name = fit[-1]
     if name not in SOLVERS:
         raise InputError(f"solver = {name!r}: choose 'auto' or one of {', '.join(SOLVERS)}")
-    if not SOLVERS[name].present:
+    if not SOLVERS[name].found():
         raise InputError(
-            f"solver = {name!r}: needs the package {SOLVERS[name].module}, which is not installed; "
-            "install it, or choose 'superlu'"
+            f"solver = {name!r}: needs the package {SOLVERS[name].package}, which is not "
+            "installed; install it, or choose 'superlu'"
         )
-    return name, SOLVERS[name].factorize
+    return name, SOLVERS[name].make()
 
 
-# products of a band's factorization (rows times width squared) above which a sparse one is quicker
-MOST_SYMMETRIC, MOST_UNSYMMETRIC = 8e9, 4e9
+def factorized(matrix: sparse.csc_array) -> Factorization:
+    """Factors of a symmetric matrix by the solver that "auto" takes."""
+    return factorizer("auto", matrix.shape[0])[1](matrix)
+
+
+MOST_UNSYMMETRIC = 4e9  # products of an unsymmetric band above which SuperLU is quicker
 
 
 def takes_band(size: int, width: int, symmetric: bool) -> bool:
-    """Whether a matrix of so many rows with all entries in a band is factorized as one."""
-    return float(size) * (width + 1) ** 2 <= (MOST_SYMMETRIC if symmetric else MOST_UNSYMMETRIC)
+    """Whether a matrix of so many rows with all entries in a band is factorized as one.
+
+    Its factorization takes products of the number of rows and the width squared.
+    """
+    most = SOLVERS[factorizer("auto", size)[0]].band if symmetric else MOST_UNSYMMETRIC
+    return float(size) * (width + 1) ** 2 <= most
 
 
 class Fill(NamedTuple):
@@ -71,6 +79,5 @@ class Fill(NamedTuple):
 def check_fill(fill: Fill, dofs: int) -> None:
     """Refuse a structure whose factors memory cannot hold."""
     needed = fill.per_doubling * dofs * max(math.log2(max(dofs, 1) / fill.least), 1.0)
-    if factorizer("auto", dofs)[0] == "pardiso":
-        needed *= 0.3  # 1.4 GiB instead of 3.5 for the modes of 240,600 dofs
+    needed *= SOLVERS[factorizer("auto", dofs)[0]].memory
     check_memory(fill.field, f"solving for {dofs} dofs", needed, fill.remedy)

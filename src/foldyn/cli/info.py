@@ -61,8 +61,8 @@ def info() -> str:
         f"optional part for pattern files in DXF: {drawings}",
         f"optional part for sweeps on clusters: Dask, {clusters}",
         *(
-            f"optional solver for large structures: {name}, "
-            f"{'found' if solver.present else f'missing: pip install {solver.module}'}"
+            f"linear solver from {solver.worthwhile:,} directions: {name}, "
+            f"{'found' if solver.found() else f'missing: pip install {solver.package}'}"
             for name, solver in SOLVERS.items()
             if solver.worthwhile > 0
         ),

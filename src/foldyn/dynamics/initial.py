@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.algebra.solvers import factorized
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.constraints import AGREES
 from foldyn.cases.ties import check_tied
@@ -147,7 +148,7 @@ def warn_of_unstable_damping(case: Case, u: NDArray) -> None:
     matrix = sparse.csc_array(whole[free][:, free])
     shift = ZERO * float(np.abs(matrix.diagonal()).max())  # rigid motions and slack bends: zero
     try:
-        factors = SuperLU(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
+        factors = factorized(sparse.csc_array(matrix + shift * sparse.eye_array(len(free))))
         negative = factors.negative()
     except SingularTangentError:
         return

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.superlu import SingularTangentError, SuperLU
+from foldyn.algebra.solvers import factorized
+from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.methods import METHODS, suited
@@ -122,7 +123,7 @@ def frequency(case: Case, u: NDArray, v: NDArray, duration: float) -> float:
     pairs, square = [(deforming.ravel()[free], moving.ravel()[free])], spin**2
     softest = (2.0 * math.pi / duration) ** 2
     try:
-        x = SuperLU(sparse.csc_array(k + softest * m)).solve(force[free])
+        x = factorized(sparse.csc_array(k + softest * m)).solve(force[free])
         pairs.append((x, x))
     except SingularTangentError:
         pass

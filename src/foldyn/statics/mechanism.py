@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.superlu import SuperLU
+from foldyn.algebra.solvers import factorized
+from foldyn.algebra.superlu import Factorization
 from foldyn.errors import InputError
 from foldyn.mechanics.body import Unstrained
 from foldyn.statics.origami import OrigamiProblem
@@ -88,7 +89,7 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     scaled = sparse.csc_array(matrix.multiply(scale[:, None]).multiply(scale[None, :]))
     size = len(free)
     shifted = sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc"))
-    factors = SuperLU(shifted)
+    factors = factorized(shifted)
     if _softest(factors, size) > SUSPICIOUS:
         return np.zeros((len(diagonal) + len(problem.held), 0))
     values, vectors = softest_modes(scaled, factors, MOST_MODES, dense=600, shift=-SHIFT)
@@ -100,7 +101,7 @@ def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     return np.linalg.qr(shapes[:, kept])[0] if kept else shapes[:, :0]
 
 
-def _softest(factors: SuperLU, size: int) -> float:
+def _softest(factors: Factorization, size: int) -> float:
     """Smallest eigenvalue, from above, by a few inverse iterations."""
     value, guess = np.inf, np.random.default_rng(0).standard_normal(size)
     for _ in range(INVERSE_ITERATIONS):

@@ -223,6 +223,7 @@ class Solver:
                 response = tangent.response(u, factor)
                 climb = rule(u - origin, step, response)
                 step = step + climb * response
+            del tangent  # its memory serves the next
             if not np.isfinite(step).all():
                 return Attempt(u, factor, iteration, reached, "no step meets the path")
             share = self._share(u, step)
