@@ -48,7 +48,7 @@ def compute():
     """The case, and its path until the layers are near and from there on, in finer steps."""
     case = press()
     near = 1.0 - (2.4 - END) * LAYERS * THICKNESS / (2.0 * case.contact.planes[0].motion[0])
-    closing = fd.trace(case, "displacement", load_factors=np.linspace(0.0, near, 20))
+    closing = fd.trace(case, "displacement", load_factors=np.linspace(0.0, near, 20).tolist())
     block = fd.trace(
         case, "arc_length", [near, 1.0], steps=300, first_step=(1.0 - near) / 40,
         initial=fd.initial_state(closing),
@@ -58,7 +58,8 @@ def compute():
 
 def curve(paths) -> tuple[np.ndarray, np.ndarray]:
     """Length of the sheet (m) and force of a plate (N) along the path."""
-    return tuple(np.concatenate(part) for part in zip(*map(_curve, paths), strict=True))
+    lengths, forces = zip(*map(_curve, paths), strict=True)
+    return np.concatenate(lengths), np.concatenate(forces)
 
 
 def _curve(path) -> tuple[np.ndarray, np.ndarray]:

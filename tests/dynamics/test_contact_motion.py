@@ -102,7 +102,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
 def test_the_tower_snaps_bounces_and_rests(force):
     pytest.importorskip("ipctk")
     case = tower(force, fd.Contact())
-    run = fd.simulate(case, 0.25, method="auto", every=1e-3)
+    run = fd.simulate(case, 0.25, method="auto", every=2e-4)  # fewer samples may miss its closing
     assert run.attrs["method"] == "dormand_prince"
     height = 0.06 + run.displacement.values[:, 6:12, 2].mean(axis=1)
     assert height.min() < 0.01  # it nearly closes

@@ -40,7 +40,7 @@ def test_nothing_crosses(seed):
     assert check(seed)
 
 
-@pytest.mark.slow  # an hour
+@pytest.mark.slow  # half an hour
 @pytest.mark.parametrize("half", [0, 1], ids=["explicit", "implicit"])
 def test_nothing_crosses_in_50_crumplings(half):
     pytest.importorskip("ipctk")

@@ -9,6 +9,9 @@ value. Where none of this leads to equilibrium the step is refused, and halved.
 Which nodes touch changes from one iteration to the next. The tangent of contact is a sparse matrix
 of its own, added to that of the structure before the factorization.
 
+Where nothing has touched, a step is first solved as if there were no contact, with a matrix that
+may serve several steps, and accepted if all stays apart on the straight way to its end.
+
 Friction takes the normal force of the end of the last step, so that within a step it has a
 potential. Anchors follow nodes that slip where a step is accepted, as in explicit methods.
 """
@@ -39,6 +42,7 @@ from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
+from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.tables import NORMAL, POINT
 
 MOST = 60  # iterations, many of which are cut
@@ -63,6 +67,7 @@ class TouchingNewton(Newton):
         self._free[matrix.free] = True
         self._moved = np.zeros((len(self._tables.planes), 3))  # of planes at the start of the step
         self._pushed = self._memory.friction.copy()  # and what they did to nodes there
+        self._touched = False
 
     @property
     def memory(self) -> Memory:
@@ -73,6 +78,7 @@ class TouchingNewton(Newton):
         """Take the state where forces were evaluated last for the start of the next step."""
         kept = self._memory
         self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
+        self._touched = float(kept.facts.energy) > 0.0
         slip(self._tables, kept.x, kept)
 
     def works(self) -> tuple[float, float]:
@@ -90,10 +96,13 @@ class TouchingNewton(Newton):
     def solve(self, h: float, t: float) -> int:
         """See `Newton`."""
         scheme, matrix = self.scheme, self.matrix
+        if not self._predict(t):
+            self._lasting = False
+            return NOT_CONVERGED
+        if not self._touched and self._passes_by(h, t):
+            return SOLVED
         self._lasting = False
         goal = Goal(scheme.tolerance, scheme.hinge_forces(), scheme.rounding)
-        if not self._predict(t):
-            return NOT_CONVERGED
         before, again, last = scheme.displacement().copy(), False, 0.0
         norm, reference = self._residual(h, t)
         for _ in range(MOST):
@@ -114,6 +123,20 @@ class TouchingNewton(Newton):
             last = norm
             norm, reference = self._along(h, t, step)
         return NOT_CONVERGED
+
+    def _passes_by(self, h: float, t: float) -> bool:
+        """Solve a step as if there were no contact; tells whether there has been none."""
+        scheme, kept, predicted = self.scheme, self._memory, self.scheme.shift.copy()
+        start, self.matrix.added = scheme.displacement().copy(), None
+        if super().solve(h, t) == SOLVED and float(kept.facts.energy) == 0.0:
+            end, moved = scheme.moved().copy(), kept.moved.copy()
+            share = self._start(start, end - start, moved[:, :3] - self._moved)
+            kept.moved[:] = moved
+            put_at(self._tables, end, kept)
+            if share == 1.0:
+                return True
+        scheme.shift[:] = predicted
+        return False
 
     def _residual(self, h: float, t: float) -> tuple[float, float]:
         self.evaluations += 1
