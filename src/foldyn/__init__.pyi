@@ -62,6 +62,7 @@ from foldyn.dynamics import (
     critical_step as critical_step,
     initial_state as initial_state,
     simulate as simulate,
+    simulate_many as simulate_many,
 )
 from foldyn.experiment import fit as fit
 from foldyn.exports import export as export

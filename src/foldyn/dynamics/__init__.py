@@ -1,6 +1,7 @@
 """Dynamics: integrators, critical step, energy audit, initial states."""
 
 from foldyn.dynamics.driver import prepare, simulate
+from foldyn.dynamics.ensemble import simulate_many
 from foldyn.dynamics.initial import initial_state
 from foldyn.dynamics.keeping import SECONDS, Keeping
 from foldyn.dynamics.methods import METHODS, compiled, critical_step
@@ -20,4 +21,5 @@ __all__ = [
     "largest_frequency",
     "prepare",
     "simulate",
+    "simulate_many",
 ]
