@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from foldyn.analyses.casefile import CaseFile, Output
 from foldyn.analyses.conversion import converted, flagged, remodeled
 from foldyn.analyses.messages import describe, dotted
+from foldyn.analyses.pattern_section import FACES, FACETS, HINGES, READING
 from foldyn.analyses.registry import ANALYSES, schema_of
-from foldyn.analyses.sections import FACES, FACETS, HINGES, READING
 from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL

@@ -9,12 +9,12 @@ sections. Validators raise InputError with a text that continues the key's path 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
+from foldyn.analyses.pattern_section import checked_pattern
 from foldyn.analyses.ranges import SAMPLINGS, varied
 from foldyn.analyses.ties import ties_of
 from foldyn.cases.contact import contact_from
@@ -27,32 +27,22 @@ from foldyn.cases.damping import (
     dampings,
     dampings_of,
 )
-from foldyn.cases.decode import check_keys, law_from
+from foldyn.cases.decode import law_from
 from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import load_from
 from foldyn.cases.masses import mass_from
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import check_nodes
 from foldyn.cases.supports import support_from
-from foldyn.errors import Faults, InputError, within
+from foldyn.errors import InputError, within
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
-from foldyn.patterns import GENERATORS
-from foldyn.patterns.facets import FACETS as KINDS_OF_FACETS
 from foldyn.plots import ANIMATIONS
 from foldyn.structures import PRESETS
 from foldyn.structures.creases import per_crease
 from foldyn.structures.rigid_plates import checked_panels
 from foldyn.structures.structure import CALIBRATIONS, SCHEMES
-from foldyn.values import MOST, choice, indices, nearest, number_or_list, numbers, show, vector
+from foldyn.values import MOST, choice, indices, number_or_list, numbers, show, vector
 
-HINGES, FACES = "hinge_offset", "faces"
-"""Key of [pattern] that makes its panels thick, and its word for hinges in their faces."""
-FACETS = "facets"
-"""Key of [pattern] for what lines assigned "F" are."""
-READING = ("scale", "unit", "frame", FACETS)
-"""Keys of [pattern] beside `file`: arguments of `read_pattern`."""
-INLINE = ("vertices", "faces", "assignments", "fold_angles", "families")
-"""Keys of [pattern] for a pattern that the case file holds."""
 MOST_SHAPES = 12
 """Deformed shapes or modes that one figure shows at most."""
 
@@ -91,91 +81,6 @@ def some_shapes(drawn: str, what: str, least: int = -MOST) -> PlainValidator:
         return chosen
 
     return PlainValidator(count_or_numbers)
-
-
-def _pattern(value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise InputError(f" = {show(value)}: must be a table, written [pattern]")
-    sources = [key for key in ("kind", "file", "vertices") if key in value]
-    if len(sources) > 1:
-        raise InputError(f": give only one of {' and '.join(sources)}")
-    if not sources:
-        if "faces" in value:
-            raise InputError(".vertices: missing; faces need vertices")
-        raise InputError(": give kind (a generator), file, or vertices and faces")
-    if "kind" in value:
-        _check_generator(value)
-    elif "file" in value:
-        check_keys(value, ["file", *READING, HINGES])
-        if not isinstance(value["file"], str) or not value["file"]:
-            raise InputError(f".file = {show(value['file'])}: must be the path of a pattern file")
-    else:
-        check_keys(value, [*INLINE, FACETS, HINGES])
-        if "faces" not in value:
-            raise InputError(".faces: missing; give the vertex numbers of every panel")
-        _inline(value)
-    if FACETS in value:
-        choice(f".{FACETS}", value[FACETS], KINDS_OF_FACETS)
-    if HINGES in value and value[HINGES] != FACES:
-        if isinstance(value[HINGES], str):
-            raise InputError(
-                f' = {show(value[HINGES])}: give "{FACES}", or heights in m, one, one per crease '
-                "or by name",
-                f".{HINGES}",
-            )
-        if not isinstance(value[HINGES], Mapping):
-            number_or_list(f".{HINGES}", value[HINGES], "crease")
-    return dict(value)
-
-
-def _check_generator(value: Mapping[str, Any]) -> None:
-    """Refuse an unknown generator, and keys that it, or the one that is meant, does not have."""
-    faults, kind = Faults(), value["kind"]
-    with faults.collected():
-        choice(".kind", kind, GENERATORS)
-    meant = nearest(kind, GENERATORS) if isinstance(kind, str) else None
-    if meant is not None:
-        with faults.collected():
-            check_keys(value, [*signature(GENERATORS[meant]).parameters, "kind", FACETS, HINGES])
-    faults.tell()
-
-
-def _inline(value: Mapping[str, Any]) -> None:
-    vertices = numbers(".vertices", value["vertices"])
-    if vertices.ndim != 2 or vertices.shape[1] not in (2, 3):
-        raise InputError(".vertices: must be a list of points [x, y, z]")
-    faces = value["faces"]
-    if not isinstance(faces, list) or not faces:
-        raise InputError(f".faces = {show(faces)}: must be a list of panels, as in [[0, 1, 2]]")
-    for i, face in enumerate(faces):
-        if not isinstance(face, list) or any(type(vertex) is not int for vertex in face):
-            raise InputError(f".faces[{i}] = {show(face)}: must be a list of vertex numbers")
-    letters = value.get("assignments", [])
-    if not _all(letters, str):
-        raise InputError(
-            f'.assignments = {show(letters)}: must be a list of letters "M", "V", "F", "U", one '
-            'per crease, or a table by family, as { zigzag = "M" }'
-        )
-    angles = value.get("fold_angles", [])
-    if not _all(angles, int, float):
-        raise InputError(
-            f".fold_angles = {show(angles)}: must be a list of angles (degrees, valleys positive, "
-            "nan for none), one per crease, or a table of sizes by family, as { zigzag = 90 }"
-        )
-    families = value.get("families", {})
-    if not isinstance(families, Mapping) or not all(isinstance(f, list) for f in families.values()):
-        raise InputError(
-            f".families = {show(families)}: must be a table of lists of vertex pairs, as in "
-            "{ zigzag = [[0, 1], [1, 2]] }"
-        )
-
-
-def _all(given: Any, *types: type) -> bool:
-    """Whether all entries of a list or a table are of some types."""
-    if not isinstance(given, list | Mapping):
-        return False
-    entries = given.values() if isinstance(given, Mapping) else given
-    return all(type(entry) in types for entry in entries)
 
 
 def _masses(value: Any, info: ValidationInfo) -> list[str]:
@@ -393,7 +298,7 @@ class CaseSchema(Section):
     """The sections that every case file may have."""
 
     title: str = ""
-    pattern: Annotated[dict[str, Any], PlainValidator(_pattern)]
+    pattern: Annotated[dict[str, Any], PlainValidator(checked_pattern)]
     sheet: SheetSection
     model: ModelSection = ModelSection()
     damping: DampingSection = DampingSection()

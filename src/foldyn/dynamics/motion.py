@@ -14,6 +14,7 @@ from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
 from foldyn.dynamics.doubts import doubts
+from foldyn.dynamics.failures import from_closed, reason_for
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.keeping import KEY, Keeping
@@ -323,7 +324,7 @@ class Motion:
                 PenetrationError,
             )
         if code == Outcome.STUCK and len(hinges):
-            closed = _from_closed(self._course.angle)
+            closed = from_closed(self._course.angle)
             hinge = int(closed.argmin())
             if closed[hinge] < MET:
                 j, k = order[hinges[hinge, :2]].tolist()
@@ -331,30 +332,12 @@ class Motion:
                     f"{moment} the error asks for a step of {tally.wanted:.3g} s: panels meet "
                     f"about nodes {j}-{k}; {self._apart(hinge)}"
                 )
-        if code == Outcome.STUCK:
-            self._stop(
-                f"{moment} the error asks for a step of {tally.wanted:.3g} s: a load jumps too "
-                "often, or the motion is too violent; raise the tolerance, or use rk4"
-            )
-        if code == Outcome.NOT_CONVERGED:
-            why = "a mass or a stiffness may be missing, or the motion is too violent"
-            if self.case.contact is not None:
-                why = 'panels meet too hard for an implicit method: use method = "dormand_prince"'
-            self._stop(
-                f"{moment} no equilibrium was found at the end of a step, however small the step: "
-                f"{why}"
-            )
-        reason = "a load is not finite"
-        if plan.steps and not self.method.implicit:
-            reason = (
-                f"the step of {plan.dt:.3g} s is too large (critical at the start: "
-                f"{self.critical:.3g} s) or {reason}"
-            )
-        self._stop(f"{moment} the motion is no longer finite: {reason}")
+        why = reason_for(code, self.case, plan, self.method, self.critical, float(tally.wanted))
+        self._stop(f"{moment} {why}")
 
     def _apart(self, hinge: int) -> str:
         """How to keep the panels at a hinge apart; its dihedral is that of the last step."""
-        if self.plan.dt > self.critical or _from_closed(self._course.angle[hinge]) > SWING:
+        if self.plan.dt > self.critical or from_closed(self._course.angle[hinge]) > SWING:
             return f"the hinge has turned too far within a step: {self._smaller_step()}"
         j, k = self._packed.numbering.order[self._packed.model.hinges[hinge, :2]].tolist()
         return kept_apart(self.case.structure, j, k)
@@ -414,8 +397,3 @@ class Motion:
             }
         facts["force_evaluations"] = int(tally.evaluations)
         return facts | (engine.facts() if engine else {})
-
-
-def _from_closed(angle: NDArray) -> NDArray:
-    """How far (rad) dihedrals are from 0 and 2 pi."""
-    return np.minimum(angle, 2.0 * np.pi - angle)

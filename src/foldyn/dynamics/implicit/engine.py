@@ -15,27 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.algebra.banded import one_thread
-from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.course import Course, Outcome, Samples, StepPlan, sample
-from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
+from foldyn.dynamics.implicit.impulse import impulse_lasts
+from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
 from foldyn.dynamics.implicit.scheme import NOT_FINITE, SOLVED, Scheme
+from foldyn.dynamics.implicit.step_control import (
+    SAME_TIME,
+    divide,
+    next_step,
+    next_stop,
+    smaller_step,
+)
 from foldyn.dynamics.implicit.touching import TouchingNewton
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.system import Packed, accelerate, acceleration
 from foldyn.jit.compiled import kernel
 
-SAME_TIME = 1e-9  # of a step: times as near as that are one
 LEAST_STEP = 2.0**-20  # of the step wanted: where Newton's method fails with less, it fails
 LEAST_TIME = 1e-13  # step relative to the end of the motion
 TURN = math.pi  # by which no dihedral jumps in a step unless panels collide
-# the control of the step by its error
-SAFETY = 0.9
-GROWTH = 2.0  # of a step at most
-WORTHWHILE = 1.25  # growth below which the step, and with it the matrix, is kept
-NEAR, CUT = 0.95, 0.85  # below which the error is about to be too large, and what is done then
-LEAST = 0.2  # share of a refused step that is tried next, at least
 MEMORY = 0.9  # share of an error that counts a step later
 SAME_STATE = 1e-9  # relative difference of states and forces that are one
 # what is measured along a motion and counts for the next step
@@ -206,7 +206,7 @@ class Implicit:
         scheme.begin(plan.start)
         self._course.tally.farthest = _largest(scheme.displacement())
         if self._packed.system.varies and not plan.steps:
-            self._horizon = self._impulse_lasts()
+            self._horizon = impulse_lasts(scheme, self._matrix, self._packed, plan.end - plan.start)
         if self._touching is not None:
             self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
@@ -214,30 +214,6 @@ class Implicit:
             self._packed.body.memory.still()
         self.continues = self._end is not None and self._resume(self._end)
         return self._sample(plan.start, out)
-
-    def _impulse_lasts(self) -> float:
-        """How long an impulse acts on: the time (s) in which a vibration moves on.
-
-        It is 1/omega of the vibration that the histories set in motion, at most the duration.
-        Rayleigh's quotient of the displacements that they would cause if they acted slowly: over
-        the duration, for bodies that nothing holds. Hinges count with their nominal stiffness.
-        """
-        scheme, matrix, packed = self._scheme, self._matrix, self._packed
-        duration, u = self._plan.end - self._plan.start, scheme.displacement()
-        force = scheme.push(scheme.old, np.ones(len(scheme.old.factor)))
-        matrix.blocks.put(packed.body.nominal(u), matrix.pattern, u, u, False, matrix.stiffness)
-        slow = (2.0 * math.pi / duration) ** 2
-        try:
-            matrix.factorize(Weights(stiffness=1.0, mass=slow, damping=0.0))
-        except SingularTangentError:
-            return duration
-        scheme.step[:] = 0.0
-        x = matrix.solve(force, scheme.step)
-        matrix.forget()
-        times_mass(packed.mass, x, scheme.out)
-        inertia, work = float((x * scheme.out).sum()), float((x * force).sum())
-        square = work / inertia - slow if inertia > 0.0 else 0.0
-        return 1.0 / math.sqrt(square) if square * duration * duration > 1.0 else duration
 
     def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
@@ -254,7 +230,7 @@ class Implicit:
         whole = True
         while t < end - SAME_TIME * plan.dt:
             goal, jump = self._next_jump(t, end, SAME_TIME * plan.dt)
-            part, stop, jump = _divide(t, goal, h, jump)
+            part, stop, jump = divide(t, goal, h, jump)
             if abs(part - plan.dt) <= SAME_TIME * plan.dt:
                 part = plan.dt  # without the rounding of the times
             outcome, hinge = self._attempt(part, stop, jump)
@@ -282,8 +258,8 @@ class Implicit:
             if wanted < LEAST_TIME * max(abs(plan.end), abs(t)):
                 return Outcome.STUCK, -1
             near = SAME_TIME * wanted
-            goal, jump = self._next_jump(t, _next_stop(plan, t, due, near), near)
-            h, end, jump = _divide(t, goal, wanted, jump)
+            goal, jump = self._next_jump(t, next_stop(plan, t, due, near), near)
+            h, end, jump = divide(t, goal, wanted, jump)
             outcome, hinge = self._attempt(h, end, jump)
             if outcome != Outcome.DONE:
                 if self._hopeless(h):
@@ -294,7 +270,7 @@ class Implicit:
             error, scale = self._error(t, h)
             if error <= 1.0:
                 break
-            tally.wanted = _smaller_step(h, error)
+            tally.wanted = smaller_step(h, error)
             tally.refused += 1
         self._accept(h, end, jump)
         tally.steps += 1
@@ -302,7 +278,7 @@ class Implicit:
         # the error of a vibration vanishes twice in each period; the ones before still count then
         error = max(error, MEMORY * tally.error * (h / (tally.last or h)) ** 3)
         tally.error, tally.last = error, h
-        tally.wanted = max(wanted if end == goal else 0.0, _next_step(h, error))
+        tally.wanted = max(wanted if end == goal else 0.0, next_step(h, error))
         tally.shortest, tally.longest = min(tally.shortest, h), max(tally.longest, h)
         if tally.steps % plan.every == 0 if plan.every else waits and end == due:
             return self._sample(end, out), -1
@@ -393,36 +369,8 @@ def _same(now: NDArray, then: NDArray) -> bool:
     return _largest(now - then) <= SAME_STATE * _largest(then)
 
 
-def _next_step(h: float, error: float) -> float:
-    """Step after an accepted one of h (s) with the error, relative to the tolerance."""
-    factor = GROWTH if error <= 0.0 else min(GROWTH, SAFETY * error ** (-1.0 / 3.0))
-    if factor < NEAR:
-        return h * CUT
-    return h if factor < WORTHWHILE else h * factor
-
-
-def _smaller_step(h: float, error: float) -> float:
-    """Step after a refused one."""
-    return h * min(0.9, max(LEAST, SAFETY * error ** (-1.0 / 3.0)))
-
-
 def _largest(values: NDArray) -> float:
     return float(np.abs(values).max(initial=0.0))
-
-
-def _next_stop(plan: StepPlan, t: float, end: float, near: float) -> float:
-    """Where a step from t has to end at the latest, for the knots of the histories."""
-    k = int(np.searchsorted(plan.stops, t + near, side="right"))
-    return plan.stops[k] if k < len(plan.stops) and plan.stops[k] < end - near else end
-
-
-def _divide(
-    t: float, goal: float, wanted: float, jump: float | None
-) -> tuple[float, float, float | None]:
-    """Step from t, the first of equal ones to the goal, its end, and the jump if it is there."""
-    parts = max(1, math.ceil((goal - t) / wanted * (1.0 - SAME_TIME)))
-    h = (goal - t) / parts
-    return (h, goal, jump) if parts == 1 else (h, t + h, None)
 
 
 @kernel
