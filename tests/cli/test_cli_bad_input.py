@@ -250,7 +250,8 @@ def test_the_memory_of_all_mass_rules_together(workplace, edited, monkeypatch) -
     finer = ("every = 0.01", "every = 0.001")
     rules = ('"circumcenter"', '["panel", "centroid"]')
     assert workplace.run(edited(finer)).status == 0
-    bad = workplace.run(edited(finer, rules), "--out", "other")
+    workplace.write(edited(finer, rules), "case.toml")
+    bad = workplace.call("run", "case.toml", "--out", "other")  # with its page: all in memory
     check(bad, "output.every: 202 samples of 13 nodes of 2 mass rules needs about ", "--force")
 
 

@@ -16,7 +16,7 @@ from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
 from foldyn.dynamics import METHODS, Keeping, compiled, prepare
-from foldyn.dynamics.timing import check_samples
+from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
 from foldyn.report.album import (
     LOADS,
@@ -117,7 +117,8 @@ class MotionAnalysis(Analysis):
 
     def check(self, computations: Sequence[Compute], figures: bool) -> None:
         """Refuse more samples than memory holds, or fewer than spectra need."""
-        motions = [one.motion for one in computations if isinstance(one, _Prepared)]
+        prepared = [one for one in computations if isinstance(one, _Prepared)]
+        motions = [one.motion for one in prepared]
         samples = min(motion.expected_samples for motion in motions)
         if figures and samples < MINIMUM_SAMPLES:
             raise InputError(
@@ -125,15 +126,13 @@ class MotionAnalysis(Analysis):
                 "analysis.duration, or run without --figures",
                 "every",
             )
-        if all(one.kept and not one.shown for one in computations if isinstance(one, _Prepared)):
-            return
-        case = motions[0].case
-        check_samples(
-            sum(motion.expected_samples for motion in motions),
-            len(case.structure.nodes),
-            len(case.reaction_dofs),
-            len(motions),
-        )
+        case, count = motions[0].case, sum(motion.expected_samples for motion in motions)
+        size = count, len(case.structure.nodes), len(case.reaction_dofs)
+        kept = [one.kept for one in prepared if one.kept]
+        if kept:
+            check_room(*size, kept[0].room)
+        if len(kept) < len(motions) or any(one.shown for one in prepared):
+            check_samples(*size, len(motions))
 
     def compiles(self, computations: Sequence[Compute]) -> bool:
         """Whether the integrator is used for the first time."""

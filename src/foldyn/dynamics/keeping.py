@@ -76,6 +76,13 @@ class Keeping:
         self._reached: float | None = None
         self._last = time.monotonic()
 
+    @property
+    def room(self) -> float:
+        """Bytes that the samples may take on the disk, with those that are there already."""
+        there = next(place for place in self.folder.absolute().parents if place.is_dir())
+        own = [file.stat().st_size for file in self.folder.glob("*") if file.is_file()]
+        return float(shutil.disk_usage(there).free + sum(own))
+
     def finished(self, key: str) -> xarray.Dataset | None:
         """The result, if it is there whole, is that of a motion, and is to be gone on with."""
         if not self.resume or self.folder.exists() or not self.file.is_file():

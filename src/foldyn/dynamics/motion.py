@@ -30,7 +30,7 @@ from foldyn.dynamics.stability import (
     stability_limit,
 )
 from foldyn.dynamics.system import Packed, place, scratch
-from foldyn.dynamics.timing import check_samples, expected_samples
+from foldyn.dynamics.timing import check_room, check_samples, expected_samples
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
@@ -109,9 +109,11 @@ class Motion:
 
     def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
         self._keeping = keeping
+        size = self.expected_samples, len(self.case.structure.nodes), len(self.case.reaction_dofs)
         if keeping is None:
-            nodes, reactions = len(self.case.structure.nodes), len(self.case.reaction_dofs)
-            check_samples(self.expected_samples, nodes, reactions)
+            check_samples(*size)
+        else:
+            check_room(*size, keeping.room)
         self._start()
         self._output.begin()
         self._integrate(*reporter(progress))

@@ -19,7 +19,7 @@ from foldyn.cases import Case, History
 from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import StepPlan
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.memory import check_memory
+from foldyn.memory import GIB, check_memory
 from foldyn.values import number, show, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
@@ -133,6 +133,18 @@ def check_samples(samples: int, nodes: int, supported: int, motions: int = 1) ->
         "every", f"{samples:.3g} samples of {nodes} nodes{together}",
         8.0 * samples * (6 * nodes + supported + 6), "raise it, or shorten the duration",
     )  # fmt: skip
+
+
+def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
+    """Refuse an output for which the disk has no room (bytes), before anything is computed."""
+    needed = 8.0 * samples * (6 * nodes + supported + 6)
+    if needed > room:
+        raise InputError(
+            f": {samples:.3g} samples of {nodes} nodes needs about {needed / GIB:.3g} GiB, more "
+            f"than the {room / GIB:.3g} GiB that are free on the disk: raise it, or shorten the "
+            "duration",
+            "every",
+        )
 
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
