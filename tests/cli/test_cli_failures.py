@@ -85,10 +85,10 @@ def test_rules_that_are_done_are_kept_beside_the_one_that_fails(workplace, edite
 def test_an_interrupted_list_keeps_what_was_done(workplace, edited, monkeypatch) -> None:
     run = Motion.run
 
-    def interrupted(self, progress=None):
+    def interrupted(self, progress=None, keeping=None):
         if self.case.structure.options.mass == "centroid":
             raise KeyboardInterrupt
-        return run(self, progress)
+        return run(self, progress, keeping)
 
     monkeypatch.setattr(Motion, "run", interrupted)
     stopped = workplace.run(edited(('"circumcenter"', '["panel", "centroid"]')))

@@ -48,10 +48,10 @@ def test_an_interruption_leaves_old_or_new_and_no_mixture(workplace, edited, mon
     run = Motion.run
 
     def stopped_at(rule):
-        def interrupted(self, progress=None):
+        def interrupted(self, progress=None, keeping=None):
             if self.case.structure.options.mass == rule:
                 raise KeyboardInterrupt
-            return run(self, progress)
+            return run(self, progress, keeping)
 
         return interrupted
 

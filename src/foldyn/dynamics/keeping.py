@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import shutil
 import time
@@ -79,9 +80,12 @@ class Keeping:
     @property
     def room(self) -> float:
         """Bytes that the samples may take on the disk, with those that are there already."""
-        there = next(place for place in self.folder.absolute().parents if place.is_dir())
-        own = [file.stat().st_size for file in self.folder.glob("*") if file.is_file()]
-        return float(shutil.disk_usage(there).free + sum(own))
+        try:
+            there = next(place for place in self.folder.absolute().parents if place.is_dir())
+            own = [file.stat().st_size for file in self.folder.glob("*") if file.is_file()]
+            return float(shutil.disk_usage(there).free + sum(own))
+        except OSError:  # a folder that is gone: writing will tell
+            return math.inf
 
     def finished(self, key: str) -> xarray.Dataset | None:
         """The result, if it is there whole, is that of a motion, and is to be gone on with."""

@@ -125,9 +125,8 @@ class Motion:
     @property
     def _origin(self) -> str:
         """From what the motion started."""
-        if isinstance(self._engine, Implicit) and self._engine.continues:
-            return "end of a motion"
-        return "rest" if self.at_rest else "state"
+        continues = isinstance(self._engine, Implicit) and self._engine.continues
+        return "end of a motion" if continues else "rest" if self.at_rest else "state"
 
     @property
     def _branches(self) -> int:
