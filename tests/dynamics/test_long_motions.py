@@ -66,7 +66,12 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "sliding": (["newmark"], {"duration": 0.02, "every": 0.001}),
     "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
-RUNS = [(kind, method) for kind, (methods, _) in KINDS.items() for method in methods]
+LONG = {"touching": [pytest.mark.slow]}
+RUNS = [
+    pytest.param(kind, method, marks=LONG.get(kind, ()))
+    for kind, (methods, _) in KINDS.items()
+    for method in methods
+]
 
 
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
