@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 
 COMPUTING = (
-    "jit", "patterns", "materials", "mechanics", "structures", "shells", "cases", "statics",
-    "dynamics", "linear", "signals",
+    "jit", "patterns", "materials", "mechanics", "algebra", "structures", "shells", "cases",
+    "statics", "dynamics", "linear", "signals",
 )  # fmt: skip
 """Folders of the package whose changes outdate stored results."""
 

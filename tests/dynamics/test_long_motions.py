@@ -57,6 +57,17 @@ def in_pieces(file: Path, calls: int, name: str, **options):
         return found, kills
 
 
+def cut_off(**options):
+    """The motion of the sheet, killed half-way."""
+
+    def stop(now):
+        if now.time > 0.5:
+            raise Killed
+
+    with pytest.raises(Killed):
+        simulated("sheet", **options, progress=stop)
+
+
 KINDS = {  # name of the case, its arguments, and what of the methods
     "sheet": (METHODS, {"duration": 1.0, "every": 0.01}),
     "steps": (["dormand_prince", "newmark"], {"duration": 1.0, "every": 3}),
@@ -120,13 +131,7 @@ def test_samples_that_memory_does_not_hold_are_the_same(tmp_path, monkeypatch, m
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
     options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-
-    def stop(now):
-        if now.time > 0.5:
-            raise Killed
-
-    with pytest.raises(Killed):
-        simulated("sheet", **options, progress=stop)
+    cut_off(**options)
     thrown = np.zeros((13, 3))
     thrown[8, 2] = 0.1
     for changes, name in [
@@ -149,13 +154,7 @@ def test_a_motion_goes_on_only_as_it_was_begun(tmp_path):
 
 def test_another_program_does_not_go_on(tmp_path, monkeypatch):
     options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-
-    def stop(now):
-        if now.time > 0.5:
-            raise Killed
-
-    with pytest.raises(Killed):
-        simulated("sheet", **options, progress=stop)
+    cut_off(**options)
     monkeypatch.setattr("foldyn.dynamics.identity.program", lambda *_: "another")
     with pytest.raises(InputError, match="was begun with the version of Foldyn"):
         simulated("sheet", **options, resume=True)
@@ -221,13 +220,7 @@ def test_bad_arguments_are_refused_before_anything_is_computed(tmp_path):
 
 def test_what_is_damaged_is_refused(tmp_path):
     options = {"duration": 1.0, "every": 0.01, "store": tmp_path / "run.nc", "checkpoint": OFTEN}
-
-    def stop(now):
-        if now.time > 0.5:
-            raise Killed
-
-    with pytest.raises(Killed):
-        simulated("sheet", **options, progress=stop)
+    cut_off(**options)
     folder = tmp_path / "run.nc.unfinished"
     content = (folder / "velocity.f8").read_bytes()
     (folder / "velocity.f8").write_bytes(content[:-100])

@@ -162,12 +162,16 @@ class Contact(Part):
             held=held,
         )
 
+    def friction_on(self, plane: Plane) -> float:
+        """Coefficient of friction on a plane: its own, or else that of all."""
+        return self.friction if plane.friction is None else plane.friction
+
     def _table(self, origin: NDArray[np.float64]) -> NDArray[np.float64]:
         table = np.zeros((len(self.planes), PLANE_COLUMNS))
         for row, plane in zip(table, self.planes, strict=True):
             row[POINT : POINT + 3] = np.array(plane.point) - origin
             row[NORMAL : NORMAL + 3] = np.array(plane.normal) / np.linalg.norm(plane.normal)
-            row[FRICTION] = self.friction if plane.friction is None else plane.friction
+            row[FRICTION] = self.friction_on(plane)
             row[MOTION : MOTION + 3] = plane.motion or 0.0
             row[HISTORY] = -1
         return table

@@ -26,7 +26,7 @@ from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
 from foldyn.errors import InputError
-from foldyn.statics.problem import Balance, Problem, balance, converged
+from foldyn.statics.problem import Balance, Problem, balance, clear_share, converged
 from foldyn.values import number, whole
 
 COLLIDES = "panel would pass through panel"
@@ -252,8 +252,7 @@ class Solver:
         for _ in range(HALVINGS):
             turn = self.problem.turn(u, u + share * step)
             if turn <= MOST_TURN:
-                clear = getattr(self.problem, "clear", None)  # problems without contact have none
-                return share * clear(u, share * step) if clear else share
+                return share * clear_share(self.problem, u, share * step)
             share *= MOST_TURN / turn if np.isfinite(turn) else 0.5
         return 0.0
 

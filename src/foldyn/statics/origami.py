@@ -318,8 +318,7 @@ def _plates(case: Case, flows: bool) -> Plates:
     """
     if case.contact is None:
         return Plates(case)
-    own, planes = case.contact.friction, case.contact.planes
-    if any((own if plane.friction is None else plane.friction) > 0.0 for plane in planes):
+    if any(case.contact.friction_on(plane) > 0.0 for plane in case.contact.planes):
         raise InputError(
             ".friction: paths of equilibria take contact without friction: give 0 here and in the "
             "planes, or simulate a slow motion",

@@ -78,6 +78,12 @@ class Problem(Protocol):
         ...
 
 
+def clear_share(problem: Problem, u: NDArray, step: NDArray) -> float:
+    """Share of a step (m,) from a state in which nothing crosses: all of it without contact."""
+    clear = getattr(problem, "clear", None)  # problems without contact have none
+    return clear(u, step) if clear else 1.0
+
+
 class Balance(NamedTuple):
     """How far a state is from equilibrium."""
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
-from foldyn.statics.problem import Problem, balance
+from foldyn.statics.problem import Problem, balance, clear_share
 from foldyn.values import brief
 
 NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
@@ -208,8 +208,7 @@ class Released:
 
     def clear(self, u: NDArray, step: NDArray) -> float:
         """Share of a step in which nothing crosses in the problem."""
-        clear = getattr(self.problem, "clear", None)
-        return clear(u, step) if clear else 1.0
+        return clear_share(self.problem, u, step)
 
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:

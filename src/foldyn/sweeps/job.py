@@ -22,7 +22,7 @@ from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked, Loaded
 from foldyn.sweeps.points import Point
 
-COMPUTING = ("algebra", "analyses", "results", "sweeps")
+COMPUTING = ("analyses", "results", "sweeps")
 """Folders that measures depend on, besides the solvers."""
 ASIDE = ("sweep", "title")
 """Tables and keys of a case file that change no result."""
