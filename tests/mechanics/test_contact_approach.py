@@ -67,8 +67,10 @@ def test_nothing_crosses_on_the_way_of_any_motion(seed):
 def gaps(own, kept, u):
     """Distances of all listed pairs at displacement u."""
     x = own.rest + u
-    first = [vertex_gap(own, x, *kept.pairs[0, k]) for k in range(kept.counts.listed_first)]
-    second = [edge_gap(own, x, *kept.pairs[1, k]) for k in range(kept.counts.listed_second)]
+    first = [
+        vertex_gap(x, own.triangles, *kept.pairs[0, k]) for k in range(kept.counts.listed_first)
+    ]
+    second = [edge_gap(x, own.edges, *kept.pairs[1, k]) for k in range(kept.counts.listed_second)]
     return np.array([*first, *second])
 
 

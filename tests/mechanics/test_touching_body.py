@@ -27,12 +27,12 @@ def every_pair(tables, x, skin):
     first, second = 0, 0
     for t in range(len(tables.triangles)):
         for v in tables.surface:
-            d0 = panel_d0(tables, v, tables.panel[t])
-            first += d0 > 0.0 and vertex_gap(tables, x, v, t) <= d0 + skin
+            d0 = panel_d0(tables.ranges, v, tables.panel[t])
+            first += d0 > 0.0 and vertex_gap(x, tables.triangles, v, t) <= d0 + skin
     for i in range(len(tables.edges)):
         for j in range(i + 1, len(tables.edges)):
-            d0 = edge_d0(tables, i, j)
-            second += d0 > 0.0 and edge_gap(tables, x, i, j) <= d0 + skin
+            d0 = edge_d0(tables.ranges, tables.edges, tables.edge_panels, i, j)
+            second += d0 > 0.0 and edge_gap(x, tables.edges, i, j) <= d0 + skin
     return first, second
 
 

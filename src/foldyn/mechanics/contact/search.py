@@ -25,53 +25,52 @@ THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to th
 
 
 @kernel
-def panel_d0(tables, v, panel):
+def panel_d0(ranges, v, panel):
     """d0 (m) of a node against a panel; 0 if it belongs to it."""
-    for at in range(tables.own_start[v], tables.own_start[v + 1]):
-        if tables.own[at] == panel:
+    for at in range(ranges.own_start[v], ranges.own_start[v + 1]):
+        if ranges.own[at] == panel:
             return 0.0
-    for at in range(tables.near_start[v], tables.near_start[v + 1]):
-        if tables.near[at] == panel:
-            return tables.near_d0[at]
-    return 0.5 * (tables.node_thickness[v] + tables.panel_thickness[panel])
+    for at in range(ranges.near_start[v], ranges.near_start[v + 1]):
+        if ranges.near[at] == panel:
+            return ranges.near_d0[at]
+    return 0.5 * (ranges.node_thickness[v] + ranges.panel_thickness[panel])
 
 
 @kernel
-def edge_d0(tables, i, j):
-    """d0 (m) of two edges; 0 if they share a panel or a node."""
-    a, b = tables.edges[i, 0], tables.edges[i, 1]
-    c, d = tables.edges[j, 0], tables.edges[j, 1]
+def edge_d0(ranges, edges, panels, i, j):
+    """d0 (m) of two edges (e, 2) of some panels (e, 2); 0 if they share a panel or a node."""
+    a, b, c, d = edges[i, 0], edges[i, 1], edges[j, 0], edges[j, 1]
     if a in (c, d) or b in (c, d):
         return 0.0
+    if panels[i, 0] == panels[j, 0] or panels[i, 0] == panels[j, 1]:
+        return 0.0
+    if panels[i, 1] >= 0 and (panels[i, 1] == panels[j, 0] or panels[i, 1] == panels[j, 1]):
+        return 0.0
     best = math.inf
-    for first in range(2):
-        for second in range(2):
-            p, q = tables.edge_panels[i, first], tables.edge_panels[j, second]
-            if p < 0 or q < 0:
-                continue
-            if p == q:
-                return 0.0
-            one = 0.5 * (panel_d0(tables, a, q) + panel_d0(tables, b, q))
-            other = 0.5 * (panel_d0(tables, c, p) + panel_d0(tables, d, p))
-            best = min(best, one, other)
+    for side in range(2):
+        p, q = panels[i, side], panels[j, side]
+        if q >= 0:
+            best = min(best, 0.5 * (panel_d0(ranges, a, q) + panel_d0(ranges, b, q)))
+        if p >= 0:
+            best = min(best, 0.5 * (panel_d0(ranges, c, p) + panel_d0(ranges, d, p)))
     return best
 
 
-@kernel
-def vertex_gap(tables, x, v, t):
+@scalar
+def vertex_gap(x, triangles, v, t):
     """Distance (m) of a vertex from a triangle."""
-    a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
+    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     p, pa, pb, pc = point(x, v), point(x, a), point(x, b), point(x, c)
     wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
     r = apart(p, pa, pb, pc, wa, wb, wc)
     return math.sqrt(dot(r, r))
 
 
-@kernel
-def edge_gap(tables, x, i, j):
+@scalar
+def edge_gap(x, edges, i, j):
     """Distance (m) of two edges."""
-    pa, pb = point(x, tables.edges[i, 0]), point(x, tables.edges[i, 1])
-    pc, pd = point(x, tables.edges[j, 0]), point(x, tables.edges[j, 1])
+    pa, pb = point(x, edges[i, 0]), point(x, edges[i, 1])
+    pc, pd = point(x, edges[j, 0]), point(x, edges[j, 1])
     s, t, _ = closest_of_segments(pa, pb, pc, pd)
     r = between(pa, pb, pc, pd, s, t)
     return math.sqrt(dot(r, r))
@@ -130,28 +129,22 @@ def _sort(points, low, size, counts, start, items):
 
 
 @scalar
-def _beside(x, nodes, low, high):
-    """Whether the box of two nodes meets a box."""
+def _within(x, v, low, high):
+    """Whether a node is in a box."""
+    inside = True
     for c in range(3):
-        p, q = x[nodes[0], c], x[nodes[1], c]
-        if max(p, q) < low[c] or min(p, q) > high[c]:
-            return False
-    return True
+        inside = inside and low[c] <= x[v, c] <= high[c]
+    return inside
 
 
 @scalar
-def _gap(tables, x, kind, one, other, low, high):
-    """Where boxes meet: d0 (m) of a pair, 0 if it never touches, and its distance less d0."""
-    if kind == 0:
-        for c in range(3):
-            if x[one, c] < low[c] or x[one, c] > high[c]:
-                return 0.0, 0.0
-        d0 = panel_d0(tables, one, tables.panel[other])
-        return d0, vertex_gap(tables, x, one, other) - d0 if d0 > 0.0 else 0.0
-    if other <= one or not _beside(x, tables.edges[other], low, high):
-        return 0.0, 0.0
-    d0 = edge_d0(tables, one, other)
-    return d0, edge_gap(tables, x, one, other) - d0 if d0 > 0.0 else 0.0
+def _beside(x, edges, i, low, high):
+    """Whether the box of an edge meets a box."""
+    for c in range(3):
+        p, q = x[edges[i, 0], c], x[edges[i, 1], c]
+        if max(p, q) < low[c] or min(p, q) > high[c]:
+            return False
+    return True
 
 
 @kernel
@@ -162,7 +155,11 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
     """
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     below, above = np.empty(3), np.empty(3)
-    found, room = 0, memory.d0.shape[1]
+    # taken out of their tuples, whose arrays would be counted for each pair
+    surface, panels, edge_panels = tables.surface, tables.panel, tables.edge_panels
+    ranges, pairs = tables.ranges, memory.pairs[kind]
+    ds, gaps = memory.d0[kind], memory.gap[kind]
+    found, room = 0, len(ds)
     elements = tables.triangles if kind == 0 else tables.edges
     for e in range(len(elements)):
         _corners(x, elements[e], below, above)
@@ -175,15 +172,22 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
             for j in range(first[1], last[1] + 1):
                 row = (i * counts[1] + j) * counts[2]
                 for at in range(start[row + first[2]], start[row + last[2] + 1]):
-                    one, other = e, items[at]
+                    one, other, d0, gap = e, items[at], 0.0, math.inf
                     if kind == 0:
-                        one, other = tables.surface[other], e
-                    d0, gap = _gap(tables, x, kind, one, other, below, above)
-                    if d0 == 0.0 or gap > skin:
+                        one, other = surface[other], e
+                        if _within(x, one, below, above):
+                            gap = vertex_gap(x, elements, one, e)
+                        if gap <= far:
+                            d0 = panel_d0(ranges, one, panels[e])
+                    elif other > e and _beside(x, elements, other, below, above):
+                        gap = edge_gap(x, elements, e, other)
+                        if gap <= far:
+                            d0 = edge_d0(ranges, elements, edge_panels, e, other)
+                    if d0 == 0.0 or gap - d0 > skin:
                         continue
                     if found < room:
-                        memory.pairs[kind, found, 0], memory.pairs[kind, found, 1] = one, other
-                        memory.d0[kind, found], memory.gap[kind, found] = d0, gap
+                        pairs[found, 0], pairs[found, 1] = one, other
+                        ds[found], gaps[found] = d0, gap - d0
                     found += 1
     return found
 

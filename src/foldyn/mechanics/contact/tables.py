@@ -65,6 +65,18 @@ class Sheets:
         )
 
 
+class Ranges(NamedTuple):
+    """What tells d0 of nodes and panels. Compiled code takes small tuples several times quicker."""
+
+    node_thickness: NDArray  # (n,) m
+    panel_thickness: NDArray  # (p,) m
+    own_start: NDArray  # (n + 1,) first of a node's panels among `own`
+    own: NDArray
+    near_start: NDArray  # (n + 1,) first of the panels that share nodes with those, among `near`
+    near: NDArray
+    near_d0: NDArray  # d0 against these, m
+
+
 class Tables(NamedTuple):
     """The same as arrays of compiled code, with e edges and h hinges that are guarded."""
 
@@ -77,12 +89,7 @@ class Tables(NamedTuple):
     panel: NDArray  # (t,)
     edge_panels: NDArray  # (e, 2) the second one -1 where there is none
     node_thickness: NDArray  # (n,) m
-    panel_thickness: NDArray  # (p,) m
-    own_start: NDArray  # (n + 1,) first of a node's panels among `own`
-    own: NDArray
-    near_start: NDArray  # (n + 1,) first of the panels that share nodes with those, among `near`
-    near: NDArray
-    near_d0: NDArray  # d0 against these, m
+    ranges: Ranges
     surface: NDArray  # (s,) nodes of triangles
     meeting: NDArray  # (m,) those that planes may meet
     hinges: NDArray  # (h, 4) nodes j, k, i, l
@@ -131,12 +138,15 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         panel=panel,
         edge_panels=_panels_of_edges(side, panel, len(edges)),
         node_thickness=thickest,
-        panel_thickness=np.ascontiguousarray(sheets.thickness, float),
-        own_start=_starts(own),
-        own=_whole([panel for of in own for panel in of]),
-        near_start=_starts(near),
-        near=_whole([panel for of in near for panel in sorted(of)]),
-        near_d0=np.array(d0, float),
+        ranges=Ranges(
+            node_thickness=thickest,
+            panel_thickness=np.ascontiguousarray(sheets.thickness, float),
+            own_start=_starts(own),
+            own=_whole([panel for of in own for panel in of]),
+            near_start=_starts(near),
+            near=_whole([panel for of in near for panel in sorted(of)]),
+            near_d0=np.array(d0, float),
+        ),
         surface=_whole(surface),
         meeting=_whole(surface[~sheets.held[surface]]),
         hinges=_whole(hinges[guarded]).reshape(-1, 4),

@@ -26,7 +26,7 @@ def touching_pairs(tables, memory):
     found = np.zeros(2, np.int64)
     for k in range(memory.counts.listed_first):
         v, t = memory.pairs[0, k, 0], memory.pairs[0, k, 1]
-        if vertex_gap(tables, x, v, t) < memory.d0[0, k]:
+        if vertex_gap(x, tables.triangles, v, t) < memory.d0[0, k]:
             out[0, found[0]] = k
             found[0] += 1
     for k in range(memory.counts.listed_second):
@@ -35,7 +35,7 @@ def touching_pairs(tables, memory):
         c, d = point(x, tables.edges[j, 0]), point(x, tables.edges[j, 1])
         if not closest_of_segments(a, b, c, d)[2]:
             continue
-        if edge_gap(tables, x, i, j) < memory.d0[1, k]:
+        if edge_gap(x, tables.edges, i, j) < memory.d0[1, k]:
             out[1, found[1]] = k
             found[1] += 1
     return out[0, : found[0]].copy(), out[1, : found[1]].copy()
