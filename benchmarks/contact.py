@@ -120,8 +120,12 @@ def ipctk_times(structure: fd.Structure, u: np.ndarray) -> tuple[float, int, flo
     )
     x = np.asfortranarray(structure.nodes + u)
     candidates, collisions = ipctk.Candidates(), ipctk.NormalCollisions()
-    search = quickest(lambda: candidates.build(mesh, x, 0.5 * (thickness + skin)))
-    collisions.build(candidates, mesh, x, thickness)
+
+    def find() -> None:
+        candidates.build(mesh, x, 0.5 * (thickness + skin))
+        collisions.build(candidates, mesh, x, thickness)  # looks at distances, as the other does
+
+    search = quickest(find)
     potential = ipctk.BarrierPotential(thickness, 1.0)
     seconds = quickest(lambda: potential.gradient(collisions, mesh, x))
     return search, len(candidates), seconds, len(collisions)

@@ -8,7 +8,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Spectrum, TimeHistory
+from foldyn.experiment import ForceDisplacement, Parameter, Shapes, Sight, Spectrum, TimeHistory
 from foldyn.experiment.calibration.fit_problem import problem
 from foldyn.signals import spectrum
 
@@ -208,3 +208,21 @@ def test_what_was_measured_counts_where_the_start_is_unknown(swung) -> None:
             digests[align, k] = problem(swung, [one], ALPHA, {}).digest()
     assert digests[0.0, 0] == digests[0.0, 1]
     assert len(set(digests.values())) == 3
+
+
+def test_a_motion_is_compared_as_its_camera_sees_it(motion, swung) -> None:
+    """A node that comes nearer seems to go out from the middle of the picture."""
+    case, depth = fd.read_case(swung).case(), 0.4
+    rest = motion["rest_position"].values[2]
+    camera = Sight(
+        rest + np.array([0.01, 0.02, depth]), np.array([0.0, 0.0, -1.0]), np.full(9, depth)
+    )
+    moved = motion["displacement"].sel(node=2).values
+    assert np.abs(moved[:, 2]).max() > 1e-9
+    seen = (moved[:, 0] - 0.01) / (1.0 - moved[:, 2] / depth) + 0.01
+    known = {"nodes": [2], "time": motion["time"].values, "values": moved[:, 0]}
+    plain, looked = history(**known), history(**known, sight=camera)
+    assert plain.curves(motion, case)[:, 0] == pytest.approx(moved[:, 0], abs=1e-15)
+    assert looked.curves(motion, case)[:, 0] == pytest.approx(seen, abs=1e-15)
+    digests = [problem(swung, [one], ALPHA, {}).digest() for one in (plain, looked)]
+    assert digests[0] != digests[1]

@@ -7,14 +7,17 @@ from foldyn.experiment.calibration.fitted import (
     Fit as Fit,
     Score as Score,
 )
-from foldyn.experiment.calibration.measured import (
-    ForceDisplacement as ForceDisplacement,
-    Shapes as Shapes,
+from foldyn.experiment.calibration.histories import (
     Spectrum as Spectrum,
     TimeHistory as TimeHistory,
 )
+from foldyn.experiment.calibration.measured import (
+    ForceDisplacement as ForceDisplacement,
+    Shapes as Shapes,
+)
 from foldyn.experiment.calibration.measurement import Measurement as Measurement
 from foldyn.experiment.calibration.parameters import Parameter as Parameter
+from foldyn.experiment.calibration.sight import Sight as Sight
 from foldyn.experiment.camera import (
     Camera as Camera,
     Scale as Scale,

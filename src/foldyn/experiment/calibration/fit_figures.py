@@ -17,7 +17,8 @@ from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.fitted import Fit
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
+from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.shown import MOST, dense, plane
 from foldyn.plots import style

@@ -16,7 +16,8 @@ from foldyn.analyses.reading import read_document
 from foldyn.analyses.sections import Count, Section, one_of
 from foldyn.cases.decode import call_from, check_keys
 from foldyn.errors import InputError, within
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
+from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measured_files import READERS
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter

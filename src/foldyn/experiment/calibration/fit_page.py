@@ -16,7 +16,8 @@ from foldyn.analyses import CaseFile
 from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases.directions import AXES
 from foldyn.experiment.calibration.fitted import Fit
-from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes, Spectrum, TimeHistory
+from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
+from foldyn.experiment.calibration.measured import ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.shown import MOST, dense, plane
 from foldyn.report.album import Album

@@ -21,6 +21,7 @@ from foldyn.dynamics.methods import method_of
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
+from foldyn.experiment.calibration.sight import Sight
 from foldyn.program import program
 from foldyn.values import show
 
@@ -128,8 +129,9 @@ class Problem:
                 value = getattr(one, item.name)
                 if item.name == "values" and not getattr(one, "align", 0.0):
                     value = np.isfinite(value)
-                array = isinstance(value, np.ndarray)
-                digest.update(value.tobytes() if array else repr(value).encode())
+                for part in value if isinstance(value, Sight) else (value,):
+                    array = isinstance(part, np.ndarray)
+                    digest.update(part.tobytes() if array else repr(part).encode())
         return digest.hexdigest()
 
 

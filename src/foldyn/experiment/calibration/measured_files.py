@@ -15,14 +15,10 @@ from foldyn.cases.csv_table import read_headings, read_numbers, some
 from foldyn.cases.directions import AXES
 from foldyn.cases.selection import check_nodes
 from foldyn.errors import InputError, within
-from foldyn.experiment.calibration.measured import (
-    IMPOSED,
-    ForceDisplacement,
-    Shapes,
-    Spectrum,
-    TimeHistory,
-)
+from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
+from foldyn.experiment.calibration.measured import IMPOSED, ForceDisplacement, Shapes
 from foldyn.experiment.calibration.measurement import Measurement
+from foldyn.experiment.calibration.sight import Sight
 from foldyn.experiment.tracking.tracks_dataset import load_tracks
 from foldyn.values import choice, numbers, show
 
@@ -124,7 +120,10 @@ def history(
         Other arguments of `TimeHistory`.
     """
     chosen = _listed(file, nodes)
-    time, values = _motions(file, *_opened(file), chosen, axis, columns)
+    tracks, names = _opened(file)
+    time, values = _motions(file, tracks, names, chosen, axis, columns)
+    if tracks is not None:
+        known["sight"] = Sight.of(tracks)
     if window is not None:
         first, last = _range("window", window, "times (s)")
         within = (time >= first) & (time <= last)
@@ -181,6 +180,8 @@ def recognize(file: Path, axis: str = "x", **known: Any) -> Measurement:
     shown = np.isfinite(values).sum(axis=0) != 1
     kept = np.flatnonzero(shown if shown.any() else ~shown)
     known |= {"nodes": np.array(nodes)[kept].tolist(), "values": values[:, kept]}
+    if tracks is not None:
+        known["sight"] = Sight.of(tracks)
     return _made(TimeHistory, file, time=time, axis=axis, **known)
 
 

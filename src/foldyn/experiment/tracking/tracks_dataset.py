@@ -64,8 +64,9 @@ def add_displacements(
 ) -> xr.Dataset:
     """Displacements from rest of the nodes that were tracked.
 
-    Each node is taken to stay as far from the camera as it was where the model was recognized;
-    the component along the line of sight is unknown (NaN). The camera must stand still.
+    Each node is taken to stay as far from the camera as it was where the model was recognized, at
+    `camera_depth` along `camera_direction` from `camera_position`; the component along the line of
+    sight is unknown (NaN). The camera must stand still.
 
     Parameters
     ----------
@@ -91,7 +92,8 @@ def add_displacements(
     seen = np.full((count, vertices, 2), np.nan)
     seen[:, node[point]] = ds["position_px"].values[:, point] - origin
     view = matches[0].view  # the camera stands still: one view serves all photographs
-    places = view.back(seen, np.stack([view.depth(one.positions[:vertices]) for one in matches]))
+    depth = np.stack([view.depth(one.positions[:vertices]) for one in matches])
+    places = view.back(seen, depth)
     moved = places - model.rest[:vertices]
     moved[..., int(np.argmax(np.abs(axes_of_view(placing.up, placing.facing)[2])))] = np.nan
     measured = np.isfinite(seen[..., 0])
@@ -112,8 +114,13 @@ def add_displacements(
     dims = ("node", "uv") if along == "time" else ("photo", "node", "uv")
     shown = projected[0] if along == "time" else projected
     out["projected_px"] = (dims, shown, {"units": "pixel"})
+    if along == "time":
+        away = depth[0] - view.depth(view.camera())
+        out["camera_depth"] = (("node",), away, {"units": "m"})
     out.attrs |= {
         "metres_per_pixel": float(view.metres_per_pixel),
+        "camera_position": view.camera(),
+        "camera_direction": view.rotation[2],
         "camera_distance": float(view.distance),
         "match_rms_px": np.array([one.rms for one in matches]),
         "match_state": np.array([one.state for one in matches]),

@@ -19,6 +19,7 @@ from foldyn.values import brief
 Array = NDArray[np.float64]
 
 _MOST_STATES = 200
+FARTHEST = 1e4  # m: a camera from which lines of sight are parallel
 
 
 @brief
@@ -120,6 +121,12 @@ class View:
         seen = (flat - (self.center - self.axis)) * self.metres_per_pixel
         z = np.broadcast_to(z, (*seen.shape[:-1], 1))
         return self.origin + np.concatenate([seen, z], axis=-1) @ self.rotation
+
+    def camera(self) -> Array:
+        """Position (3,), m, of the camera: at most `FARTHEST` away."""
+        distance = min(self.distance, FARTHEST)
+        aside = (self.axis - self.center) * self.metres_per_pixel
+        return self.origin + np.append(aside, -distance) @ self.rotation
 
     def turned(self, rotvec: ArrayLike) -> View:
         """The same view with the model turned by a rotation vector (rad) in the camera's axes."""
