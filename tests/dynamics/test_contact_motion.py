@@ -18,7 +18,6 @@ from contact_cases import (
 import foldyn as fd
 from contact_sheets import SHEET, crossing, strip
 from foldyn.checks import observed_order
-from foldyn.dynamics.methods import METHODS
 from foldyn.errors import ComputationError, FoldynWarning, InputError, PenetrationError
 from foldyn.viewer.fields import fields
 
@@ -148,15 +147,6 @@ def test_a_moving_plane_does_the_work_that_it_gives():
     assert float(run.work[-1]) > 0.0
     assert run.attrs["energy_error"] < 1e-3
     assert run.displacement.values[-1, :, 2].min() > 2e-3 - 0.2e-3  # it flies ahead of the plane
-
-
-def test_methods_without_contact_refuse_it():
-    case = fd.Case(strip(), contact=fd.Contact())
-    for name, method in METHODS.items():
-        if method.contact:
-            continue
-        with pytest.raises(InputError, match="take contact; choose one of rk4, central_difference"):
-            fd.simulate(case, 0.01, method=name)
 
 
 def test_a_start_behind_a_plane_or_inside_each_other_is_refused():

@@ -3,21 +3,23 @@
     (q1 - q0)/h = (w0 + w1)/2,   M (w1 - w0)/h + alpha M (w0 + w1)/2 + b = 0,
     b = F + C (u1 - u0)/h - (p0 + p1)/2,
 
-with F the forces of `implicit.discrete_gradient`, C the damping but for alpha M, that of elements
-that follow the motion at (u0 + u1)/2 (a rigid motion dissipates nothing), and p at each end of the
-step those of all loads, also of those that depend on the displacement. Without damping and loads
-the energy of any structure and the momenta of a free one stay what they are, with any step, to the
-tolerance of the equations and to rounding; with them the energy balance closes as exactly. Of order
-2 (Simo and
-Tarnow 1992, Gonzalez 1996). Nothing damps the vibrations that a step does not resolve.
+with F the forces of `implicit.discrete_gradient`, and of contact (`implicit.contact_step`), C the
+damping but for alpha M, that of elements that follow the motion at (u0 + u1)/2 (a rigid motion
+dissipates nothing), and p at each end of the step those of all loads, also of those that depend on
+the displacement. Without damping and loads the energy of any structure and the momenta of a free
+one stay what they are, with any step, to the tolerance of the equations and to rounding; with them
+the energy balance closes as exactly. Of order 2 (Simo and Tarnow 1992, Gonzalez 1996). Nothing
+damps the vibrations that a step does not resolve.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.actuation import turn
@@ -32,14 +34,17 @@ from foldyn.dynamics.damping import (
     viscous_work,
 )
 from foldyn.dynamics.implicit import discrete_gradient
+from foldyn.dynamics.implicit.contact_step import StepContact
 from foldyn.dynamics.implicit.matrix import StepMatrix, Weights
 from foldyn.dynamics.implicit.scheme import Scheme, add_load_work, norms
 from foldyn.dynamics.inertia import times_mass
-from foldyn.dynamics.system import Packed, carry
+from foldyn.dynamics.system import Packed, carry, place
 from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics import strain_energies
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.following import add_following
 from foldyn.mechanics.step_tangent import FLOOR, expected_stress
 
@@ -54,7 +59,14 @@ class EnergyMomentum(Scheme):
 
     def __init__(self, packed: Packed, course: Course) -> None:
         super().__init__(packed, course)
-        self._stress, self._start = np.zeros((2, len(packed.model.bars)))
+        model: Any = packed.model
+        self._contact: StepContact | None = None
+        if packed.system.touches:
+            self._contact = StepContact(model.contact, self.work.memory, packed.system.rows)
+            model = model.inner
+        self._arrays = model, packed.system, packed.mass
+        self._touch = np.zeros((0, 3)) if self._contact is None else self._contact.force
+        self._stress, self._start = np.zeros((2, len(model.bars)))
         self._before = 0.0  # the last step, s
 
     def begin(self, t: float) -> None:
@@ -82,14 +94,18 @@ class EnergyMomentum(Scheme):
 
     def residual(self, h: float, t: float) -> tuple[float, float]:
         """See `Scheme`."""
+        old, s = self.old, self.scratch
+        if self._contact is not None:
+            place(self.packed.system, old.q + self.shift, old.w, t, s)
+            self._contact.put(self.displacement(), s.displacement, old.factor, s.factor)
         return residual(
-            *self.packed.arrays, h, t, self.old, self.new, self.shift, self.out, self.course.angle,
-            self.work.angle, self.scratch,
+            *self._arrays, h, t, old, self.new, self.shift, self.out, self.course.angle,
+            self.work.angle, self._touch, s,
         )  # fmt: skip
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
         """See `Scheme`."""
-        model, pattern, out = self.packed.model, matrix.pattern, matrix.stiffness
+        model, pattern, out = self._arrays[0], matrix.pattern, matrix.stiffness
         u0, u1, slots = self.displacement(), self.moved(), pattern.hinge_slots
         expected_stress(model, u0, u0, False, self._start)
         expected_stress(model, u1, before, again, self._stress)
@@ -100,9 +116,19 @@ class EnergyMomentum(Scheme):
         matrix.add_following(u1, self.new.factor, 0.5)
         matrix.follow(0.5 * (u0 + u1))
 
+    def contact_tangent(self, tables: Tables, memory: Memory, size: int) -> sparse.csr_array:
+        """See `Scheme`."""
+        assert self._contact is not None
+        return self._contact.tangent(size)
+
+    def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
+        """See `Scheme`."""
+        assert self._contact is not None
+        return self._contact.push
+
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
-        (model, system, mass), old, new = self.packed.arrays, self.old, self.new
+        (model, system, mass), old, new = self._arrays, self.old, self.new
         done, lost = _works(system, mass, h, old, new, self.shift, self.scratch)
         if system.damping.follows:
             lost += _taken(system, h, old, new, self.scratch)
@@ -117,10 +143,11 @@ class EnergyMomentum(Scheme):
 
 
 @kernel
-def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s):
+def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, touch, s):
     """Residual of a step into `out`; returns its norm and that of the forces at play, N.
 
-    The dihedrals angle0 (nh,) belong to the start; angle1 gets those of the end.
+    The dihedrals angle0 (nh,) belong to the start; angle1 gets those of the end. The force of
+    contact in the step is touch (n, 3), N, or none (0, 3).
     """
     model, system, mass = borrowed(model), borrowed(system), borrowed(mass)
     old, new, s = borrowed(old), borrowed(new), borrowed(s)
@@ -150,6 +177,8 @@ def residual(model, system, mass, h, t, old, new, shift, out, angle0, angle1, s)
     new.force[:] = 0.0
     discrete_gradient.add_bar_forces(model, s.displacement, s.velocity, new.force)
     discrete_gradient.add_hinge_forces(model, s.displacement, s.velocity, angle0, angle1, new.force)
+    for i in range(touch.size):
+        bracket[i] += flat(touch)[i]
     u0, u1 = flat(s.displacement), flat(s.velocity)
     if system.damping.data.size > 0:
         speed = flat(s.product)

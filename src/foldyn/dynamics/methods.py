@@ -207,6 +207,7 @@ METHODS: Mapping[str, Integrator] = {
             energy_momentum.EnergyMomentum,
             conserving=True,
             remembers=False,
+            contact=True,
         ),
     )
 }

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.cases.waveforms import unseen
 from foldyn.dynamics.course import Course
@@ -16,6 +17,9 @@ from foldyn.dynamics.system import Packed, Scratch, accelerate, scratch
 from foldyn.dynamics.ties import hand_over
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.contact.body import contact_tangent
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.tables import Tables
 
 EPS = float(np.finfo(float).eps)
 FAST = 0.3  # share of the residual that an iteration leaves, below which its matrix is kept
@@ -133,6 +137,17 @@ class Scheme(ABC):
     @abstractmethod
     def change(self, h: float) -> NDArray:
         """Estimate of h^2/12 times the change of the acceleration in the step (n, 3), m."""
+
+    def contact_tangent(self, tables: Tables, memory: Memory, size: int) -> sparse.csr_array:
+        """Derivative (size, size), N/m, of the force of contact where it was evaluated last."""
+        return contact_tangent(tables, memory, size)
+
+    def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
+        """Gradient of friction and normal force, both N, that do the work of planes in a step.
+
+        before, after : (q, n, 4) at its ends; see `mechanics.contact.memory`.
+        """
+        return 0.5 * (before + after)
 
     def iterate(
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,

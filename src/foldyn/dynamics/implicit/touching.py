@@ -39,7 +39,7 @@ from foldyn.dynamics.implicit.scheme import (
 )
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.approach import KEEP, clear_share
-from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
+from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
 from foldyn.mechanics.contact.search import place as put_at
@@ -86,7 +86,7 @@ class TouchingNewton(Newton):
         kept, scheme = self._memory, self.scheme
         if not len(self._moved):
             return 0.0, 0.0
-        push = 0.5 * (self._pushed + kept.friction)
+        push = scheme.plane_push(self._pushed, kept.friction)
         along = (kept.moved[:, :3] - self._moved)[:, None, :]
         motion = (scheme.moved() - scheme.displacement())[: push.shape[1]]
         normal = push[:, :, 3:] * self._tables.planes[:, None, NORMAL : NORMAL + 3]
@@ -144,7 +144,7 @@ class TouchingNewton(Newton):
 
     def _tangent(self) -> sparse.csr_array | None:
         """That of contact where forces were evaluated last; None where nothing touches."""
-        tangent = contact_tangent(self._tables, self._memory, self._size)
+        tangent = self.scheme.contact_tangent(self._tables, self._memory, self._size)
         return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:

@@ -50,6 +50,11 @@ class TouchingBody(WrappedBody):
         self.sheets, self._like = sheets, like
         self.energy_groups = (*inner.energy_groups, GROUP)
 
+    @property
+    def has_discrete_gradient(self) -> bool:  # type: ignore[override]
+        """See `Body`: that of contact is the solver's."""
+        return self.inner.has_discrete_gradient
+
     @cached_property
     def tables(self) -> Tables:
         """What may touch, as arrays."""

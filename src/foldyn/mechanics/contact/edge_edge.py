@@ -33,7 +33,7 @@ PARALLEL = 1e-3
 
 
 @scalar
-def _mollifier(cc, c0):
+def mollifier(cc, c0):
     """The factor m at a squared cross product, and its first two derivatives."""
     if cc >= c0:
         return 1.0, 0.0, 0.0
@@ -73,7 +73,7 @@ def edge_edge(tables, x, force, i, j, d0):
     e, g = minus(pb, pa), minus(pd, pc)
     n = cross(e, g)
     cc = dot(n, n)
-    m, m1, _ = _mollifier(cc, PARALLEL * tables.edge_square[i] * tables.edge_square[j])
+    m, m1, _ = mollifier(cc, PARALLEL * tables.edge_square[i] * tables.edge_square[j])
     nodes, k = (a, b, c, d), m * tables.stiffness
     energy = _part(x, force, nodes, s, t, d0, k)
     s, t, square = closest_end(pa, pb, pc, pd)
@@ -93,16 +93,29 @@ def edge_edge(tables, x, force, i, j, d0):
 
 
 @kernel
-def _second_part(corners, s, t, d0, k, out, slope):
-    """The second derivative of such a term, to out (12, 12); its gradient to slope (12,)."""
-    weights, moves, free = np.array([1.0 - s, s, t - 1.0, -t]), np.zeros((2, 4)), 0
+def weigh_edges(corners, which, weights, moves):
+    """Set weights (4,) and moves (2, 4) of the distance of two edges, or of the closest end.
+
+    corners : (4, 3) of the first edge and the second.
+    which : 0 for the edges, 1 for the closest end.
+
+    Returns the number of parameters over which the distance is minimal, see `second`, and whether
+    the closest points lie inside both edges.
+    """
+    a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
+    s, t, inside = closest_of_segments(a, b, c, d)
+    if which == 1:
+        s, t, _ = closest_end(a, b, c, d)
+    weights[0], weights[1], weights[2], weights[3] = 1.0 - s, s, t - 1.0, -t
+    moves[:] = 0.0
+    free = 0
     if 0.0 < s < 1.0:
         moves[free, 0], moves[free, 1] = -1.0, 1.0
         free += 1
     if 0.0 < t < 1.0:
         moves[free, 2], moves[free, 3] = 1.0, -1.0
         free += 1
-    return add_second(corners, weights, moves, free, d0, k, out, slope)
+    return free, inside
 
 
 @kernel
@@ -112,30 +125,29 @@ def edge_edge_tangent(tables, x, i, j, d0, out):
     Rows and columns belong to the ends of edge i and then of edge j.
     """
     corners, inner, slope = np.empty((4, 3)), np.zeros((12, 12)), np.zeros(12)
+    weights, moves = np.empty(4), np.empty((2, 4))
     for axis in range(3):
         for end in range(2):
             corners[end, axis] = x[tables.edges[i, end], axis]
             corners[2 + end, axis] = x[tables.edges[j, end], axis]
-    pa, pb, pc, pd = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
-    s, t, inside = closest_of_segments(pa, pb, pc, pd)
+    free, inside = weigh_edges(corners, 0, weights, moves)
     if not inside:
         return 0.0
-    energy = _second_part(corners, s, t, d0, tables.stiffness, inner, slope)
+    energy = add_second(corners, weights, moves, free, d0, tables.stiffness, inner, slope)
     if energy == 0.0:
         return 0.0
-    s, t, square = closest_end(pa, pb, pc, pd)
-    if square < d0 * d0:
-        energy += _second_part(corners, s, t, d0, -tables.stiffness, inner, slope)
-    e, g = minus(pb, pa), minus(pd, pc)
+    free, _ = weigh_edges(corners, 1, weights, moves)
+    energy += add_second(corners, weights, moves, free, d0, -tables.stiffness, inner, slope)
+    e, g = minus(point(corners, 1), point(corners, 0)), minus(point(corners, 3), point(corners, 2))
     n = cross(e, g)
     c0 = PARALLEL * tables.edge_square[i] * tables.edge_square[j]
-    m, m1, m2 = _mollifier(dot(n, n), c0)
+    m, m1, m2 = mollifier(dot(n, n), c0)
     for p in range(12):
         for q in range(12):
             out[p, q] += m * inner[p, q]
     if m1 == 0.0:
         return m * energy
-    first, second = _square_of_cross(e, g)
+    first, second = square_of_cross(e, g)
     for p in range(12):
         for q in range(12):
             out[p, q] += m1 * (first[p] * slope[q] + slope[p] * first[q])
@@ -144,7 +156,7 @@ def edge_edge_tangent(tables, x, i, j, d0, out):
 
 
 @kernel
-def _square_of_cross(e, g):
+def square_of_cross(e, g):
     """First and second derivative, (12,) and (12, 12), of |e x g|^2 by the ends of both edges."""
     ee, gg, eg = dot(e, e), dot(g, g), dot(e, g)
     by_vectors, twice = np.empty(6), np.empty((6, 6))

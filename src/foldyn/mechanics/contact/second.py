@@ -19,22 +19,22 @@ from foldyn.mechanics.contact.potential import barrier
 
 
 @kernel
-def add_second(corners, weights, moves, free, d0, k, out, slope):
-    """Add the derivatives of k d0^2 f(d/d0): the second to out (12, 12), the first to slope (12,).
-
-    corners : (4, 3) positions; weights : (4,) of r; moves : (2, 4) derivatives of the weights by
-    the `free` parameters over which the distance is minimal. Returns the energy (J).
-    """
-    r = np.zeros(3)
-    for i in range(4):
-        for c in range(3):
+def apart_of(corners, weights, r):
+    """Set r (3,) to the vector sum w_i x_i of corners (4, 3) and weights (4,); its square."""
+    for c in range(3):
+        r[c] = 0.0
+        for i in range(4):
             r[c] += weights[i] * corners[i, c]
-    d = math.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
-    if d >= d0 or k == 0.0:
-        return 0.0
-    f, f1, f2 = barrier(d / d0)
-    first = k * d0 * f1 / d
-    second = (k * f2 - first) / (d * d)
+    return r[0] ** 2 + r[1] ** 2 + r[2] ** 2
+
+
+@kernel
+def half_square(corners, weights, moves, free, r, slope, second):
+    """Set slope (12,) and second (12, 12) to the derivatives of d^2 / 2.
+
+    corners : (4, 3) positions; weights : (4,) of r (3,); moves : (2, 4) derivatives of the weights
+    by the `free` parameters over which the distance is minimal.
+    """
     jacobian, inverse, h = np.zeros((2, 3)), np.zeros((2, 2)), np.zeros((2, 12))
     for p in range(free):
         for i in range(4):
@@ -52,14 +52,32 @@ def add_second(corners, weights, moves, free, d0, k, out, slope):
         for i in range(12):
             h[p, i] = weights[i // 3] * jacobian[p, i % 3] + moves[p, i // 3] * r[i % 3]
     for i in range(12):
-        along = weights[i // 3] * r[i % 3]
-        slope[i] += first * along
+        slope[i] = weights[i // 3] * r[i % 3]
         for j in range(12):
-            value = second * along * weights[j // 3] * r[j % 3]
-            if i % 3 == j % 3:
-                value += first * weights[i // 3] * weights[j // 3]
+            value = weights[i // 3] * weights[j // 3] if i % 3 == j % 3 else 0.0
             for p in range(free):
                 for q in range(free):
-                    value -= first * h[p, i] * inverse[p, q] * h[q, j]
-            out[i, j] += value
+                    value -= h[p, i] * inverse[p, q] * h[q, j]
+            second[i, j] = value
+
+
+@kernel
+def add_second(corners, weights, moves, free, d0, k, out, slope):
+    """Add the derivatives of k d0^2 f(d/d0): the second to out (12, 12), the first to slope (12,).
+
+    The others as in `half_square`. Returns the energy (J).
+    """
+    r = np.empty(3)
+    d = math.sqrt(apart_of(corners, weights, r))
+    if d >= d0 or k == 0.0:
+        return 0.0
+    along, curved = np.empty(12), np.empty((12, 12))
+    half_square(corners, weights, moves, free, r, along, curved)
+    f, f1, f2 = barrier(d / d0)
+    first = k * d0 * f1 / d
+    second = (k * f2 - first) / (d * d)
+    for i in range(12):
+        slope[i] += first * along[i]
+        for j in range(12):
+            out[i, j] += first * curved[i, j] + second * along[i] * along[j]
     return k * d0 * d0 * f

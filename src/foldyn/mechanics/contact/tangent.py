@@ -101,12 +101,12 @@ def plane_tangents(tables, x, memory):
                     out[i, a, b] += stiffness * normal
             tied = tables.planes[p, FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0
             if tied and memory.counts.lagged == 1:
-                _friction_tangent(tables, x, memory, p, i, out[i])
+                friction_tangent(tables, x, memory, p, i, out[i])
     return out
 
 
 @kernel
-def _friction_tangent(tables, x, memory, p, i, out):
+def friction_tangent(tables, x, memory, p, i, out):
     """Add the derivative of the spring of node i on plane p to out (3, 3)."""
     k, stretch = tables.stiffness, stretch_of(tables, x, memory, p, i)
     most = farthest_stretch(tables, memory, p, i)

@@ -32,6 +32,8 @@ from foldyn.mechanics.contact.distances import (
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.second import add_second
 
+PARTS = 7  # of a triangle: itself, its sides, its corners
+
 
 @scalar
 def _push(force, i, by, r):
@@ -93,29 +95,56 @@ def vertex_triangle(tables, x, force, v, t, d0):
     return energy
 
 
-@kernel
-def _second_part(corners, w, region, d0, k, out, slope):
-    """The second derivative of such a term, to out (12, 12); its gradient to slope (12,)."""
-    weights, moves = np.zeros(4), np.zeros((2, 4))
-    weights[0] = 1.0
-    for i in range(3):
-        weights[1 + i] = -w[i]
-    free = 0
-    if region < SIDE_AB:
-        free = 2
-        moves[0, 1], moves[0, 2] = 1.0, -1.0
-        moves[1, 1], moves[1, 3] = 1.0, -1.0
-    elif region <= SIDE_CA:
-        free = 1
-        first = region - SIDE_AB
-        moves[0, 1 + first], moves[0, 1 + (first + 1) % 3] = 1.0, -1.0
-    return add_second(corners, weights, moves, free, d0, k, out, slope)
-
-
 @scalar
 def _on_side(s, side, first, second):
     """Region of the point at the fraction s of a side between two corners."""
     return first if s <= 0.0 else (second if s >= 1.0 else side)
+
+
+@kernel
+def weigh_triangle(corners, which, weights, moves):
+    """Set weights (4,) and moves (2, 4) of the distance of a vertex from a part of a triangle.
+
+    corners : (4, 3) of the vertex and the triangle.
+    which : 0 for the triangle, 1 to 3 for its sides, 4 to 6 for its corners.
+
+    Returns the number of parameters over which the distance is minimal; see `second`.
+    """
+    p, a, b, c = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
+    if which == 0:
+        wa, wb, wc, region = closest_on_triangle(p, a, b, c)
+    elif which == 1:
+        s = closest_on_segment(p, a, b)
+        wa, wb, wc, region = 1.0 - s, s, 0.0, _on_side(s, SIDE_AB, CORNER_A, CORNER_B)
+    elif which == 2:
+        s = closest_on_segment(p, b, c)
+        wa, wb, wc, region = 0.0, 1.0 - s, s, _on_side(s, SIDE_BC, CORNER_B, CORNER_C)
+    elif which == 3:
+        s = closest_on_segment(p, c, a)
+        wa, wb, wc, region = s, 0.0, 1.0 - s, _on_side(s, SIDE_CA, CORNER_C, CORNER_A)
+    else:
+        wa, wb, wc, region = _one(which, 4), _one(which, 5), _one(which, 6), CORNER_A
+    weights[0], weights[1], weights[2], weights[3] = 1.0, -wa, -wb, -wc
+    moves[:] = 0.0
+    if region < SIDE_AB:
+        moves[0, 1], moves[0, 2] = 1.0, -1.0
+        moves[1, 1], moves[1, 3] = 1.0, -1.0
+        return 2
+    if region <= SIDE_CA:
+        first = region - SIDE_AB
+        moves[0, 1 + first], moves[0, 1 + (first + 1) % 3] = 1.0, -1.0
+        return 1
+    return 0
+
+
+@scalar
+def share_of(tables, t, which):
+    """What a part of triangle t counts; see `weigh_triangle`."""
+    if which == 0:
+        return 1.0
+    if which < 4:
+        return -tables.shared_side[t, which - 1]
+    return tables.shared_corner[tables.triangles[t, which - 4]]
 
 
 @kernel
@@ -124,30 +153,16 @@ def vertex_triangle_tangent(tables, x, v, t, d0, out):
 
     Rows and columns belong to the vertex and then the corners.
     """
-    a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
-    corners, k, slope = np.empty((4, 3)), tables.stiffness, np.zeros(12)
+    corners, slope, energy = np.empty((4, 3)), np.zeros(12), 0.0
+    weights, moves = np.empty(4), np.empty((2, 4))
     for axis in range(3):
-        corners[0, axis], corners[1, axis] = x[v, axis], x[a, axis]
-        corners[2, axis], corners[3, axis] = x[b, axis], x[c, axis]
-    p, pa, pb, pc = point(x, v), point(x, a), point(x, b), point(x, c)
-    wa, wb, wc, region = closest_on_triangle(p, pa, pb, pc)
-    energy = _second_part(corners, (wa, wb, wc), region, d0, k, out, slope)
-    if energy == 0.0:
-        return 0.0
-    s = closest_on_segment(p, pa, pb)
-    share = -k * tables.shared_side[t, 0]
-    region = _on_side(s, SIDE_AB, CORNER_A, CORNER_B)
-    energy += _second_part(corners, (1.0 - s, s, 0.0), region, d0, share, out, slope)
-    s = closest_on_segment(p, pb, pc)
-    share = -k * tables.shared_side[t, 1]
-    region = _on_side(s, SIDE_BC, CORNER_B, CORNER_C)
-    energy += _second_part(corners, (0.0, 1.0 - s, s), region, d0, share, out, slope)
-    s = closest_on_segment(p, pc, pa)
-    share = -k * tables.shared_side[t, 2]
-    region = _on_side(s, SIDE_CA, CORNER_C, CORNER_A)
-    energy += _second_part(corners, (s, 0.0, 1.0 - s), region, d0, share, out, slope)
-    for i in range(3):
-        share = k * tables.shared_corner[tables.triangles[t, i]]
-        w = (_one(i, 0), _one(i, 1), _one(i, 2))
-        energy += _second_part(corners, w, CORNER_A + i, d0, share, out, slope)
+        corners[0, axis] = x[v, axis]
+        for i in range(3):
+            corners[1 + i, axis] = x[tables.triangles[t, i], axis]
+    for which in range(PARTS):
+        k = tables.stiffness * share_of(tables, t, which)
+        free = weigh_triangle(corners, which, weights, moves)
+        energy += add_second(corners, weights, moves, free, d0, k, out, slope)
+        if which == 0 and energy == 0.0:
+            return 0.0
     return energy

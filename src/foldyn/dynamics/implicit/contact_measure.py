@@ -1,0 +1,195 @@
+"""Discrete gradients of what depends on the mutual distances of four points.
+
+In a step the points move by dx about their mean positions x, and a measure e, such as a squared
+distance, goes from e0 to e1. With D the part of dx that is no rigid motion (least squares about x),
+
+    g = grad e(x) + (e1 - e0 - grad e(x) . dx) D / |D|^2
+
+does the work e1 - e0 exactly, and has neither a resultant nor a moment about x: the gradient of a
+measure has none, and what is orthogonal to all rigid motions has none (Gonzalez, J. Nonlinear Sci.
+6, 1996). What is missed is of the third order in the step. It vanishes for a squared distance of
+points that stay the closest ones.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.intrinsics import flat
+
+NOISE = 16.0 * float(np.finfo(float).eps)  # of positions: what a measure may miss by rounding
+
+
+class Move(NamedTuple):
+    """Four points in a step, and memory for a measure of theirs."""
+
+    start: NDArray  # (4, 3) m
+    middle: NDArray  # (4, 3) m
+    end: NDArray  # (4, 3) m
+    motion: NDArray  # (4, 3) dx, m
+    deform: NDArray  # (4, 3) D, m
+    by_end: NDArray  # (12, 12) derivative of D with respect to the end
+    slope: NDArray  # (12,) gradient of a measure in the middle,
+    second: NDArray  # (12, 12) its second derivative there,
+    after: NDArray  # (12,) its gradient at the end,
+    gradient: NDArray  # (12,) its discrete gradient
+    weights: NDArray  # (4,) of a distance; see `mechanics.contact.second`
+    moves: NDArray  # (2, 4)
+    apart: NDArray  # (3,) m
+
+
+def new_move() -> Move:
+    """Memory for four points."""
+    start, middle, end, motion, deform = np.zeros((5, 4, 3))
+    slope, after, gradient = np.zeros((3, 12))
+    by_end, second = np.zeros((2, 12, 12))
+    weights, moves, apart = np.zeros(4), np.zeros((2, 4)), np.zeros(3)
+    return Move(
+        start, middle, end, motion, deform, by_end, slope, second, after, gradient, weights, moves,
+        apart,
+    )  # fmt: skip
+
+
+@kernel
+def go(move, tangent):
+    """What follows from start and end; returns |D|^2 (m2) and the largest coordinate (m).
+
+    tangent : whether the derivative of D is asked for.
+    """
+    r, d, farthest = np.empty((4, 3)), move.deform, 0.0
+    for c in range(3):
+        middle, shift = 0.0, 0.0
+        for v in range(4):
+            x0, x1 = move.start[v, c], move.end[v, c]
+            farthest = max(farthest, abs(x0), abs(x1))
+            move.middle[v, c], move.motion[v, c] = 0.5 * (x0 + x1), x1 - x0
+            middle += 0.25 * move.middle[v, c]
+            shift += 0.25 * move.motion[v, c]
+        for v in range(4):
+            r[v, c], d[v, c] = move.middle[v, c] - middle, move.motion[v, c] - shift
+    inverse = _inertia_inverse(r)
+    w, size = (0.0, 0.0, 0.0), 0.0
+    for _ in range(2):  # once more for digits that narrow pairs lose in the inverse
+        turn = _turned_by(inverse, *_moment(r, d))
+        for v in range(4):
+            d[v, 0] -= turn[1] * r[v, 2] - turn[2] * r[v, 1]
+            d[v, 1] -= turn[2] * r[v, 0] - turn[0] * r[v, 2]
+            d[v, 2] -= turn[0] * r[v, 1] - turn[1] * r[v, 0]
+        w = (w[0] + turn[0], w[1] + turn[1], w[2] + turn[2])
+        for c in range(3):
+            shift = 0.25 * (d[0, c] + d[1, c] + d[2, c] + d[3, c])
+            for v in range(4):
+                d[v, c] -= shift
+    for v in range(4):
+        for c in range(3):
+            size += d[v, c] * d[v, c]
+    if tangent:
+        _by_end(move, r, w, inverse)
+    return size, farthest
+
+
+@scalar
+def _moment(r, d):
+    """Sum of r x d, both (4, 3)."""
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for v in range(4):
+        a, b, c = r[v, 0], r[v, 1], r[v, 2]
+        t0 += b * d[v, 2] - c * d[v, 1]
+        t1 += c * d[v, 0] - a * d[v, 2]
+        t2 += a * d[v, 1] - b * d[v, 0]
+    return t0, t1, t2
+
+
+@scalar
+def _inertia_inverse(r):
+    """Inverse of the inertia of points r (4, 3) about their mean: xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for v in range(4):
+        a, b, c = r[v, 0], r[v, 1], r[v, 2]
+        xx += b * b + c * c
+        yy += a * a + c * c
+        zz += a * a + b * b
+        xy -= a * b
+        xz -= a * c
+        yz -= b * c
+    axx, ayy, azz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    axy, axz, ayz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+    once = 1.0 / (xx * axx + xy * axy + xz * axz)
+    return once * axx, once * ayy, once * azz, once * axy, once * axz, once * ayz
+
+
+@scalar
+def _turned_by(inverse, t0, t1, t2):
+    """Vector of the rotation that gives points with such an inertia some moment."""
+    axx, ayy, azz, axy, axz, ayz = inverse
+    return (
+        axx * t0 + axy * t1 + axz * t2,
+        axy * t0 + ayy * t1 + ayz * t2,
+        axz * t0 + ayz * t1 + azz * t2,
+    )
+
+
+@kernel
+def _by_end(move, r, w, inverse):
+    """The derivative of D = dx - w x r: of its turn w, and of r, half of what the end moves by."""
+    one, moved = np.zeros(3), np.zeros(3)
+    for v in range(4):
+        for c in range(3):
+            one[:] = 0.0
+            one[c] = 1.0
+            # the end's part in D, and in the moment of dx about x, is e - w x e / 2
+            moved[0] = one[0] - 0.5 * (w[1] * one[2] - w[2] * one[1])
+            moved[1] = one[1] - 0.5 * (w[2] * one[0] - w[0] * one[2])
+            moved[2] = one[2] - 0.5 * (w[0] * one[1] - w[1] * one[0])
+            d, a = move.deform[v], r[v]
+            turn = _turned_by(
+                inverse,
+                0.5 * (one[1] * d[2] - one[2] * d[1]) + a[1] * moved[2] - a[2] * moved[1],
+                0.5 * (one[2] * d[0] - one[0] * d[2]) + a[2] * moved[0] - a[0] * moved[2],
+                0.5 * (one[0] * d[1] - one[1] * d[0]) + a[0] * moved[1] - a[1] * moved[0],
+            )
+            for i in range(4):
+                share = 0.75 if i == v else -0.25
+                row, b = 3 * i, r[i]
+                column = 3 * v + c
+                move.by_end[row, column] = share * moved[0] - turn[1] * b[2] + turn[2] * b[1]
+                move.by_end[row + 1, column] = share * moved[1] - turn[2] * b[0] + turn[0] * b[2]
+                move.by_end[row + 2, column] = share * moved[2] - turn[0] * b[1] + turn[1] * b[0]
+
+
+@kernel
+def add_measure(move, size, farthest, change, law, law_slope, tangent, force, block):
+    """Add the force (12,) of a measure, and its derivative (12, 12) with respect to the end.
+
+    size, farthest : of `go`.
+    change : of the measure in the step.
+    law, law_slope : the quotient of an energy and the measure, N per unit of its gradient, and its
+        derivative with respect to the measure at the end.
+    tangent : whether the derivative is asked for.
+    """
+    dx, deform = flat(move.motion), flat(move.deform)
+    missed, rounding, share = change, 0.0, 0.0
+    for i in range(12):
+        missed -= move.slope[i] * dx[i]
+        rounding += abs(move.slope[i])
+    if abs(missed) > NOISE * farthest * rounding and size > 0.0:
+        share = missed / size
+    for i in range(12):
+        move.gradient[i] = move.slope[i] + share * deform[i]
+        force[i] += law * move.gradient[i]
+    if not tangent:
+        return
+    for j in range(12):
+        along, half = 0.0, 0.0
+        if share != 0.0:
+            for i in range(12):
+                half += 0.5 * move.second[j, i] * dx[i]
+                along += move.by_end[i, j] * deform[i]
+            along = (move.after[j] - move.slope[j] - half - 2.0 * share * along) / size
+        for i in range(12):
+            value = 0.5 * move.second[i, j] + share * move.by_end[i, j] + along * deform[i]
+            block[i, j] += law * value + law_slope * move.gradient[i] * move.after[j]

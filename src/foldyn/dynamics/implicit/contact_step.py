@@ -1,0 +1,356 @@
+"""Contact in a step of the conserving method: forces that do exactly the work of its potential.
+
+Pairs: `contact_pairs`. Hinges are guarded as they resist: the quotient of energy and dihedral times
+the discrete gradient of the dihedral. Planes: the quotient of energy and distance, along the
+normal. Friction: the spring halfway, with no more than what the normal force at the start of the
+step allows.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from foldyn.dynamics.implicit.contact_measure import new_move
+from foldyn.dynamics.implicit.contact_pairs import EDGES, VERTEX, edges_step, vertex_step
+from foldyn.dynamics.implicit.contact_quotient import quotient
+from foldyn.dynamics.implicit.discrete_gradient import discrete_gradient
+from foldyn.jit.compiled import kernel
+from foldyn.mechanics.block_matrix import assembled, pairs_within
+from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
+from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.search import (
+    edge_gap,
+    farthest,
+    list_pairs,
+    place,
+    use_all,
+    vertex_gap,
+)
+from foldyn.mechanics.contact.step_limit import fastest
+from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
+from foldyn.mechanics.contact.tangent import friction_tangent
+from foldyn.mechanics.dihedral import add_hessian
+
+
+class StepContact:
+    """What touches in the steps of a motion.
+
+    Parameters
+    ----------
+    tables : Tables
+    memory : Memory
+        Its positions, planes and energy become those at the end of a step.
+    rows : int
+        Of nodal arrays.
+
+    Attributes
+    ----------
+    force : ndarray, shape (rows, 3)
+        Mean gradient (N) of the potential in a step, and friction.
+    push : ndarray, shape (q, n, 4)
+        Mean gradient (N) of friction of each plane at each node, and the normal force.
+    """
+
+    def __init__(self, tables: Tables, memory: Memory, rows: int) -> None:
+        self._tables, self._memory = tables, memory
+        self.force, self.push = np.zeros((rows, 3)), np.zeros_like(memory.friction)
+        self._start, self._middle = np.zeros((2, *memory.x.shape))
+        self._moved = np.zeros((2, len(tables.planes), 3))
+        self._pairs = np.zeros((2, memory.d0.shape[1]), np.int64)
+        self._move = new_move()
+
+    def put(self, u0: NDArray, u1: NDArray, factor0: NDArray, factor1: NDArray) -> None:
+        """Make the force that of a step between displacements (rows, 3).
+
+        factor0, factor1 : (h, 3) of the histories at both ends.
+        """
+        kept = self._memory
+        for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
+            move_planes(self._tables, factor, kept)
+            moved[:] = kept.moved[:, :3]
+        self.force[:] = 0.0
+        self._counts = _find(self._tables, u0, u1, self._start, self._middle, kept, self._pairs)
+        kept.facts.energy = self._steps(False, self.force)[2]
+        _add_others(
+            self._tables, self._start, self._middle, self._moved, kept, self._move, self.push,
+            self.force,
+        )  # fmt: skip
+
+    def _steps(self, tangent: bool, force: NDArray) -> tuple[NDArray, NDArray, float]:
+        """Add the forces of the pairs that touch; nodes (k, 4), tangents (k, 12, 12), energy (J).
+
+        Tangents are zero if they are not asked for.
+        """
+        count = sum(self._counts)
+        nodes, blocks = np.empty((count, 4), np.int64), np.zeros((count, 12, 12))
+        energy = _pair_steps(
+            self._tables, self._start, self._memory, self._pairs, *self._counts, self._move,
+            tangent, nodes, blocks, force,
+        )  # fmt: skip
+        return nodes, blocks, energy
+
+    def tangent(self, size: int) -> sparse.csr_array:
+        """Derivative (size, size), N/m, of the force of the last step with respect to its end."""
+        own, kept = self._tables, self._memory
+        nodes, blocks, _ = self._steps(True, np.zeros_like(self.force))
+        guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
+        acts = _guard_tangents(own, self._start, kept.x, self._move, guards)
+        nodes = np.concatenate([nodes, own.hinges[acts]])
+        four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
+        pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+        if len(own.planes):
+            at_planes = np.zeros((*kept.x.shape, 3))
+            _plane_tangents(own, self._start, self._middle, self._moved, kept, at_planes)
+            met = np.flatnonzero(at_planes.any(axis=(1, 2)))
+            pairs.append(np.column_stack([met, met]))
+            entries.append(at_planes[met])
+        return assembled(np.concatenate(pairs), np.concatenate(entries), size)
+
+
+@kernel
+def _find(tables, u0, u1, start, middle, memory, pairs):
+    """Positions of a step, and the pairs that touch, at its start or its end.
+
+    Their numbers go to `pairs`; returns how many there are of either kind.
+    """
+    place(tables, u0, memory)
+    start[:] = memory.x
+    if memory.d0.shape[1] > 0:
+        _list(tables, u0, u1, memory)
+    place(tables, u1, memory)
+    middle[:] = 0.5 * (start + memory.x)
+    # by how much a distance in the middle and one at the ends may differ
+    reach, found = fastest(memory.x - start, len(start)), np.zeros(2, np.int64)
+    for kind in range(2):
+        listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
+        for k in range(listed):
+            one, other, d0 = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1], memory.d0[kind, k]
+            if not _gap(tables, middle, kind, one, other) < d0 + reach:
+                continue
+            before = _gap(tables, start, kind, one, other)
+            if min(before, _gap(tables, memory.x, kind, one, other)) < d0:
+                pairs[kind, found[kind]] = k
+                found[kind] += 1
+    return found[0], found[1]
+
+
+@kernel
+def _gap(tables, x, kind, one, other):
+    """Distance (m) of a pair."""
+    if kind == VERTEX:
+        return vertex_gap(tables, x, one, other)
+    return edge_gap(tables, x, one, other)
+
+
+@kernel
+def _list(tables, u0, u1, memory):
+    """Have all pairs listed that are near on the way from u0 to u1; none if that is too long."""
+    far = math.inf
+    if memory.counts.has_list == 1:
+        far = max(farthest(tables, u0, memory), farthest(tables, u1, memory))
+    if not far < 0.5 * memory.facts.skin:
+        middle = 0.5 * (u0 + u1)
+        place(tables, middle, memory)
+        list_pairs(tables, middle, memory)
+        use_all(memory)
+        if not farthest(tables, u0, memory) < 0.5 * memory.facts.skin:
+            memory.counts.full, memory.counts.has_list = 1, 0
+
+
+@kernel
+def _gather(tables, memory, kind, pair, start, move, nodes):
+    """The four nodes of a listed pair, and where they are in a step."""
+    one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
+    if kind == VERTEX:
+        nodes[0] = one
+        for i in range(3):
+            nodes[1 + i] = tables.triangles[other, i]
+    else:
+        for i in range(2):
+            nodes[i], nodes[2 + i] = tables.edges[one, i], tables.edges[other, i]
+    for i in range(4):
+        for c in range(3):
+            move.start[i, c], move.end[i, c] = start[nodes[i], c], memory.x[nodes[i], c]
+    return one, other
+
+
+@kernel
+def _pair_steps(
+    tables, start, memory, pairs, first, second, move, tangent, nodes, blocks, force
+):  # fmt: skip
+    """Nodes (k, 4), tangents (k, 12, 12) and forces of the pairs that touch; their energy (J).
+
+    Those of either kind are `first` and `second` many.
+    """
+    push, energy = np.empty(12), 0.0
+    for k in range(first + second):
+        kind = VERTEX if k < first else EDGES
+        pair = pairs[kind, k if k < first else k - first]
+        one, other = _gather(tables, memory, kind, pair, start, move, nodes[k])
+        d0 = memory.d0[kind, pair]
+        push[:] = 0.0
+        if kind == VERTEX:
+            energy += vertex_step(tables, other, d0, move, tangent, push, blocks[k])
+        else:
+            energy += edges_step(tables, one, other, d0, move, tangent, push, blocks[k])
+        for i in range(12):
+            force[nodes[k, i // 3], i % 3] += push[i]
+    return energy
+
+
+@kernel
+def _guard(tables, h, theta0, theta1):
+    """Mean moment (N m) of a guard, its slope by the dihedral at the end, its energy there (J)."""
+    limit, k = tables.hinge_limit[h], tables.hinge_stiffness[h]
+    moment, slope, energy = 0.0, 0.0, 0.0
+    for sign in (1.0, -1.0):
+        x0 = (theta0 if sign > 0.0 else TURN - theta0) / limit
+        x1 = (theta1 if sign > 0.0 else TURN - theta1) / limit
+        value, rate = quotient(x0, x1)
+        moment += sign * k * limit * value
+        slope += k * rate
+        energy += k * limit * limit * barrier(x1)[0] if x1 < 1.0 else 0.0
+    return moment, slope, energy
+
+
+@kernel
+def _turn(tables, h, start, end, move, points, plain, gradient):
+    """Discrete gradient of the dihedral of a guarded hinge; its dihedrals, the gradient at the end.
+
+    See `discrete_gradient`.
+    """
+    before, after = gradient_at(tables, start, h), gradient_at(tables, end, h)
+    for v in range(4):
+        node = tables.hinges[h, v]
+        for c in range(3):
+            move.middle[v, c] = 0.5 * (start[node, c] + end[node, c])
+            move.motion[v, c] = end[node, c] - start[node, c]
+            move.deform[v, c] = after[1 + 3 * v + c]
+    change = after[0] - before[0]
+    discrete_gradient(move.middle, move.motion, change, points, plain, gradient)
+
+
+@kernel
+def _add_guards(tables, start, memory, move, force):
+    """Add the moments of the guards; their energy at the end to that of contact."""
+    points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    for h in range(tables.hinge_limit.size):
+        theta0 = gradient_at(tables, start, h)[0]
+        theta1 = gradient_at(tables, memory.x, h)[0]
+        moment, _, energy = _guard(tables, h, theta0, theta1)
+        memory.facts.energy += energy
+        if moment == 0.0:
+            continue
+        _turn(tables, h, start, memory.x, move, points, plain, gradient)
+        for v in range(4):
+            for c in range(3):
+                force[tables.hinges[h, v], c] += moment * gradient[v, c]
+
+
+@kernel
+def _guard_tangents(tables, start, end, move, blocks):
+    """Derivatives (h, 4, 3, 4, 3) of the guards, and which of them act (h,).
+
+    Those of the gradients are of the first order in the step, as of other hinges.
+    """
+    acts = np.zeros(tables.hinge_limit.size, np.bool_)
+    points, plain, gradient = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    for h in range(tables.hinge_limit.size):
+        theta0, theta1 = gradient_at(tables, start, h)[0], gradient_at(tables, end, h)[0]
+        moment, slope, _ = _guard(tables, h, theta0, theta1)
+        if moment == 0.0:
+            continue
+        acts[h] = True
+        _turn(tables, h, start, end, move, points, plain, gradient)
+        for v in range(12):
+            for w in range(12):
+                turned = slope * gradient[v // 3, v % 3] * move.deform[w // 3, w % 3]
+                blocks[h, v // 3, v % 3, w // 3, w % 3] = turned
+        add_hessian(points, plain, 0.5 * moment, blocks[h])
+    return acts
+
+
+@kernel
+def _add_others(tables, start, middle, moved, memory, move, push, force):
+    """Add the forces of guards and planes."""
+    if memory.d0.shape[1] > 0:
+        _add_guards(tables, start, memory, move, force)
+        if memory.counts.full == 1:
+            memory.facts.energy = np.nan
+            force[tables.surface[0], 0] = np.nan
+    if len(tables.planes) > 0:
+        _add_planes(tables, start, middle, moved, memory, push, force)
+
+
+@kernel
+def _plane_quotient(tables, start, moved, memory, p, i):
+    """Mean normal force over -k d0 and its slope, of node i at plane p; its energy (J) at the end.
+
+    memory.moved : that of the end, also afterwards.
+    """
+    d0 = 0.5 * tables.node_thickness[i]
+    after = height(tables, memory.x, memory, p, i) / d0
+    memory.moved[p, :3] = moved[0, p]
+    before = height(tables, start, memory, p, i) / d0
+    memory.moved[p, :3] = moved[1, p]
+    energy = tables.stiffness * d0 * d0 * barrier(after)[0] if after < 1.0 else 0.0
+    value, slope = quotient(before, after)
+    return value, slope, energy
+
+
+@kernel
+def _add_planes(tables, start, middle, moved, memory, push, force):
+    """Add the forces of the planes; they go to push (q, n, 4), too."""
+    k = tables.stiffness
+    push[:] = 0.0
+    for p in range(len(tables.planes)):
+        plane = tables.planes[p]
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            value, _, energy = _plane_quotient(tables, start, moved, memory, p, i)
+            if value == 0.0:
+                continue
+            memory.facts.energy += energy
+            push[p, i, 3] = -0.5 * k * tables.node_thickness[i] * value
+            for c in range(3):
+                force[i, c] -= push[p, i, 3] * plane[NORMAL + c]
+            if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
+                memory.moved[p, :3] = 0.5 * (moved[0, p] + moved[1, p])
+                stretch = stretch_of(tables, middle, memory, p, i)
+                memory.moved[p, :3] = moved[1, p]
+                most = farthest_stretch(tables, memory, p, i)
+                share = k if stretch[3] <= most else k * most / stretch[3]
+                for c in range(3):
+                    push[p, i, c] = share * stretch[c]
+                    force[i, c] += push[p, i, c]
+
+
+@kernel
+def _plane_tangents(tables, start, middle, moved, memory, out):
+    """Derivatives (n, 3, 3) of the forces of planes."""
+    spring = np.empty((3, 3))
+    for p in range(len(tables.planes)):
+        plane = tables.planes[p]
+        for m in range(tables.meeting.size):
+            i = tables.meeting[m]
+            value, slope, _ = _plane_quotient(tables, start, moved, memory, p, i)
+            if value == 0.0:
+                continue
+            for a in range(3):
+                for b in range(3):
+                    normal = plane[NORMAL + a] * plane[NORMAL + b]
+                    out[i, a, b] += tables.stiffness * slope * normal
+            if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
+                spring[:] = 0.0
+                memory.moved[p, :3] = 0.5 * (moved[0, p] + moved[1, p])
+                friction_tangent(tables, middle, memory, p, i, spring)
+                memory.moved[p, :3] = moved[1, p]
+                for a in range(3):
+                    for b in range(3):
+                        out[i, a, b] += 0.5 * spring[a, b]
