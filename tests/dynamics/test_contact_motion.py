@@ -183,9 +183,6 @@ def test_others_refuse_contact():
     case = fd.Case(strip(), [fd.Fix([0, 1, 2, 3])], [push], contact=fd.Contact())
     with pytest.raises(InputError, match=r"contact: modes and responses do not take contact yet"):
         fd.modes(case)
-    shell = fd.shell(fd.patterns.simple_fold(a=0.04, b=0.04, dihedral=90), SHEET, divisions=2)
-    with pytest.raises(InputError, match=r"contact: .* shells do not take it yet"):
-        fd.simulate(fd.Case(shell, contact=fd.Contact()), 1e-3, method="newmark")
 
 
 @pytest.mark.slow  # compiles the loop with contact around laws with memory

@@ -74,16 +74,22 @@ def gaps(own, kept, u):
     return np.array([*first, *second])
 
 
-def test_steps_stay_within_the_range_of_the_list():
-    made = pair(0.3)._replace(skin=0.1)
+def test_motions_beyond_the_range_of_a_list_make_others_on_their_way():
+    made, u = pair(0.3)._replace(skin=0.1), np.zeros((6, 3))
     step = np.zeros((6, 3))
-    step[3:, 0] = 2.0  # along each other: 1 m of each against the mean
+    step[3:, 0] = 1.0  # along each other: 0.5 m of each against the mean, 0.05 m to a list
     kept = memory(made)
-    share = clear_share(made, kept, np.zeros((6, 3)), step, NO_PLANES, KEEP)
-    assert share == pytest.approx(0.5 * 0.1)
-    assert kept.counts.lists == 1
-    clear_share(made, kept, 0.9 * share * step, step, NO_PLANES, KEEP)
-    assert kept.counts.lists == 2
+    assert clear_share(made, kept, u, step, NO_PLANES, KEEP) == 1.0
+    assert kept.counts.lists in (10, 11)  # by rounding
+    np.testing.assert_array_equal(kept.x, made.rest)
+    step[3:] = 0.0, 0.0, -3.0  # onto each other, and through
+    share = clear_share(made, memory(made), u, step, NO_PLANES, KEEP)
+    assert 0.2 < 3.0 * share < 0.3
+    none, far = memory(made), 100.0 * step
+    assert clear_share(made, none, u, far, NO_PLANES, KEEP) < 0.001
+    slide = np.zeros((6, 3))
+    slide[3:, 0] = 1000.0
+    assert clear_share(made, memory(made), u, slide, NO_PLANES, KEEP) < 0.01  # enough for once
 
 
 def test_planes_and_sheets_that_meet_share_the_gap():

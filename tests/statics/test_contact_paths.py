@@ -133,6 +133,3 @@ def test_what_paths_do_not_take_is_refused():
     behind = fd.Contact(planes=[fd.Plane((0, 0, 1e-3), (0, 0, 1))])
     with pytest.raises(InputError, match=r"contact.planes\[0\]: node 4 is 0.001 m behind"):
         fd.trace(fd.Case(strip(), held, [push], contact=behind))
-    shell = fd.shell(fd.patterns.simple_fold(a=0.04, b=0.04, dihedral=90), SHEET, divisions=2)
-    with pytest.raises(InputError, match=r"contact: .* shells do not take it yet"):
-        fd.trace(fd.Case(shell, [fd.Fix([0, 1, 2, 3])], [push], contact=fd.Contact()))

@@ -52,8 +52,8 @@ class Case(Supported, Loaded, Damped):
     masses : sequence of PointMass
         What nodes carry beside the mass of the sheet; none by default.
     contact : Contact, optional
-        Panels that touch each other, and planes; without it they pass through each other. Explicit
-        integrators take it.
+        Panels that touch each other, and planes; without it they pass through each other. Motions
+        and paths of equilibria take it.
 
     Attributes
     ----------

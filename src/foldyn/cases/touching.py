@@ -75,9 +75,3 @@ def _check_structure(case: Case) -> None:
             "leave out contact, or hinge_offset",
             "contact",
         )
-    if len(case.body.hidden):
-        raise InputError(
-            ": is for models of bars and hinges; shells do not take it yet: leave it out, or "
-            "take fd.discretize",
-            "contact",
-        )

@@ -44,9 +44,10 @@ def choose(
     conserved = not case.damped and not any(histories(case))
     conserved = conserved and case.body.has_discrete_gradient and not case.remembering
     implicit = "energy_momentum" if conserved else "generalized_alpha"
-    if case.contact is not None and case.remembering:
+    has_mass = not case.structure.massless or case.structure.condensed is not None
+    if case.contact is not None and has_mass and case.remembering:
         return suited("rk4", case).name, "explicit: contact, and laws with memory"
-    if case.contact is not None:
+    if case.contact is not None and has_mass:
         return suited("dormand_prince", case).name, "explicit: its error resolves impacts"
     if massless := case.structure.massless:
         return "generalized_alpha", f"implicit: {massless} have no mass"

@@ -2,7 +2,7 @@
 
 Explicit methods limit their steps by speeds (`step_limit`). A step of Newton's method is a motion
 without one: nodes and planes go along straight lines, and it is cut so that each gap keeps a share
-of itself, no guarded hinge passes 0 or 2 pi, and nothing leaves the range of the list of pairs.
+of itself and no guarded hinge passes 0 or 2 pi. Pairs are listed anew where it leaves their range.
 
 The first gap to close is found by conservative advancement, which needs distances alone: a pair
 whose points move by l at most against each other keeps its gap g above its goal over the share
@@ -35,6 +35,7 @@ from foldyn.mechanics.contact.tables import NORMAL
 KEEP = 0.2  # of each gap
 NEAR = 0.01  # of the goal: gaps so little above it have reached it
 ADVANCES = 100  # of one pair
+LISTS = 40  # of pairs along one motion
 HALVINGS = 40  # where a hinge would pass
 
 
@@ -141,6 +142,41 @@ def _hinges_share(tables, x, step, keep, best):
 
 
 @kernel
+def _listed_share(tables, memory, u, step, keep, fast):
+    """Share of a motion from u, where memory.x is, that leaves all pairs apart.
+
+    Where the motion leaves the range of the list, it goes on from there with another one.
+    """
+    far, done = farthest(tables, u, memory), 0.0
+    if memory.counts.has_list == 0 or not far <= 0.25 * memory.facts.skin:
+        list_pairs(tables, u, memory)
+        use_all(memory)
+        far = 0.0
+    ahead = np.empty((0, 3))
+    for _ in range(LISTS):
+        if memory.counts.full == 1:
+            return done
+        left, range_left = 1.0 - done, 0.5 * memory.facts.skin - far
+        part = range_left / fast if fast * left > range_left else left
+        share = _pairs_share(tables, memory, step, keep, part)
+        if share < part:
+            return done + share
+        if part == left:
+            return 1.0
+        done += part
+        if ahead.size == 0:
+            ahead = np.empty_like(u)
+        for i in range(len(u)):
+            for c in range(3):
+                ahead[i, c] = u[i, c] + done * step[i, c]
+        place(tables, ahead, memory)
+        list_pairs(tables, ahead, memory)
+        use_all(memory)
+        far = 0.0
+    return done
+
+
+@kernel
 def clear_share(tables, memory, u, step, moves, keep):
     """Share, from 0 to 1, of a motion from displacement u by `step`, (rows, 3), that crosses none.
 
@@ -152,17 +188,8 @@ def clear_share(tables, memory, u, step, moves, keep):
     for i in range(n):  # a largest value does not see nan
         if not _length(step, i) < math.inf:
             return 0.0
-    fast = fastest(step, n)
     if memory.d0.shape[1] > 0:
-        far, skin = farthest(tables, u, memory), memory.facts.skin
-        if memory.counts.has_list == 0 or not far <= 0.25 * skin:
-            list_pairs(tables, u, memory)
-            use_all(memory)
-            far, skin = 0.0, memory.facts.skin
-        if memory.counts.full == 1:
-            return 0.0
-        if fast > 0.5 * skin - far:
-            best = (0.5 * skin - far) / fast
-        best = _pairs_share(tables, memory, step, keep, best)
+        best = _listed_share(tables, memory, u, step, keep, fastest(step, n))
+        place(tables, u, memory)
         best = _hinges_share(tables, memory.x, step, keep, best)
     return max(0.0, _planes_share(tables, memory, step, moves, keep, best))

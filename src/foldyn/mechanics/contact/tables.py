@@ -123,7 +123,11 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
     thickest = np.array([sheets.thickness[of].max() if len(of) else 0.0 for of in own])
     apart = nodes[edges[:, 1]] - nodes[edges[:, 0]]
     square = np.einsum("ij,ij->i", apart, apart)
-    guarded, limit, reach, stiffness = hinge_guards(nodes, hinges, thickest, sheets.stiffness)
+    sides = _panels_of_edges(side, panel, len(edges))
+    pieces = crease_pieces(nodes, edges, sides, members)
+    guarded, limit, reach, stiffness = hinge_guards(
+        nodes, hinges, thickest, sheets.stiffness, pieces
+    )
     if not sheets.panels:
         guarded = guarded[:0]
     surface = np.unique(triangles)
@@ -136,7 +140,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         shared_side=np.where(uses[side] == 2, 0.5, 0.0),
         shared_corner=np.where(closed, 1.0 / np.maximum(around, 1), 0.0),
         panel=panel,
-        edge_panels=_panels_of_edges(side, panel, len(edges)),
+        edge_panels=sides,
         node_thickness=thickest,
         ranges=Ranges(
             node_thickness=thickest,
@@ -226,24 +230,59 @@ def _distances(nodes: NDArray, corners: NDArray, common: list[int]) -> NDArray:
     return np.linalg.norm(away - along[:, None] * axis, axis=1)
 
 
+class Pieces(NamedTuple):
+    """Edges that are one of several along the crease of two panels, c of them."""
+
+    ends: NDArray  # (c, 2) increasing
+    height: NDArray  # (c,) half the width of the narrower panel over the crease, m
+    share: NDArray  # (c,) of the length of all pieces
+
+
+def crease_pieces(
+    nodes: NDArray, edges: NDArray, edge_panels: NDArray, members: list[NDArray]
+) -> Pieces:
+    """Find the pieces of creases: none where a crease has one hinge, as in bars and hinges."""
+    between = np.flatnonzero(edge_panels[:, 1] >= 0)
+    pairs, which, count = np.unique(
+        np.sort(edge_panels[between], axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    which, start = which.ravel(), nodes[edges[between, 0]]
+    along = nodes[edges[between, 1]] - start
+    length = np.linalg.norm(along, axis=1)
+    share = length / np.bincount(which, length)[which]
+    several = np.flatnonzero(count[which] > 1)
+    height = np.empty(len(several))
+    for at, k in enumerate(several.tolist()):
+        arms = [nodes[members[panel]] - start[k] for panel in pairs[which[k]]]
+        widths = [np.linalg.norm(np.cross(arm, along[k]), axis=1).max() for arm in arms]
+        height[at] = 0.5 * min(widths) / length[k]
+    return Pieces(edges[between[several]], height, share[several])
+
+
 def hinge_guards(
-    nodes: NDArray, hinges: NDArray, thickness: NDArray, stiffness: float
+    nodes: NDArray, hinges: NDArray, thickness: NDArray, stiffness: float, pieces: Pieces
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Guarded hinges, and of all: where their guard begins (rad), reach (rad/m), stiffness.
 
     Faces of thickness t whose lower wing has the height h over the axis meet at a dihedral of about
-    t / h; the guard has the stiffness k h^2, that of a contact at the wing.
+    t / h; the guard has the stiffness k h^2, that of a contact at the wing. On a piece of a crease
+    the wings are parts of panels, and h is that of the panels: the guards of all pieces begin where
+    the panels meet, and have together the stiffness of one.
     """
-    whole = np.flatnonzero((hinges >= 0).all(axis=1))
+    whole = np.flatnonzero(((hinges >= 0) & (hinges < len(nodes))).all(axis=1))
     limit, reach, strength = np.zeros((3, len(hinges)))
-    j, k, i, l = np.maximum(hinges, 0).T  # noqa: E741
+    j, k, i, l = hinges[whole].T  # noqa: E741
     axis = nodes[k] - nodes[j]
     length = np.linalg.norm(axis, axis=1)
     heights = [np.linalg.norm(np.cross(nodes[w] - nodes[j], axis), axis=1) for w in (i, l)]
-    height = np.minimum(*heights)[whole] / length[whole]
-    limit[whole] = np.minimum(GUARDED, thickness[j[whole]] / height)
+    height = np.minimum(*heights) / length
     reach[whole] = 2.0 / height
-    strength[whole] = stiffness * height**2
+    share, row = np.ones(len(whole)), {(a, b): c for c, (a, b) in enumerate(pieces.ends.tolist())}
+    for at, (a, b) in enumerate(np.sort(hinges[whole, :2], axis=1).tolist()):
+        if (a, b) in row:
+            height[at], share[at] = pieces.height[row[a, b]], pieces.share[row[a, b]]
+    limit[whole] = np.minimum(GUARDED, thickness[j] / height)
+    strength[whole] = stiffness * height**2 * share
     return whole, limit, reach, strength
 
 
