@@ -144,7 +144,8 @@ def test_guards_keep_dihedrals_between_0_and_360(dihedral):
         force = np.zeros_like(x)
         moved = u.reshape(-1, 3)
         angles = body.angles(u - (body.tables.rest - x).ravel())
-        return add_guards(body.tables, x + moved, angles, force), force.ravel()
+        guards = 0, len(body.tables.hinge_limit)
+        return add_guards(body.tables, x + moved, angles, force, *guards), force.ravel()
 
     rest = np.zeros(x.size)
     angle = np.degrees(body.angles((x - body.tables.rest).ravel())[body.tables.hinge_row])

@@ -79,7 +79,11 @@ class Compiled:
     def _parts(self) -> dict[str, Any]:
         contact = [getattr(work, "memory", ()) for work in self._works]
         powers = [memory.powers for memory in self._memories]
-        return parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
+        parts = parts_of(self._packed, self._course) | {"powers": powers, "contact": contact}
+        if self._packed.system.touches:  # a step's limit looks at the end of the one before
+            whole = self._memories[0]
+            parts["seen"] = [self._works[0].angle, whole.displacement, whole.velocity]
+        return parts
 
     def facts(self) -> dict[str, Any]:
         """Statistics of its own, for the result's attributes: what contact has cost."""
@@ -94,11 +98,11 @@ def threads_of(packed: Packed) -> int:
     """Threads on which a motion of a case runs fastest.
 
     One where something would have to be done by each of them: functions of the user, loads that
-    depend on the displacement, dampers, contact, constraints.
+    depend on the displacement, dampers, constraints.
     """
     system = packed.system
     called = bool((system.waves.code == CALLED).any())
-    alone = system.follows or called or system.damping.follows or system.touches
+    alone = system.follows or called or system.damping.follows
     return 1 if alone or len(system.ties.slave) else packed.body.threads
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from foldyn.dynamics.course import Course
 from foldyn.dynamics.system import Packed
 
-CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan")
-"""Fields that stay what they are."""
+CONSTANT = ("team", "strips", "packed", "course", "_packed", "_course", "_plan", "share")
+"""Fields that stay what they are, or serve one evaluation."""
 
 
 def parts_of(packed: Packed, course: Course) -> dict[str, Any]:
@@ -82,6 +82,17 @@ def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
 
 
 def _places(parts: Mapping[str, Any]) -> Iterator[_Place]:
+    """Places in parts; an array that threads share is one."""
+    seen: set[int] = set()
+    for place in _all_places(parts):
+        if isinstance(place.value, np.ndarray):
+            if id(place.value) in seen:
+                continue
+            seen.add(id(place.value))
+        yield place
+
+
+def _all_places(parts: Mapping[str, Any]) -> Iterator[_Place]:
     for name, part in parts.items():
         if isinstance(part, tuple | list | np.ndarray | np.void):
             yield from _arrays(name, part)

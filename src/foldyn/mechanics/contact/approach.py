@@ -27,9 +27,9 @@ from foldyn.mechanics.contact.distances import (
     point,
 )
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.planes import height
-from foldyn.mechanics.contact.search import farthest, list_pairs, place, use_all
-from foldyn.mechanics.contact.step_limit import fastest
+from foldyn.mechanics.contact.search import list_pairs, place, use_all
 from foldyn.mechanics.contact.tables import NORMAL
 
 KEEP = 0.2  # of each gap
@@ -147,7 +147,7 @@ def _listed_share(tables, memory, u, step, keep, fast):
 
     Where the motion leaves the range of the list, it goes on from there with another one.
     """
-    far, done = farthest(tables, u, memory), 0.0
+    far, done = farthest(u, memory), 0.0
     if memory.counts.has_list == 0 or not far <= 0.25 * memory.facts.skin:
         list_pairs(tables, u, memory)
         use_all(memory)

@@ -15,7 +15,7 @@ from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.body import Blocks, Body, Unstrained
 from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.memory import Memory, memory
+from foldyn.mechanics.contact.memory import Memory, memories, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
 from foldyn.mechanics.contact.planes import add_planes
 from foldyn.mechanics.contact.tables import HISTORY, POINT, Sheets, Tables, tables
@@ -161,10 +161,22 @@ class TouchingBody(WrappedBody):
         return InnerBlocks(self.inner.blocks())
 
     def workspaces(self, threads: int) -> Sequence[TouchingWork]:
-        """See `Body`: one thread."""
-        inner: Any = self.inner.workspaces(1)[0]
-        kept = memory(self.tables, self.sheets.panels)
-        return [TouchingWork(inner, inner.angle, inner.fold_angle, inner.strips, inner.team, kept)]
+        """See `Body`."""
+        works: Sequence[Any] = self.inner.workspaces(threads)
+        if len(works) == 1:  # which owns further rows, if there are some
+            kept = [memory(self.tables, self.sheets.panels)]
+        else:
+            teams, own = [work.team for work in works], [work.strips.own for work in works]
+            kept = memories(self.tables, self.sheets.panels, teams, own)
+        return [
+            TouchingWork(work, work.angle, work.fold_angle, work.strips, work.team, own)
+            for work, own in zip(works, kept, strict=True)
+        ]
+
+    @property
+    def threads(self) -> int:
+        """See `Body`."""
+        return self.inner.threads
 
     # ------------------------------------------------------------------ other bodies
     def renumbered(self) -> tuple[TouchingBody, NDArray]:

@@ -25,10 +25,13 @@ def gradient_at(tables, x, h):
 
 
 @kernel
-def add_guards(tables, x, angle, force):
-    """Energy (J) of the guards at dihedrals `angle`; adds their gradient to force (n, 3)."""
+def add_guards(tables, x, angle, force, first, last):
+    """Energy (J) of the guards first to last - 1 at dihedrals `angle`; adds their gradient.
+
+    force : (n, 3) N.
+    """
     energy = 0.0
-    for h in range(tables.hinge_limit.size):
+    for h in range(first, last):
         limit, theta = tables.hinge_limit[h], angle[tables.hinge_row[h]]
         if limit < theta < TURN - limit:
             continue

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.mechanics.contact.share import NOTES, Share
 from foldyn.mechanics.contact.tables import Tables
+from foldyn.mechanics.threads import Team, team
 
 ROOM = 64  # pairs for each triangle, of either kind
 
 
 class Memory(NamedTuple):
-    """Memory of one motion of n nodes against q planes; room for m pairs of either kind."""
+    """Memory of one motion of n nodes against q planes; room for m pairs of either kind.
+
+    Members of a team of threads have the same arrays, but for `moved`, `counts` and `facts`: these
+    become the same numbers, but for the energy, which is that of a member's share.
+    """
 
     x: NDArray  # (n, 3) positions at the last evaluation, m
     listed: NDArray  # (n, 3) displacement when the pairs were listed, m
@@ -27,6 +34,7 @@ class Memory(NamedTuple):
     moved: NDArray  # (q, 6) displacement of the planes, m, and its velocity, m/s
     counts: np.record
     facts: np.record
+    share: Share  # of a member of a team
 
 
 COUNTED = (
@@ -49,21 +57,53 @@ FACTS = np.dtype((np.record, [(name, np.float64) for name in MEASURED]))
 
 def memory(tables: Tables, panels: bool = True) -> Memory:
     """New memory."""
-    n, q = len(tables.rest), len(tables.planes)
+    return memories(tables, panels, team(1), [np.array([0, len(tables.rest)])])[0]
+
+
+def memories(
+    tables: Tables, panels: bool, members: Sequence[Team], own: Sequence[NDArray]
+) -> list[Memory]:
+    """New memory of each member of a team, who owns the nodes own[0] to own[1]."""
+    n, q, size = len(tables.rest), len(tables.planes), len(members)
     room = ROOM * len(tables.triangles) + 256 if panels else 0
-    counts, facts = np.zeros(1, COUNTS), np.zeros(1, FACTS)
+    near = np.empty((2, room), np.int32)
+    counts, facts = np.zeros(size, COUNTS), np.zeros(size, FACTS)
     facts["skin"] = tables.skin
     facts["shortest"] = np.inf
-    return Memory(
+    share = Share(
+        team=members[0],
+        own=own[0],
+        meeting=own[0],
+        found=near if size == 1 else np.empty_like(near),
+        sums=np.zeros((size, 0 if size == 1 else n, 3)),
+        counts=counts.view(np.int64).reshape(size, -1),
+        facts=facts.view(np.float64).reshape(size, -1),
+    )
+    first = Memory(
         x=tables.rest.copy(),
         listed=np.zeros((n, 3)),
         pairs=np.empty((2, room, 2), np.int32),
         d0=np.empty((2, room)),
         gap=np.empty((2, room)),
-        near=np.empty((2, room), np.int32),
+        near=near,
         anchor=np.zeros((q, n, 4)),
         friction=np.zeros((q, n, 4)),
         moved=np.zeros((q, 6)),
         counts=counts[0],
         facts=facts[0],
+        share=share,
     )
+    notes = np.zeros((size, NOTES))
+    return [
+        first._replace(
+            moved=np.zeros((q, 6)),
+            counts=counts[k],
+            facts=facts[k],
+            share=share._replace(
+                team=members[k]._replace(note=notes),
+                own=own[k],
+                meeting=np.searchsorted(tables.meeting, own[k]),
+            ),
+        )
+        for k in range(size)
+    ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
+from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import limited
 from foldyn.mechanics.contact.tables import Tables
 from foldyn.mechanics.kernels import (
@@ -61,13 +62,16 @@ def _force(model, u, force, work):
 
 @overload(energies_of, inline="always")
 def _energies(model, u, work, out):
-    """The energy of contact is that of the last force, which samples are taken after."""
+    """The energy of contact is that of the last force, which samples are taken after.
+
+    All members of a team have waited for each other then.
+    """
     if model.instance_class is not Touching:
         return None
 
     def touching(model, u, work, out):
         energies_of(model.inner, u, work.inner, out[: model.groups])
-        out[model.groups] = work.memory.facts.energy
+        out[model.groups] = energy_of_all(work.memory)
 
     return touching
 

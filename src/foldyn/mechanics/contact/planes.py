@@ -45,11 +45,11 @@ def height(tables, x, memory, p, i):
 
 @kernel
 def add_planes(tables, x, memory, force):
-    """Energy (J) of nodes at planes; adds its gradient and friction to force (n, 3)."""
-    energy, k = 0.0, tables.stiffness
+    """Energy (J) of a member's nodes at planes; adds its gradient and friction to force (n, 3)."""
+    energy, k, mine = 0.0, tables.stiffness, memory.share.meeting
     for p in range(len(tables.planes)):
         plane = tables.planes[p]
-        for m in range(tables.meeting.size):
+        for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             push = memory.friction[p, i]
             push[0] = push[1] = push[2] = push[3] = 0.0
@@ -95,11 +95,12 @@ def stretch_of(tables, x, memory, p, i):
 @kernel
 def slip(tables, x, memory):
     """At the end of a step, anchors follow nodes that slip, and begin and end with touch."""
+    mine = memory.share.meeting
     for p in range(len(tables.planes)):
         plane, moved = tables.planes[p], memory.moved[p]
         if plane[FRICTION] == 0.0:
             continue
-        for m in range(tables.meeting.size):
+        for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             anchor = memory.anchor[p, i]
             d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
@@ -123,12 +124,12 @@ def slip(tables, x, memory):
 def plane_powers(tables, v, memory):
     """Power (W) of moving planes on nodes with velocities v (n, 3), and that of friction.
 
-    After `add_planes`.
+    After `add_planes`; of a member's nodes.
     """
-    work, dissipated = 0.0, 0.0
+    work, dissipated, mine = 0.0, 0.0, memory.share.meeting
     for p in range(len(tables.planes)):
         plane, moved = tables.planes[p], memory.moved[p]
-        for m in range(tables.meeting.size):
+        for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             push = memory.friction[p, i]
             if push[3] == 0.0:

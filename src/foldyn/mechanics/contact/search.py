@@ -19,6 +19,8 @@ from foldyn.mechanics.contact.distances import (
     dot,
     point,
 )
+from foldyn.mechanics.contact.motions import farthest
+from foldyn.mechanics.contact.share import pass_on
 
 CELLS = 8.0  # per node, at most
 THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
@@ -246,28 +248,17 @@ def list_pairs(tables, u, memory):
 
 
 @kernel
-def farthest(tables, u, memory):
-    """Largest motion (m) of a node from where pairs were listed, against the mean of all."""
-    n = len(memory.x)
-    mean = np.zeros(3)
-    for i in range(n):
-        for c in range(3):
-            mean[c] += (u[i, c] - memory.listed[i, c]) / n
-    worst = 0.0
-    for i in range(n):
-        square = 0.0
-        for c in range(3):
-            square += (u[i, c] - memory.listed[i, c] - mean[c]) ** 2
-        if not square < math.inf:
-            return math.inf
-        worst = max(worst, square)
-    return math.sqrt(worst)
+def relist(tables, u, memory):
+    """`list_pairs` by the first member of a team, for all: after a `wait` for their positions."""
+    if memory.share.team.number == 0:
+        list_pairs(tables, u, memory)
+    pass_on(memory.share)
 
 
 @kernel
 def place(tables, u, memory):
-    """Positions at displacement u (rows, 3) to memory.x."""
-    for i in range(len(memory.x)):
+    """Positions at displacement u (rows, 3) to memory.x, of a member's own nodes."""
+    for i in range(memory.share.own[0], memory.share.own[1]):
         for c in range(3):
             memory.x[i, c] = tables.rest[i, c] + u[i, c]
 
@@ -285,8 +276,13 @@ def use_all(memory):
 
 @kernel
 def follow(tables, u, memory):
-    """Have all pairs that are near at u, wherever it is, among the near ones."""
-    counts = memory.counts
-    if counts.has_list == 0 or not farthest(tables, u, memory) < 0.5 * memory.facts.skin:
+    """Have all pairs that are near at u, wherever it is, among the near ones.
+
+    After a `wait` for the positions of all members, of whom the first one does it.
+    """
+    if memory.share.team.number == 0 and (
+        memory.counts.has_list == 0 or not farthest(u, memory) < 0.5 * memory.facts.skin
+    ):
         list_pairs(tables, u, memory)
         use_all(memory)
+    pass_on(memory.share)

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner_scalar, kernel, scalar
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -24,31 +24,18 @@ from foldyn.mechanics.contact.distances import (
     point,
 )
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.motions import motions
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.search import farthest, list_pairs, place
+from foldyn.mechanics.contact.search import place, relist
+from foldyn.mechanics.contact.share import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
+from foldyn.mechanics.threads import largest, part, wait
 
 APPROACH = 0.1
 RESOLVED = 0.25
 REACH = 4.0  # times the fastest motion in a step: how far away pairs are looked at in it
 MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
-
-
-@kernel
-def fastest(v, n):
-    """Largest speed (m/s) of n nodes against the mean of all."""
-    mean = np.zeros(3)
-    for i in range(n):
-        for c in range(3):
-            mean[c] += v[i, c] / n
-    worst = 0.0
-    for i in range(n):
-        square = 0.0
-        for c in range(3):
-            square += (v[i, c] - mean[c]) ** 2
-        worst = max(worst, square)
-    return math.sqrt(worst)
 
 
 @scalar
@@ -93,15 +80,44 @@ def _edge_bound(tables, x, v, lightness, i, j, d0, reach, limit):
     return _bound(limit, distance, d0, -dot(r, w) / distance, tables.stiffness, light)
 
 
+@inner_scalar
+def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
+    """See `_bound`, for a member's part of all listed pairs; notes those that are near."""
+    counts, team = memory.counts, memory.share.team
+    for kind in range(2):
+        listed = counts.listed_first if kind == 0 else counts.listed_second
+        first, last = part(team, listed)
+        found = first
+        for k in range(first, last):
+            if memory.gap[kind, k] - 2.0 * far > reach:
+                continue
+            one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
+            d0 = memory.d0[kind, k]
+            if kind == 0:
+                now = _vertex_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+            else:
+                now = _edge_bound(tables, x, v, lightness, one, other, d0, reach, limit)
+            if now == now:
+                limit = now
+                memory.share.found[kind, found] = k
+                found += 1
+        team.note[team.number, NEAR + kind] = found - first
+    return limit
+
+
 @kernel
-def _hinges_bound(tables, x, v, lightness, angle, reach, limit, counts):
-    """See `_bound`, for all guarded hinges; counts those that a motion by reach may bring there."""
-    counts.hinges = 0
-    for h in range(tables.hinge_limit.size):
+def _hinges_bound(tables, x, v, lightness, angle, reach, limit, team):
+    """See `_bound`, for a member's part of the guarded hinges.
+
+    Notes how many of them a motion by reach may bring to their guard.
+    """
+    near = 0
+    first, last = part(team, tables.hinge_limit.size)
+    for h in range(first, last):
         begin, theta = tables.hinge_limit[h], angle[tables.hinge_row[h]]
         if min(theta, TURN - theta) - begin > 2.0 * tables.hinge_reach[h] * reach:
             continue
-        counts.hinges += 1
+        near += 1
         found = gradient_at(tables, x, h)
         rate, light = 0.0, 0.0
         for k in range(4):
@@ -114,15 +130,16 @@ def _hinges_bound(tables, x, v, lightness, angle, reach, limit, counts):
         if theta > math.pi:
             theta, rate = TURN - theta, -rate
         limit = _bound(limit, theta, begin, -rate, tables.hinge_stiffness[h], light)
+    team.note[team.number, HINGES] = near
     return limit
 
 
 @kernel
 def _planes_bound(tables, x, v, lightness, memory, limit):
-    """See `_bound`, for all nodes and planes; friction's springs are resolved, too."""
-    k = tables.stiffness
+    """See `_bound`, for a member's nodes and planes; friction's springs are resolved, too."""
+    k, mine = tables.stiffness, memory.share.meeting
     for p in range(len(tables.planes)):
-        for m in range(tables.meeting.size):
+        for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
             closing = 0.0
@@ -140,56 +157,34 @@ def limited(tables, u, v, angle, dt, lightness, memory):
     """The longest step (s), at most dt, from displacement u with velocity v, both (rows, 3).
 
     Lists are renewed, pairs that may touch in the step are gathered, and friction slips: to be
-    called once before each step, where the last one has ended.
+    called once before each step, where the last one has ended. Each member of a team looks at its
+    share; all get the same step.
 
     angle : dihedrals (nh,) at u; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
-    limit, counts, x = dt, memory.counts, memory.x
-    fast = fastest(v, len(x))
-    if memory.d0.shape[1] > 0:
+    limit, counts, x, team = dt, memory.counts, memory.x, memory.share.team
+    panels = memory.d0.shape[1] > 0
+    place(tables, u, memory)
+    if panels:
+        fast, far = motions(u, v, memory)
         skin = memory.facts.skin
-        far = farthest(tables, u, memory)
-        placed = False
         fresh = counts.has_list == 1 and far < MARGIN * skin
         if counts.has_list == 0 or (not fresh and not far + 2.0 * fast * dt < 0.5 * skin):
-            place(tables, u, memory)
-            list_pairs(tables, u, memory)
-            placed, far, skin = True, 0.0, memory.facts.skin
+            relist(tables, u, memory)
+            far, skin = 0.0, memory.facts.skin
         if 2.0 * fast * dt > 0.5 * skin - far:
             limit = (0.25 * skin - 0.5 * far) / fast
         reach = REACH * fast * limit + MARGIN * skin
-        for kind in range(2):
-            found = 0
-            listed = counts.listed_first if kind == 0 else counts.listed_second
-            for k in range(listed):
-                if memory.gap[kind, k] - 2.0 * far > reach:
-                    continue
-                if not placed:
-                    place(tables, u, memory)
-                    placed = True
-                one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
-                d0 = memory.d0[kind, k]
-                if kind == 0:
-                    now = _vertex_bound(tables, x, v, lightness, one, other, d0, reach, limit)
-                else:
-                    now = _edge_bound(tables, x, v, lightness, one, other, d0, reach, limit)
-                if now == now:
-                    limit = now
-                    memory.near[kind, found] = k
-                    found += 1
-            if kind == 0:
-                counts.near_first = found
-            else:
-                counts.near_second = found
-        if not placed:
-            place(tables, u, memory)
-        limit = _hinges_bound(tables, x, v, lightness, angle, reach, limit, counts)
-        counts.watched = counts.has_list
-    else:
-        place(tables, u, memory)
-        counts.watched = 1
+        limit = _pairs_bound(tables, x, v, lightness, far, reach, limit, memory)
+        limit = _hinges_bound(tables, x, v, lightness, angle, reach, limit, team)
     if len(tables.planes) > 0:
         slip(tables, x, memory)
         limit = _planes_bound(tables, x, v, lightness, memory, limit)
+    team.note[team.number, LIMIT] = -limit
+    wait(team)
+    limit = -largest(team, LIMIT)
+    if panels:
+        gather(memory)
+    counts.watched = counts.has_list if panels else 1
     memory.facts.shortest = min(memory.facts.shortest, limit)
     return limit

@@ -1,0 +1,79 @@
+"""How fast nodes are, and how far from where pairs were listed, against the mean of all.
+
+What all nodes do together closes no gap.
+"""
+
+from __future__ import annotations
+
+import math
+
+from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.mechanics.contact.share import FAR, FAST, MOTION, SPEED
+from foldyn.mechanics.threads import largest, total, wait
+
+
+@scalar
+def _moved(now, before, i, c):
+    if before is None:
+        return now[i, c]
+    return now[i, c] - before[i, c]
+
+
+@scalar
+def _mean(now, before, first, last, n):
+    """Part of the nodes first to last - 1 in the mean of now - before, both (rows, 3), over n."""
+    a, b, c = 0.0, 0.0, 0.0
+    for i in range(first, last):
+        a += _moved(now, before, i, 0) / n
+        b += _moved(now, before, i, 1) / n
+        c += _moved(now, before, i, 2) / n
+    return a, b, c
+
+
+@scalar
+def _largest(now, before, first, last, a, b, c):
+    """Largest of now - before of these nodes against a mean; inf where something is not finite."""
+    if not abs(a) + abs(b) + abs(c) < math.inf:
+        return math.inf
+    worst = 0.0
+    for i in range(first, last):
+        square = 0.0
+        square += (_moved(now, before, i, 0) - a) ** 2
+        square += (_moved(now, before, i, 1) - b) ** 2
+        square += (_moved(now, before, i, 2) - c) ** 2
+        worst = max(worst, square)
+    return math.sqrt(worst)
+
+
+@kernel
+def fastest(v, n):
+    """Largest speed (m/s) of n nodes against the mean of all."""
+    a, b, c = _mean(v, None, 0, n, n)
+    return _largest(v, None, 0, n, a, b, c)
+
+
+@kernel
+def farthest(u, memory):
+    """Largest motion (m) of a node from where pairs were listed, against the mean of all."""
+    n = len(memory.x)
+    a, b, c = _mean(u, memory.listed, 0, n, n)
+    return _largest(u, memory.listed, 0, n, a, b, c)
+
+
+@inner_scalar
+def motions(u, v, memory):
+    """Both for the nodes of all members of a team, each of whom looks at its own.
+
+    Waits for what the members have written before.
+    """
+    team, n = memory.share.team, len(memory.x)
+    note, first, last = team.note[team.number], memory.share.own[0], memory.share.own[1]
+    note[SPEED], note[SPEED + 1], note[SPEED + 2] = _mean(v, None, first, last, n)
+    note[MOTION], note[MOTION + 1], note[MOTION + 2] = _mean(u, memory.listed, first, last, n)
+    wait(team)
+    a, b, c = total(team, SPEED), total(team, SPEED + 1), total(team, SPEED + 2)
+    note[FAST] = _largest(v, None, first, last, a, b, c)
+    a, b, c = total(team, MOTION), total(team, MOTION + 1), total(team, MOTION + 2)
+    note[FAR] = _largest(u, memory.listed, first, last, a, b, c)
+    wait(team)
+    return largest(team, FAST), largest(team, FAR)
