@@ -123,12 +123,6 @@ def fold_case(law):
     )
 
 
-@pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
-def test_methods_that_go_to_and_fro_refuse_creases_that_yield(method):
-    with pytest.raises(InputError, match=r"fold_law = 'plastic': yields.*\"newton\" and"):
-        fd.statics.trace(fold_case(fd.Plastic(1e-3)), method)
-
-
 def test_equilibria_of_creases_that_creep_are_refused():
     for solve in (fd.statics.trace, lambda case: fd.modes(case, state="equilibrium")):
         with pytest.raises(InputError, match="fold_law = 'eyring': creep goes on for ever"):

@@ -56,6 +56,20 @@ def test_a_yielding_path_follows_the_law(hardening):
     np.testing.assert_allclose(work, stored, rtol=0, atol=2e-3 * work.max())  # trapezoids
 
 
+@pytest.mark.parametrize("method", ["mgdcm", "arc_length"])
+def test_methods_with_a_free_factor_follow_the_law(method):
+    """The moment at each point is that of the formula, and so is the end."""
+    law = fd.Plastic(LIMIT, kinematic=HARD, law="linear")
+    case = one_hinge(law, [fd.Impose([WING], "z", np.tan(0.3))], hold=False)
+    path = fd.statics.trace(case, method, [0.0, 1.0], first_step=0.02)
+    theta, found = opened(path), moment(path)
+    slope, first = STIFFNESS * HARD / (STIFFNESS + HARD), LIMIT / STIFFNESS
+    expected = np.where(theta < first, STIFFNESS * theta, LIMIT + slope * (theta - first))
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-12)
+    plastic = theta[-1] - found[-1] / STIFFNESS
+    assert float(path.dissipated[-1]) == pytest.approx(LIMIT * plastic, rel=1e-7)
+
+
 def test_the_work_of_closed_cycles_is_dissipated():
     """The loop's area, by the corners of the parallelogram, in three cycles."""
     law = fd.Plastic(LIMIT, kinematic=HARD, law="linear")

@@ -68,13 +68,14 @@ CONTINUATIONS: Mapping[str, str] = {
 PATH: Mapping[str, Quantity] = {
     **STATE,
     **CONTACT,
+    "plane_friction": Quantity("N", "friction of each plane on the sheet", ("plane", "axis")),
     "work": Quantity("J", "work of loads, supports and actuators since the first point"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
     "point": Quantity(text="kind of the point"),
     "iterations": Quantity(text="Newton iterations"),
     "residual": Quantity(text="residual as a fraction of the forces at play"),
     "memory": MEMORY,
-    "dissipated": Quantity("J", "energy dissipated by creases since the first point"),
+    "dissipated": Quantity("J", "energy dissipated by creases and friction since the first point"),
 }
 FOLDING: Mapping[str, Quantity] = {
     "displacement": Quantity("m", "displacement from the pattern as it was", PLACE),

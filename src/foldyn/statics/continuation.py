@@ -17,8 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.statics.newton import COLLIDES, Attempt, Rule, Solver
-from foldyn.statics.problem import UNKNOWN
-from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, step_to, stopped
+from foldyn.statics.problem import EPS, UNKNOWN, clear_share
+from foldyn.statics.stepping import (
+    PathStoppedError,
+    Station,
+    Walk,
+    arrive,
+    kept,
+    step_to,
+    stopped,
+)
 
 # rule of one step from its length and its prediction (m,)
 ArcRule = Callable[[float, NDArray], Rule]
@@ -117,7 +125,7 @@ def follow(
                 )
             continue
         pace.accept(station, arrived)
-        station = arrived
+        station = kept(solver.problem, arrived)
         yield station
 
 
@@ -127,7 +135,7 @@ class _Pace:
     def __init__(self, solver: Solver, station: Station, moved: NDArray) -> None:
         self.solver, self.settings, self.moved = solver, solver.settings, moved
         self.length = float(np.linalg.norm(moved))
-        self.shortest = self.length * 2.0**-self.settings.cuts
+        self.cuts = 0  # since the last step
         self.largest = float(np.radians(self.settings.largest_turn))
         climb = _climb(station, self.length, moved)
         self.scale = self.length / abs(climb) if climb != 0.0 else 1.0
@@ -147,12 +155,12 @@ class _Pace:
         return "a hinge turns too far" if turn > 1.5 * self.largest else ""
 
     def cut(self) -> bool:
-        """Halve the length; false where it has become too short."""
-        self.length *= 0.5
-        return self.length > self.shortest
+        """Halve the length; false where that has been done too often, or it is lost in rounding."""
+        self.length, self.cuts = 0.5 * self.length, self.cuts + 1
+        return self.cuts < self.settings.cuts and self.length > EPS * self.solver.problem.length
 
     def accept(self, station: Station, arrived: Station) -> None:
-        """Choose the next length after a step."""
+        """Choose the next length after a step: at most the size of the structure."""
         one, other = station.point, arrived.point
         self.moved = other.u - one.u
         length = float(np.linalg.norm(self.moved))
@@ -161,7 +169,8 @@ class _Pace:
         growth = np.sqrt(self.settings.target / max(other.iterations, 1))
         bend = abs(slope - self.slope)
         limits = (2.0, growth, BEND / max(bend, 1e-9), self.largest / max(turn, 1e-9))
-        self.length, self.slope = length * max(min(limits), 0.25), slope
+        self.length = min(length * max(min(limits), 0.25), self.solver.problem.length)
+        self.slope, self.cuts = slope, 0
 
 
 def _first(solver: Solver, start: Station, first_step: float) -> Station:
@@ -170,7 +179,7 @@ def _first(solver: Solver, start: Station, first_step: float) -> Station:
     for _ in range(solver.settings.cuts + 1):
         attempt = step_to(solver, start, start.point.factor + step)
         if not attempt.failure and not np.array_equal(attempt.u, start.point.u):
-            return arrive(solver, attempt)
+            return kept(solver.problem, arrive(solver, attempt))
         solver.tally.cuts += 1
         step *= 0.5
     raise stopped(start, attempt)  # pyright: ignore
@@ -182,11 +191,12 @@ def _advance(
     """One step of a length along the path in the direction in which it `moved`."""
     climb = _climb(station, length, moved)
     prediction = climb * station.response
-    point = station.point
-    factor = point.factor + climb
-    u = point.u + prediction
-    u[solver.problem.held] = solver.problem.prescribed(factor)
-    if not np.isfinite(solver.problem.turn(point.u, u)):
+    problem, point = solver.problem, station.point
+    clear = clear_share(problem, point.u, prediction)
+    factor = point.factor + clear * climb
+    u = point.u + clear * prediction
+    u[problem.held] = problem.prescribed(factor)
+    if clear == 0.0 or not np.isfinite(problem.turn(point.u, u)):
         return Attempt(u, factor, 0, UNKNOWN, COLLIDES)
     return solver.correct(u, factor, rule(length, prediction), origin=point.u)
 

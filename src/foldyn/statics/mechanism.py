@@ -35,15 +35,17 @@ MOVED = 0.3  # of the largest motion: nodes that a message names
 MOST_NAMED = 8
 
 
-def refuse_mechanisms(problem: OrigamiProblem) -> None:
+def refuse_mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> None:
     """Refuse a case whose supports or members leave a mechanism, naming its motions.
+
+    factor : load factor at which it begins, where planes that it touches hold it as well.
 
     Raises
     ------
     InputError
         The structure can move without strain.
     """
-    names = mechanisms(problem)
+    names = mechanisms(problem, factor)
     if names:
         raise InputError(
             f"the structure can move freely: {'; '.join(names)}. Statics needs supports (and bars "
@@ -52,10 +54,11 @@ def refuse_mechanisms(problem: OrigamiProblem) -> None:
         )
 
 
-def mechanisms(problem: OrigamiProblem) -> list[str]:
+def mechanisms(problem: OrigamiProblem, factor: float = 0.0) -> list[str]:
     """Free motions in words: rigid ones, and where there are none, internal mechanisms."""
     structure = problem.structure
-    start, body = problem.start(), problem.case.body
+    start = problem.start(factor)
+    body = problem.body(start, 0.0)
     x, q = structure.nodes + problem.displacement(start), problem.dofs(start)
     rigid = name_rigid_motions(x, problem.pinned, body.holds(q))
     unstrained = None if rigid else body.unstrained(q)

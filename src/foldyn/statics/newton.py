@@ -56,7 +56,8 @@ class Settings:
     target : int
         Iterations per point that the step control aims at: steps shrink above and grow below.
     cuts : int
-        Halvings of the first step (of each interval of load factors) after which a path ends.
+        Halvings after which a path ends: of the first step of each interval of load factors, or,
+        where these are free, of a step after the last one that was taken.
     largest_turn : float
         Degrees by which a hinge (or, without hinges, a bar) may turn within one step of
         "mgdcm" and "arc_length".

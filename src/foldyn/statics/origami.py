@@ -14,17 +14,13 @@ from scipy import sparse
 from foldyn.cases import Actuate, Case
 from foldyn.cases.loaded import SomeLoads
 from foldyn.errors import InputError
-from foldyn.materials.memory_law import VARIABLES
 from foldyn.mechanics.body import Body
 from foldyn.mechanics.following import following_force, following_tangent, joined
-from foldyn.mechanics.inelastic_body import InelasticBody
+from foldyn.statics.memories import REFUSED, Memories
 from foldyn.statics.plates import Plates
 from foldyn.statics.problem import EPS
 from foldyn.statics.rigid import Relief
-from foldyn.structures.remembering import Remembering
-from foldyn.structures.remembering import memory as memory_of
 
-REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
 PROBE = 1e-4  # change of the load factor that gives derivatives of what is not linear in it
 
 AdaptiveLoad = Callable[[NDArray, float], NDArray]
@@ -72,10 +68,10 @@ class OrigamiProblem:
     inertia_relief : bool
         Balance the loads of a free body by its inertia.
     flow : {"refused", "followed", "at rest"}
-        What to do with creases that yield or creep: a path of the right kind follows those that
+        What to do with friction, and with creases that yield or creep: a path follows those that
         yield; at rest nothing has flowed.
     memory : ndarray of shape (b, 2) or "fresh", optional
-        Their state where it begins; see `cases.State`.
+        State of the creases where it begins; see `cases.State`.
 
     Attributes
     ----------
@@ -98,14 +94,10 @@ class OrigamiProblem:
         adaptive_load: AdaptiveLoad | None = None, inertia_relief: bool = False,
         flow: str = REFUSED, memory: NDArray | str | None = None,
     ) -> None:  # fmt: skip
-        self._flows = _flows(case, flow)
-        self._plates = _plates(case, bool(self._flows))
+        self.memories, self._plates = Memories(case, flow), Plates(case)
         self.case, structure = case, case.structure
         self.structure, self._adaptive = structure, adaptive_load
-        body = case.body
-        if self._flows and flow == FOLLOWED:
-            body = InelasticBody(body, memory_of(self._flows, body))
-        self._memory = body.memory
+        body = self.memories.body
         self.groups, self._hidden = body.energy_groups, len(body.hidden)
         self._work, self._ties = body.workspaces(1)[0], case.constraints
         self._shape = structure.nodes.shape
@@ -116,8 +108,7 @@ class OrigamiProblem:
         self.following = joined((part, k) for k, kind in kinds for part, _ in kind.following_terms)
         at_rest = body.dofs(np.zeros(self._shape) if rest is None else rest)
         self._rest = self._plates.joined(self._ties.coordinates(at_rest))
-        if self._memory is not None:
-            self._memory.start(at_rest, memory)
+        self.memories.start(at_rest, memory)
         self._constant = self._extended(_total(steady.load_terms, self._shape))
         self._growing = self._extended(_total(growing.load_terms, self._shape))
         self.constant = self._plates.joined(self._ties.force(self._constant))
@@ -255,27 +246,31 @@ class OrigamiProblem:
             forces.append(body.contact(q)[1])
         return max(float(np.linalg.norm(force)) for force in forces)
 
+    def begin(self, factor: float) -> None:
+        """Begin at a factor, with friction at rest."""
+        self._evaluate(self.start(factor))
+        self.memories.tie()
+
     def keep(self, u: NDArray) -> Any:
-        """Accept a state (m,), where creases have yielded; returns what `recall` takes."""
-        if self._memory is None:
+        """Accept a state (m,), where creases have yielded and nodes slipped; see `recall`."""
+        if not self.memories:
             return None
-        self.actuation.body(0.0).energies(self.dofs(u))
-        self._memory.commit()
-        return self._memory.snapshot()
+        self._evaluate(u)
+        return self.memories.commit()
 
     def recall(self, kept: Any) -> None:
         """Go back to an accepted state."""
-        if kept is not None and self._memory is not None:
-            self._memory.recall(kept)
+        self.memories.recall(kept)
 
-    def memory(self, kept: Any) -> NDArray:
-        """State (b, 2) of all branches of the case there, those that relax relaxed."""
-        state = np.zeros((sum(part.count for part in self.case.remembering), VARIABLES))
-        if kept is not None:
-            flows = [not part.law.relaxes for part in self.case.remembering]
-            own = np.repeat(flows, [part.count for part in self.case.remembering])
-            state[own] = kept[1]
-        return state
+    def slips(self, u: NDArray) -> bool:
+        """Whether a node slips on a plane in a state (m,)."""
+        if not self.memories.rubs:
+            return False
+        self._evaluate(u)
+        return self.memories.slips()
+
+    def _evaluate(self, u: NDArray) -> None:
+        self.body(u, 0.0).energies(self.dofs(u))
 
     def turn(self, u: NDArray, v: NDArray) -> float:
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
@@ -286,8 +281,12 @@ class OrigamiProblem:
         if self.case.contact is None:
             return {}
         q, body = self.dofs(u), self.body(u, 0.0)
-        planes = {"plane_force": body.plane_forces(q)} if self.case.contact.planes else {}
-        return {"contact_force": body.touch(q), **planes}
+        out = {"contact_force": body.touch(q)}
+        if self.case.contact.planes:
+            out["plane_force"] = body.plane_forces(q)
+        if self.memories.rubs:
+            out["plane_friction"] = body.plane_friction(q)
+        return out
 
     def clear(self, u: NDArray, step: NDArray) -> float:
         """Share of a step (m,) from a state in which nothing crosses."""
@@ -306,60 +305,6 @@ class OrigamiProblem:
             return 0.0
         ahead, behind = self.energies(u, factor + PROBE), self.energies(u, factor - PROBE)
         return float((ahead - behind)[1:].sum() / (2.0 * PROBE))
-
-
-def _plates(case: Case, flows: bool) -> Plates:
-    """Planes that move along the path.
-
-    Raises
-    ------
-    InputError
-        There is friction, or creases yield.
-    """
-    if case.contact is None:
-        return Plates(case)
-    if any(case.contact.friction_on(plane) > 0.0 for plane in case.contact.planes):
-        raise InputError(
-            ".friction: paths of equilibria take contact without friction: give 0 here and in the "
-            "planes, or simulate a slow motion",
-            "contact",
-        )
-    if flows:
-        raise InputError(
-            ": paths of equilibria take it with elastic laws; simulate the motion, or leave it out",
-            "contact",
-        )
-    return Plates(case)
-
-
-def _flows(case: Case, flow: str) -> tuple[Remembering, ...]:
-    """Laws with memory whose moments do not relax to those of an elastic law.
-
-    Raises
-    ------
-    InputError
-        There are such, and the solver cannot have them.
-    """
-    parts = tuple(part for part in case.remembering if not part.law.relaxes)
-    for part in parts:
-        name, field = part.law.name, f"{part.kind}_law"
-        if flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
-            continue
-        if part.law.rate_dependent:
-            raise InputError(
-                f" = {name!r}: creep goes on for ever, and the steps of a path say nothing of "
-                "time; simulate the motion, or take an elastic law",
-                field,
-            )
-        raise InputError(
-            f" = {name!r}: yields, so that its equilibria depend on the way there; fd.simulate "
-            'takes it, and paths of the methods "newton" and "displacement"; elsewhere take an '
-            "elastic law",
-            field,
-        )
-    if parts:
-        case.check_flow()
-    return parts
 
 
 def _factors(steady: float, growing: float) -> NDArray:

@@ -13,7 +13,7 @@ from foldyn.errors import InputError
 from foldyn.statics.continuation import ArcRule, Cylinder, Plane, follow
 from foldyn.statics.newton import Solver
 from foldyn.statics.stability import LostError, Section, critical_points
-from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, walk
+from foldyn.statics.stepping import PathStoppedError, Station, Walk, arrive, kept, recall, walk
 from foldyn.values import choice, number, numbers, show
 
 STEPS_DRIVEN = 10
@@ -154,10 +154,15 @@ def _up_to(solver: Solver, start: Station, way: Iterator[Station], end: float, s
 def _landed(solver: Solver, before: Station, after: Station, end: float) -> Station:
     """Station at the load factor `end` between two others; the one after it if none is found."""
     section = Section(solver, before, after)
+    recall(solver.problem, before)
     try:
         near = section.zero(lambda mark: mark.station.point.factor - end, 1e-10).station
     except LostError:
+        recall(solver.problem, after)
         return after
     attempt = solver.correct(near.point.u, end, stiffness=near.stiffness)
     strayed = np.linalg.norm(attempt.u - near.point.u) > 1e-3 * np.sqrt(section.whole)
-    return after if attempt.failure or strayed else arrive(solver, attempt)
+    if attempt.failure or strayed:
+        recall(solver.problem, after)
+        return after
+    return kept(solver.problem, arrive(solver, attempt))

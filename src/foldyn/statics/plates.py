@@ -63,7 +63,7 @@ class Plates:
 
     def force(self, body: Any, q: NDArray) -> float:
         """What moves the planes along their motion, N; q (m,) of the body."""
-        return float((body.plane_forces(q) * self._motion).sum())
+        return float(((body.plane_forces(q) + body.plane_friction(q)) * self._motion).sum())
 
     def bordered(self, matrix: sparse.csr_array, body: Any, q: NDArray, project: Any) -> Any:
         """A tangent of the other dofs with the row and column of this one, N/m.
@@ -72,9 +72,11 @@ class Plates:
         """
         if not self:
             return matrix
-        column, own = np.zeros(body.size), 0.0
-        for block, along in zip(body.plane_tangents(q), self._motion, strict=True):
-            column[: block.shape[0] * 3] -= (block @ along).ravel()
-            own += float((block @ along).sum(axis=0) @ along)
-        edge = sparse.csr_array(project(column)[:, None])
-        return sparse.csr_array(sparse.block_array([[matrix, edge], [edge.T, [[own]]]]))
+        blocks = body.plane_tangents(q)
+        nodal = blocks.shape[1] * 3
+        column, row = np.zeros((2, body.size))
+        column[:nodal] = -np.einsum("pnab,pb->na", blocks, self._motion).ravel()
+        row[:nodal] = -np.einsum("pnab,pa->nb", blocks, self._motion).ravel()
+        own = np.einsum("pnab,pa,pb->", blocks, self._motion, self._motion)
+        right, below = project(column)[:, None], project(row)[None, :]
+        return sparse.csr_array(sparse.block_array([[matrix, right], [below, [[own]]]]))

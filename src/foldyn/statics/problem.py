@@ -84,6 +84,12 @@ def clear_share(problem: Problem, u: NDArray, step: NDArray) -> float:
     return clear(u, step) if clear else 1.0
 
 
+def is_counted(problem: Problem, u: NDArray) -> bool:
+    """Whether the negative eigenvalues in a state (m,) say something: not where a node slips."""
+    slips = getattr(problem, "slips", None)  # problems without friction have none
+    return not (slips and slips(u))
+
+
 class Balance(NamedTuple):
     """How far a state is from equilibrium."""
 

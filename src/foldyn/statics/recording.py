@@ -189,7 +189,7 @@ def _dataset(
     if message := _asymmetry_warning(points[-1], problem):
         warnings.warn(message, FoldynWarning, stacklevel=5)
     recorded = [_recorded(problem, point) for point in points]
-    residuals, energies, reactions = ([r[k] for r in recorded] for k in range(3))
+    residuals, energies, reactions, touches = zip(*recorded, strict=True)
     displacement = np.array([problem.displacement(p.u) for p in points])
     crossings = crossings_of(problem.case, displacement)
     if len(crossings.first):
@@ -212,7 +212,7 @@ def _dataset(
             "iterations": [p.iterations for p in points],
             "residual": [p.residual for p in points],
             **_memory(problem, points),
-            **_touch(problem, points),
+            **{name: [touch[name] for touch in touches] for name in touches[0]},
         },
         {
             **facts,
@@ -229,25 +229,29 @@ def _dataset(
     return crossings.recorded(result)
 
 
-def _recorded(problem: OrigamiProblem, point: Point) -> tuple[NDArray, NDArray, NDArray]:
-    """Residual (m,), energies by groups and reactions at a point, what has yielded as it was."""
+def _recorded(
+    problem: OrigamiProblem, point: Point
+) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
+    """Residual (m,), energies by groups, reactions and forces of contact at a point, as it was."""
     problem.recall(point.memory)
     at = point.u, point.factor
-    return problem.residual(*at), problem.energies(*at), problem.reactions(*at)
+    return (
+        problem.residual(*at),
+        problem.energies(*at),
+        problem.reactions(*at),
+        problem.touch(point.u),
+    )
 
 
 def _memory(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
-    """States of the branches of laws with memory, and what they have dissipated, J."""
-    if not problem.case.remembering:
-        return {}
-    lost = [0.0 if point.memory is None else point.memory[2][0] for point in points]
-    return {"memory": [problem.memory(point.memory) for point in points], "dissipated": lost}
-
-
-def _touch(problem: OrigamiProblem, points: Sequence[Point]) -> dict[str, Any]:
-    """Forces of contact at the points, N."""
-    forces = [problem.touch(point.u) for point in points]
-    return {name: [force[name] for force in forces] for name in forces[0]}
+    """States of the branches of laws with memory, and what they and friction dissipate, J."""
+    own, out = problem.memories, {}
+    if problem.case.remembering:
+        out["memory"] = [own.branches(point.memory) for point in points]
+    if problem.case.remembering or own.rubs:
+        lost = np.array([own.lost(point.memory) for point in points])
+        out["dissipated"] = lost - lost[0]
+    return out
 
 
 def _asymmetry_warning(point: Point, problem: OrigamiProblem) -> str:

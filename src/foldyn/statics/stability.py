@@ -22,7 +22,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from foldyn.algebra.superlu import Factorization
 from foldyn.statics.newton import Solver, plane
-from foldyn.statics.stepping import Station, arrive
+from foldyn.statics.stepping import Station, arrive, kept, recall
 
 APART = 1e-6  # share of a step within which crossings count as one multiple point
 SHARP = 1e-13  # share of a step to which a crossing is located
@@ -104,11 +104,20 @@ class Section:
 
 
 def critical_points(solver: Solver, start: Station, end: Station) -> list[Station]:
-    """Stations at the limit and bifurcation points of a step, in their order."""
-    if start.point.negative == end.point.negative:
+    """Stations at the limit and bifurcation points of a step, in their order.
+
+    Each of them is on the way of the step: from what the structure remembered at its start.
+    """
+    counts = start.point.negative, end.point.negative
+    if counts[0] == counts[1] or min(counts) < 0:
         return []
-    section = Section(solver, start, end)
-    return _crossings(section, *section.ends)
+    section, found = Section(solver, start, end), []
+    recall(solver.problem, start)
+    for station in _crossings(section, *section.ends):
+        found.append(kept(solver.problem, station))
+        recall(solver.problem, start)
+    recall(solver.problem, end)
+    return found
 
 
 def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
@@ -117,7 +126,7 @@ def _crossings(section: Section, low: Mark, high: Mark) -> list[Station]:
         return []
     if change > 1 and high.share - low.share > APART:
         middle = section.at(0.5 * (low.share + high.share), low, high)
-        if middle is not None:
+        if middle is not None and middle.negative >= 0:
             return _crossings(section, low, middle) + _crossings(section, middle, high)
     critical = _crossing(section, low, high)
     return [] if critical is None else [critical]
@@ -141,6 +150,8 @@ def _zero_of_determinant(section: Section, low: Mark, high: Mark) -> Station | N
     scale = _log_determinant(low)
 
     def determinant(mark: Mark) -> float:
+        if mark.negative < 0:
+            raise LostError
         sign = 1.0 if (mark.negative - low.negative) % 2 == 0 else -1.0
         return sign * float(np.exp(min(_log_determinant(mark) - scale, 600.0)))
 
@@ -159,7 +170,7 @@ def _log_determinant(mark: Mark) -> float:
 def _bisected(section: Section, low: Mark, high: Mark) -> Station | None:
     while high.share - low.share > SHARP:
         middle = section.at(0.5 * (low.share + high.share), low, high)
-        if middle is None or middle.share in (low.share, high.share):
+        if middle is None or middle.negative < 0 or middle.share in (low.share, high.share):
             break
         low, high = (middle, high) if middle.negative == low.negative else (low, middle)
     return high.station if high.share - low.share <= APART else None

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.statics.newton import COLLIDES, Attempt, Solver, Stiffness
-from foldyn.statics.problem import Problem, balance, clear_share
+from foldyn.statics.problem import Problem, balance, clear_share, is_counted
 from foldyn.values import brief
 
 NEGLIGIBLE = 1e-6  # of the structure's size: motions below are never a snap
@@ -92,19 +92,27 @@ Walk = Iterator[Station]
 def arrive(solver: Solver, attempt: Attempt) -> Station:
     """Station at the equilibrium that a correction found."""
     stiffness = solver.stiffness(attempt.u, attempt.factor)
-    negative = stiffness.symmetric.negative() if solver.settings.stability else -1
+    counted = solver.settings.stability and is_counted(solver.problem, attempt.u)
+    negative = stiffness.symmetric.negative() if counted else -1
     relative = attempt.balance.relative
     point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
     return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
 
 
 def kept(problem: Problem, station: Station) -> Station:
-    """The station with what has yielded on the way to it; the problem goes on from there."""
+    """The station with what has yielded or slipped on the way; the problem goes on from there."""
     keep = getattr(problem, "keep", None)  # problems that forget have none
     memory = keep(station.point.u) if keep else None
     if memory is None:
         return station
     return station._replace(point=replace(station.point, memory=memory))
+
+
+def recall(problem: Problem, station: Station) -> None:
+    """Go back to what a problem remembered at a station."""
+    back = getattr(problem, "recall", None)  # problems that forget have none
+    if back:
+        back(station.point.memory)
 
 
 def step_to(solver: Solver, start: Station, factor: float) -> Attempt:
@@ -121,10 +129,20 @@ def _step(solver: Solver, start: Station, factor: float, search: bool) -> Attemp
     attempt = solver.correct(start.point.u, factor, None, start.stiffness, search)
     if attempt.failure:
         return attempt
-    predicted = abs(factor - start.point.factor) * float(np.linalg.norm(start.response))
+    change = abs(factor - start.point.factor)
     length = float(np.linalg.norm(attempt.u - start.point.u))
-    limit = solver.settings.jump * predicted + NEGLIGIBLE * solver.problem.length
-    return attempt._replace(failure=SNAPS) if length > limit else attempt
+
+    def snaps(response: NDArray) -> bool:
+        predicted = change * float(np.linalg.norm(response))
+        return length > solver.settings.jump * predicted + NEGLIGIBLE * solver.problem.length
+
+    if not snaps(start.response):
+        return attempt
+    # what begins to yield or to slip within the step goes on as it does at its end
+    gives_way = start.point.memory is not None
+    if gives_way and not snaps(solver.stiffness(attempt.u, factor).response(attempt.u, factor)):
+        return attempt
+    return attempt._replace(failure=SNAPS)
 
 
 def walk(solver: Solver, start: Station, factors: Sequence[float], between: bool) -> Walk:

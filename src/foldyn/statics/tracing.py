@@ -16,15 +16,9 @@ from foldyn.errors import InputError
 from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
+from foldyn.statics.memories import FOLLOWED
 from foldyn.statics.newton import Settings, Solver
-from foldyn.statics.origami import (
-    FOLLOWED,
-    REFUSED,
-    AdaptiveLoad,
-    OrigamiProblem,
-    drives,
-    is_actuated,
-)
+from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
 from foldyn.statics.recording import record
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
@@ -143,13 +137,13 @@ def trace(
     check_fill(case.structure.fill, case.body.size)
     problem = OrigamiProblem(
         case, steady, displacement, adaptive_load, inertia_relief,
-        flow=REFUSED if plan.method.rule is not None else FOLLOWED,
-        memory=_flowed(case, initial),
+        flow=FOLLOWED, memory=_flowed(case, initial),
     )  # fmt: skip
     begin = 0.0 if initial is None else plan.begin
     _check_start(problem, begin)
     _check_actuation(problem, plan)
-    refuse_mechanisms(problem)
+    problem.begin(begin)
+    refuse_mechanisms(problem, begin)
     solver = Solver(problem, settings)
     facts = {
         "method": method,

@@ -144,8 +144,8 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
 def _gap(tables, x, kind, one, other):
     """Distance (m) of a pair."""
     if kind == VERTEX:
-        return vertex_gap(tables, x, one, other)
-    return edge_gap(tables, x, one, other)
+        return vertex_gap(x, tables.triangles, one, other)
+    return edge_gap(x, tables.edges, one, other)
 
 
 @kernel
@@ -153,13 +153,13 @@ def _list(tables, u0, u1, memory):
     """Have all pairs listed that are near on the way from u0 to u1; none if that is too long."""
     far = math.inf
     if memory.counts.has_list == 1:
-        far = max(farthest(tables, u0, memory), farthest(tables, u1, memory))
+        far = max(farthest(u0, memory), farthest(u1, memory))
     if not far < 0.5 * memory.facts.skin:
         middle = 0.5 * (u0 + u1)
         place(tables, middle, memory)
         list_pairs(tables, middle, memory)
         use_all(memory)
-        if not farthest(tables, u0, memory) < 0.5 * memory.facts.skin:
+        if not farthest(u0, memory) < 0.5 * memory.facts.skin:
             memory.counts.full, memory.counts.has_list = 1, 0
 
 
@@ -349,7 +349,7 @@ def _plane_tangents(tables, start, middle, moved, memory, out):
             if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
                 spring[:] = 0.0
                 memory.moved[p, :3] = 0.5 * (moved[0, p] + moved[1, p])
-                friction_tangent(tables, middle, memory, p, i, spring)
+                friction_tangent(tables, middle, memory, p, i, 0.0, spring)
                 memory.moved[p, :3] = moved[1, p]
                 for a in range(3):
                     for b in range(3):

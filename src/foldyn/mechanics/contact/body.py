@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.mechanics.block_matrix import assembled, pairs_within
-from foldyn.mechanics.body import Blocks, Body, Unstrained
+from foldyn.mechanics.body import Blocks, Body, Unstrained, unit_rows
 from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
+from foldyn.mechanics.contact.friction import Friction
 from foldyn.mechanics.contact.memory import Memory, memories, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
-from foldyn.mechanics.contact.planes import add_planes
-from foldyn.mechanics.contact.tables import HISTORY, POINT, Sheets, Tables, tables
+from foldyn.mechanics.contact.tables import FRICTION, HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     pair_tangents,
@@ -34,7 +34,8 @@ GROUP = "contact"
 class TouchingBody(WrappedBody):
     """A body with contact; see `mechanics.body.Body`.
 
-    Its tangent is that of the energy: without friction, which has none.
+    Friction acts where springs are tied: on paths of equilibria (`rubbing`), and in motions, which
+    have memory of their own. Elsewhere there is none.
 
     Parameters
     ----------
@@ -48,6 +49,7 @@ class TouchingBody(WrappedBody):
     def __init__(self, inner: Body, sheets: Sheets, like: TouchingBody | None = None) -> None:
         super().__init__(inner)
         self.sheets, self._like = sheets, like
+        self._moved = np.zeros((len(sheets.planes), 3))
         self.energy_groups = (*inner.energy_groups, GROUP)
 
     @property
@@ -76,15 +78,21 @@ class TouchingBody(WrappedBody):
 
     def around(self, inner: Body) -> TouchingBody:
         """See `WrappedBody`."""
-        return TouchingBody(inner, self.sheets, self)
+        body = TouchingBody(inner, self.sheets, self)
+        body._moved = self._moved
+        return body
 
     def displaced(self, moved: NDArray) -> TouchingBody:
         """The same with planes displaced by `moved` (p, 3), m."""
         body = self.around(self.inner)
-        planes = self.tables.planes.copy()
-        planes[:, POINT : POINT + 3] += moved
-        body.tables = self.tables._replace(planes=planes)
+        body._moved = np.asarray(moved, float)
         return body
+
+    def rubbing(self) -> tuple[TouchingBody, Friction]:
+        """The same with springs of friction, and what keeps where they are tied."""
+        body = self.around(self.inner)
+        body._memory = memory(self.tables, self.sheets.panels)
+        return body, Friction(body.tables, body._memory)
 
     def driven(self, rows: Mapping[int, int]) -> TouchingBody:
         """The same with planes, by number, that move with histories of these numbers."""
@@ -95,19 +103,27 @@ class TouchingBody(WrappedBody):
 
     # ------------------------------------------------------------------ mechanics
     def contact(self, q: NDArray) -> tuple[float, NDArray]:
-        """Energy (J) and its gradient (n, 3), N, of contact alone."""
+        """Energy (J) of contact alone and the force (n, 3), N, against it, friction included."""
         u = self.nodal(q)
         force = np.zeros_like(u)
-        add_contact(self.tables, u, self.inner.angles(q), force, self._memory)
+        add_contact(self.tables, u, self.inner.angles(q), force, self._placed())
         return float(self._memory.facts.energy), force
+
+    def _placed(self) -> Memory:
+        """The memory with the planes where they are."""
+        self._memory.moved[:, :3] = self._moved
+        return self._memory
 
     def touch(self, q: NDArray) -> NDArray:
         """Size (n,), N, of the force of contact on each node, without friction."""
-        return np.linalg.norm(self.contact(q)[1], axis=1)
+        force = self.contact(q)[1]
+        return np.linalg.norm(force - self._memory.friction[:, :, :3].sum(axis=0), axis=1)
 
     def energies(self, q: NDArray) -> NDArray:
-        """See `Body`."""
-        return np.append(self.inner.energies(q), self.contact(q)[0])
+        """See `Body`; what springs of friction store counts to contact."""
+        energy, pull = self.contact(q)[0], self._memory.friction[:, :, :3]
+        stored = float((pull * pull).sum()) / (2.0 * self.tables.stiffness)
+        return np.append(self.inner.energies(q), energy + stored)
 
     def internal(self, q: NDArray, work: TouchingWork | None = None) -> NDArray:
         """See `Body`."""
@@ -127,34 +143,30 @@ class TouchingBody(WrappedBody):
         return sparse.csr_array(self.inner.step_tangent(q, before) + self.contact_tangent(q))
 
     def contact_tangent(self, q: NDArray) -> sparse.csr_array:
-        """The second derivative (m, m), N/m, of the energy of contact."""
+        """The derivative (m, m), N/m, of the forces of contact."""
         self.contact(q)
         return contact_tangent(self.tables, self._memory, self.size)
 
     def clear(self, q: NDArray, step: NDArray, moves: NDArray, keep: float = KEEP) -> float:
         """Share of a step (m,) from q in which nothing crosses, while planes move (p, 3), m."""
         u, motion = self.nodal(q), self.nodal(step)
-        return clear_share(self.tables, self._memory, u, motion, moves, keep)
+        return clear_share(self.tables, self._placed(), u, motion, moves, keep)
 
     def plane_forces(self, q: NDArray) -> NDArray:
         """Force (p, 3), N, of each plane on the nodes, without friction."""
         self.contact(q)
-        out = np.zeros((len(self.tables.planes), 3))
-        for plane, alone in enumerate(self._alone()):
-            force = np.zeros_like(self._memory.x)
-            add_planes(alone, self._memory.x, self._memory, force)
-            out[plane] = -force.sum(axis=0)
-        return out
+        pressed = self._memory.friction[:, :, 3].sum(axis=1)
+        return pressed[:, None] * self.tables.planes[:, NORMAL : NORMAL + 3]
 
-    def plane_tangents(self, q: NDArray) -> list[NDArray]:
-        """Second derivatives (n, 3, 3), N/m, of the potential of each plane."""
+    def plane_friction(self, q: NDArray) -> NDArray:
+        """Friction (p, 3), N, of each plane on the nodes."""
         self.contact(q)
-        return [plane_tangents(alone, self._memory.x, self._memory) for alone in self._alone()]
+        return -self._memory.friction[:, :, :3].sum(axis=1)
 
-    def _alone(self) -> list[Tables]:
-        """Tables with one plane each."""
-        planes = self.tables.planes
-        return [self.tables._replace(planes=planes[p : p + 1]) for p in range(len(planes))]
+    def plane_tangents(self, q: NDArray) -> NDArray:
+        """Derivatives (p, n, 3, 3), N/m, of the forces against each plane."""
+        self.contact(q)
+        return plane_tangents(self.tables, self._memory.x, self._memory)
 
     def blocks(self) -> InnerBlocks:
         """See `Body`: of the body within; which nodes touch changes, so contact is apart."""
@@ -188,9 +200,33 @@ class TouchingBody(WrappedBody):
         """See `Body`: without contact."""
         return self.inner.nominal(q)
 
+    def holds(self, q: NDArray) -> sparse.csr_array:
+        """See `Body`: planes hold nodes that touch them."""
+        return sparse.csr_array(sparse.vstack([self.inner.holds(q), self._held(q)]))
+
+    def _held(self, q: NDArray) -> sparse.csr_array:
+        """Unit rows (s, m): normals of planes at nodes that touch, all axes where these rub."""
+        self.contact(q)
+        plane, node = np.nonzero(self._memory.friction[:, :, 3])
+        rubs = (self.tables.planes[plane, FRICTION] > 0.0) & (
+            self._memory.anchor[plane, node, 3] > 0.0
+        )
+        normals = self.tables.planes[plane, NORMAL : NORMAL + 3]
+        nodes = np.concatenate([node, np.repeat(node[rubs], 3)])[:, None]
+        axes = np.tile(np.eye(3), (int(rubs.sum()), 1))
+        return unit_rows(nodes, np.concatenate([normals, axes]), self.size)
+
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """See `Body`: without contact."""
-        return self.inner.unstrained(q)
+        """See `Body`: of contact, planes alone."""
+        inner, held = self.inner.unstrained(q), self._held(q)
+        if inner is None or not held.shape[0]:
+            return inner
+
+        def stretch(mode: NDArray) -> float:
+            return max(inner.stretch(mode), float(np.abs(held @ mode).max() / np.abs(mode).max()))
+
+        own = self.tables.stiffness * (held.T @ held)
+        return inner._replace(tangent=sparse.csr_array(inner.tangent + own), stretch=stretch)
 
 
 class InnerBlocks:
@@ -213,7 +249,7 @@ class InnerBlocks:
 
 
 def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
-    """The second derivative (size, size), N/m, of the energy of contact where it was last found."""
+    """The derivative (size, size), N/m, of the forces of contact where they were last found."""
     first, second = touching_pairs(own, kept)
     nodes = np.empty((len(first) + len(second), 4), np.int64)
     blocks = np.zeros((len(nodes), 12, 12))
@@ -224,7 +260,7 @@ def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
     four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
     pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
     if len(own.planes):
-        normal = plane_tangents(own, kept.x, kept)
+        normal = plane_tangents(own, kept.x, kept).sum(axis=0)
         met = np.flatnonzero(normal.any(axis=(1, 2)))
         pairs.append(np.column_stack([met, met]))
         entries.append(normal[met])

@@ -86,8 +86,11 @@ def guard_tangents(tables, x, blocks):
 
 @kernel
 def plane_tangents(tables, x, memory):
-    """Second derivatives (n, 3, 3) of the potential of planes, and of that of lagged friction."""
-    out = np.zeros((len(x), 3, 3))
+    """Derivatives (q, n, 3, 3) of the forces of planes on nodes, friction included.
+
+    After `add_planes`.
+    """
+    out = np.zeros((len(tables.planes), len(x), 3, 3))
     for p in range(len(tables.planes)):
         for m in range(tables.meeting.size):
             i = tables.meeting[m]
@@ -98,24 +101,29 @@ def plane_tangents(tables, x, memory):
             for a in range(3):
                 for b in range(3):
                     normal = tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
-                    out[i, a, b] += stiffness * normal
-            tied = tables.planes[p, FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0
-            if tied and memory.counts.lagged == 1:
-                friction_tangent(tables, x, memory, p, i, out[i])
+                    out[p, i, a, b] += stiffness * normal
+            if tables.planes[p, FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
+                friction_tangent(tables, x, memory, p, i, stiffness, out[p, i])
     return out
 
 
 @kernel
-def friction_tangent(tables, x, memory, p, i, out):
-    """Add the derivative of the spring of node i on plane p to out (3, 3)."""
+def friction_tangent(tables, x, memory, p, i, stiffness, out):
+    """Add the derivative of the spring of node i on plane p to out (3, 3).
+
+    stiffness : the rate, N/m, with which the present normal force falls as the node rises; where
+    it bounds friction, the derivative of a node that slips is not symmetric.
+    """
     k, stretch = tables.stiffness, stretch_of(tables, x, memory, p, i)
     most = farthest_stretch(tables, memory, p, i)
     slips = stretch[3] > most
     share = most / stretch[3] if slips else 1.0
+    rate = 0.0 if memory.counts.lagged == 1 else tables.planes[p, FRICTION] * stiffness
     for a in range(3):
         for b in range(3):
             along = -tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
             along += 1.0 if a == b else 0.0
-            if slips:  # its force keeps its size
+            if slips:  # its force keeps its direction
                 along -= stretch[a] * stretch[b] / (stretch[3] * stretch[3])
+                out[a, b] -= rate * stretch[a] / stretch[3] * tables.planes[p, NORMAL + b]
             out[a, b] += k * share * along

@@ -1,0 +1,96 @@
+"""Friction on planes along a path of equilibria: what an accepted step changes.
+
+Within a step friction is a function of the state: springs from the anchors of the last accepted
+step, each with no more than mu N, N the present normal force (`planes`). So a step is the return
+mapping of Coulomb friction by the backward Euler method. A node that does not touch is tied where
+it is, so that it rubs in the step in which it comes to touch.
+
+An anchor that goes its way under a mean of the forces mu N at both ends of the step dissipates
+their product; a spring that lets go loses what it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.planes import LEAST, slip
+from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
+
+
+class Friction:
+    """Where the springs of friction are tied, which changes in place.
+
+    It commits, takes snapshots and recalls them as `mechanics.inelastic_body.Memory` does.
+
+    Parameters
+    ----------
+    tables : Tables
+    kept : Memory
+        Of the body whose steps are accepted.
+    """
+
+    def __init__(self, tables: Tables, kept: Memory) -> None:
+        self._tables, self._kept = tables, kept
+        shape = kept.anchor.shape[:2]
+        self._stored = np.zeros(shape)  # J, of springs at the last accepted step
+        self._lost = np.zeros(1)  # J
+        self._coefficient = tables.planes[:, FRICTION, None]
+
+    def start(self) -> None:
+        """Tie all nodes where the body was evaluated last; springs are at rest."""
+        self._kept.anchor[:] = 0.0
+        self._stored[:], self._lost[:] = 0.0, 0.0
+        self._tie()
+
+    def commit(self) -> None:
+        """Accept the step that ends where the body was evaluated last."""
+        anchor, before = self._kept.anchor, self._kept.anchor.copy()
+        slip(self._tables, self._kept.x, self._kept)
+        way = np.linalg.norm(anchor[:, :, :3] - before[:, :, :3], axis=2)
+        bound = 0.5 * self._coefficient * (before[:, :, 3] + anchor[:, :, 3])
+        lost = np.where(anchor[:, :, 3] > 0.0, bound * way, self._stored)
+        self._lost += lost.sum()
+        self._stored[:] = self.stored()
+        self._tie()
+
+    def stored(self) -> NDArray:
+        """Energy (q, n), J, of the springs where the body was evaluated last."""
+        pull = self._kept.friction[:, :, :3]
+        return (pull * pull).sum(axis=2) / (2.0 * self._tables.stiffness)
+
+    def slips(self) -> bool:
+        """Whether a node slips where the body was evaluated last."""
+        kept, normal = self._kept, self._tables.planes[:, None, NORMAL : NORMAL + 3]
+        apart = kept.x - kept.moved[:, None, :3] - kept.anchor[:, :, :3]
+        along = apart - (apart * normal).sum(axis=2, keepdims=True) * normal
+        pull = self._tables.stiffness * np.linalg.norm(along, axis=2)
+        pressed = kept.friction[:, :, 3]
+        return bool(((pressed > 0.0) & (pull > self._coefficient * pressed)).any())
+
+    @property
+    def lost(self) -> float:
+        """What has been dissipated since the start, J."""
+        return float(self._lost[0])
+
+    def snapshot(self) -> tuple[NDArray, ...]:
+        """The last accepted step, to `recall`."""
+        return tuple(array.copy() for array in self._state)
+
+    def recall(self, snapshot: Sequence[NDArray]) -> None:
+        """Go back to an accepted step."""
+        for array, kept in zip(self._state, snapshot, strict=True):
+            array[:] = kept
+
+    @property
+    def _state(self) -> tuple[NDArray, ...]:
+        return self._kept.anchor, self._stored, self._lost
+
+    def _tie(self) -> None:
+        anchor, moved = self._kept.anchor, self._kept.moved[:, None, :3]
+        loose = anchor[:, :, 3] == 0.0
+        anchor[:, :, :3] = np.where(loose[:, :, None], self._kept.x - moved, anchor[:, :, :3])
+        anchor[:, :, 3] = np.where(loose, LEAST, anchor[:, :, 3])

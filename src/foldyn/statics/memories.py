@@ -1,0 +1,160 @@
+"""What the accepted steps of a path change: creases that yield, and friction on planes.
+
+Both are functions of the state within a step. Only an accepted step moves what they start from, so
+iterations, steps that are cut and points that are located between others leave no trace.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.cases import Case
+from foldyn.errors import InputError
+from foldyn.materials.memory_law import VARIABLES
+from foldyn.mechanics.inelastic_body import InelasticBody
+from foldyn.structures.remembering import Remembering
+from foldyn.structures.remembering import memory as memory_of
+
+REFUSED, FOLLOWED, AT_REST = "refused", "followed", "at rest"
+
+
+class Kept(NamedTuple):
+    """An accepted step, to go back to; None for what there is not."""
+
+    creases: tuple[NDArray, ...] | None
+    friction: tuple[NDArray, ...] | None
+
+
+class Memories:
+    """The body of a case along a path, with what it remembers.
+
+    Parameters
+    ----------
+    case : Case
+    flow : {"refused", "followed", "at rest"}
+        What to do with friction and with creases that yield or creep: a path follows those that
+        yield; at rest nothing has flowed.
+
+    Attributes
+    ----------
+    body : Body
+        With memory of its own, where there is any.
+    """
+
+    def __init__(self, case: Case, flow: str) -> None:
+        self._case, flows = case, _flows(case, flow)
+        body: Any = case.body
+        self._creases = self._friction = None
+        if flows and flow == FOLLOWED:
+            inner = case.elastic_body
+            self._creases = memory_of(flows, inner)
+            yielding = InelasticBody(inner, self._creases)
+            body = yielding if case.contact is None else body.around(yielding)
+        if _rubs(case, flow):
+            body, self._friction = body.rubbing()
+        self.body = body
+
+    def __bool__(self) -> bool:
+        """Whether there is any memory."""
+        return self._creases is not None or self._friction is not None
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction."""
+        return self._friction is not None
+
+    def start(self, q: NDArray, state: NDArray | str | None) -> None:
+        """Begin at the body's dofs q (m,), with creases in a state (b, 2); see `cases.State`."""
+        if self._creases is not None:
+            self._creases.start(q, state)
+
+    def tie(self) -> None:
+        """Begin with springs of friction at rest where the body was evaluated last."""
+        if self._friction is not None:
+            self._friction.start()
+
+    def slips(self) -> bool:
+        """Whether a node slips where the body was evaluated last."""
+        return self._friction is not None and self._friction.slips()
+
+    def commit(self) -> Kept:
+        """Accept the step that ends where the body was evaluated last."""
+        own = (self._creases, self._friction)
+        for memory in own:
+            if memory is not None:
+                memory.commit()
+        return Kept(*(None if memory is None else memory.snapshot() for memory in own))
+
+    def recall(self, kept: Kept | None) -> None:
+        """Go back to an accepted step."""
+        if kept is None:
+            return
+        for memory, snapshot in zip((self._creases, self._friction), kept, strict=True):
+            if memory is not None and snapshot is not None:
+                memory.recall(snapshot)
+
+    def branches(self, kept: Kept | None) -> NDArray:
+        """State (b, 2) of all branches of the case there, those that relax relaxed."""
+        parts = self._case.remembering
+        state = np.zeros((sum(part.count for part in parts), VARIABLES))
+        if kept is not None and kept.creases is not None:
+            flows = [not part.law.relaxes for part in parts]
+            state[np.repeat(flows, [part.count for part in parts])] = kept.creases[1]
+        return state
+
+    def lost(self, kept: Kept | None) -> float:
+        """What creases and friction have dissipated there, J."""
+        own = [] if kept is None else [memory for memory in kept if memory is not None]
+        return float(sum(memory[2][0] for memory in own))
+
+
+def _rubs(case: Case, flow: str) -> bool:
+    """Whether a path has friction.
+
+    Raises
+    ------
+    InputError
+        It has, and the solver cannot have it.
+    """
+    contact = case.contact
+    if contact is None or not any(contact.friction_on(plane) > 0.0 for plane in contact.planes):
+        return False
+    if flow == REFUSED:
+        raise InputError(
+            ".friction: makes equilibria depend on the way there; fd.simulate and fd.trace take "
+            "it; elsewhere give 0, here and in the planes",
+            "contact",
+        )
+    return flow == FOLLOWED
+
+
+def _flows(case: Case, flow: str) -> tuple[Remembering, ...]:
+    """Laws with memory whose moments do not relax to those of an elastic law.
+
+    Raises
+    ------
+    InputError
+        There are such, and the solver cannot have them.
+    """
+    parts = tuple(part for part in case.remembering if not part.law.relaxes)
+    for part in parts:
+        name, field = part.law.name, f"{part.kind}_law"
+        if flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
+            continue
+        if part.law.rate_dependent:
+            raise InputError(
+                f" = {name!r}: creep goes on for ever, and the steps of a path say nothing of "
+                "time; simulate the motion, or take an elastic law",
+                field,
+            )
+        raise InputError(
+            f" = {name!r}: yields, so that its equilibria depend on the way there; fd.simulate "
+            "and fd.trace take it; elsewhere take an elastic law",
+            field,
+        )
+    if parts:
+        case.check_flow()
+    return parts
