@@ -78,17 +78,12 @@ class Workers(Generic[Item, Result]):
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
-        """Compute an item here while the processes start, which then find its kernels compiled."""
-        for _ in range(self.count):
-            self._submit(_nothing)
-        keep(item, self.do(item))
-
     def each(
         self,
         items: Iterable[Item],
         keep: Callable[[Item, Result], None],
         lost: Callable[[Item, str], Result] | None = None,
+        first: bool = False,
     ) -> None:
         """Compute something for each item; each result is kept as soon as it is ready.
 
@@ -103,6 +98,9 @@ class Workers(Generic[Item, Result]):
             Result for an item whose process was ended from outside twice, the second time while it
             computed nothing else; called with the item and the reason. Others are computed all the
             same. Only where one thread asks at a time.
+        first : bool
+            Whether the first item is computed here while the processes start, which then find its
+            kernels compiled.
 
         Raises
         ------
@@ -110,6 +108,10 @@ class Workers(Generic[Item, Result]):
             A process was ended from outside, and there is no `lost`.
         """
         left, doubtful = iter(items), deque[Item]()
+        for item in islice(left, int(first)):
+            for _ in range(self.count):
+                self._submit(_nothing)
+            keep(item, self.do(item))
         while True:
             broken = self._each(left, keep)
             if not broken:

@@ -9,7 +9,7 @@ from scipy import linalg
 
 import foldyn as fd
 from foldyn.dynamics import METHODS, largest_frequency
-from foldyn.dynamics.stability import MARGIN, stability_limit
+from foldyn.dynamics.stability import MARGIN, frequency_bound, stability_limit
 
 RK4 = METHODS["rk4"].growth
 OMEGA = 4.0
@@ -78,6 +78,32 @@ def test_growth_is_that_of_a_computed_step(damping, method):
         alpha, beta = damping.get("alpha", 0.0), damping.get("beta", 0.0)
         wanted = growth(np.array([OMEGA]), np.array([alpha + beta * OMEGA**2]), dt)[0]
         assert found == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("c", [0.0, 1e-9, 1e-3, 0.1, 0.3, 0.5, 1.0, 30.0])
+def test_growth_of_central_differences_is_that_of_their_matrix(c):
+    """On (u, v, a), in units of the step: u' = u + v + a/2, a' = -w^2 u' - c (v + a), and v'."""
+    w = np.concatenate([[0.0], np.geomspace(1e-6, 2.0, 60), [2.0001, 3.0, 20.0]])
+    a_row = [-(w**2), -(w**2) - c, -0.5 * w**2 - c]
+    one = np.ones_like(w)
+    v_row = [0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]]
+    step = np.array([[one, one, 0.5 * one], v_row, a_row])
+    wanted = np.abs(np.linalg.eigvals(np.moveaxis(step, 2, 0))).max(axis=1)
+    found = METHODS["central_difference"].growth(w, np.full_like(w, c), 1.0)
+    np.testing.assert_allclose(found, wanted, rtol=1e-7)  # double roots have half the digits
+
+
+@pytest.mark.parametrize("dihedral", [20.0, 100.0, 179.0])
+def test_the_bound_of_frequencies_is_one(dihedral):
+    pattern = fd.patterns.miura(cells=(3, 2), dihedral=dihedral)
+    for mass in ("circumcenter", "mixed_voronoi"):
+        case = fd.Case(
+            fd.discretize(pattern, fd.Sheet(1e6, 0.25, 0.01, 1.0), mass=mass), [fd.Fix([0])]
+        )
+        u = 1e-2 * np.random.default_rng(0).standard_normal(case.structure.nodes.shape)
+        for moved in (None, u):
+            bound, largest = frequency_bound(case, moved), largest_frequency(case, moved)
+            assert largest <= bound < 2.0 * largest
 
 
 @pytest.mark.parametrize("mass", ["circumcenter", "consistent"])

@@ -16,20 +16,36 @@ from foldyn.jit.intrinsics import borrowed, flat
 from foldyn.mechanics.kernels import elapse
 
 ORDER = 2
+NEWTON = 4  # iterations: few, where c is small
+ROUNDING = 1e-15
 
 
 def growth(omega, damping, dt):
     """Factor by which a step of dt multiplies a free vibration, at most, per frequency.
 
-    Spectral radius of the step as a matrix on (u, v, a).
+    With u' = u + v + a/2, a' = -w^2 u' - c (v + a) and v' = v + (a + a')/2, in units of the step,
+    the factors are the roots of z^3 + p z^2 + q z + c/2. The one near -c/2 is found by Newton's
+    method, the others are those of a quadratic.
     """
     w, c = np.broadcast_arrays(omega * dt, damping * dt)
-    one = np.ones_like(w)
-    # in units of the step: u' = u + v + a/2, a' = -w^2 u' - c (v + a), v' = v + (a + a')/2
-    a_row = [-(w**2), -(w**2) - c, -0.5 * w**2 - c]
-    v_row = [0.5 * a_row[0], one + 0.5 * a_row[1], 0.5 * one + 0.5 * a_row[2]]
-    step = np.array([[one, one, 0.5 * one], v_row, a_row])
-    return np.abs(np.linalg.eigvals(np.moveaxis(step, (0, 1), (-2, -1)))).max(axis=-1)
+    p, q = w**2 - 2.0 + 1.5 * c, 1.0 - 2.0 * c
+    z = np.zeros_like(w)
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON):
+            value = ((z + p) * z + q) * z + 0.5 * c
+            z = z - value / ((3.0 * z + 2.0 * p) * z + q)
+        found = np.abs(((z + p) * z + q) * z + 0.5 * c) <= ROUNDING * (1.0 + np.abs(z)) ** 3
+    half, product = 0.5 * (p + z), q + z * (p + z)
+    apart = half**2 - product
+    pair = np.sqrt(np.abs(product))
+    pair = np.where(apart < 0.0, pair, np.abs(half) + np.sqrt(np.maximum(apart, 0.0)))
+    out = np.maximum(np.abs(z), pair)
+    if not found.all():  # damped so strongly that roots come together
+        p, q, d = (each[~found] for each in (p, q, 0.5 * c))
+        zero, one = np.zeros_like(p), np.ones_like(p)
+        step = np.array([[-p, -q, -d], [one, zero, zero], [zero, one, zero]])
+        out[~found] = np.abs(np.linalg.eigvals(np.moveaxis(step, -1, 0))).max(axis=-1)
+    return out
 
 
 @shared

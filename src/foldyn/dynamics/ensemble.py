@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,27 +14,19 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
 from foldyn.dynamics import timing
-from foldyn.dynamics.audit import Balance, Rounding, audited
-from foldyn.dynamics.course import Course, StepPlan
-from foldyn.dynamics.damping import has_dampers
+from foldyn.dynamics.audit import audited
+from foldyn.dynamics.beside import METHOD, differing, integrate, lacking, room
+from foldyn.dynamics.course import StepPlan
 from foldyn.dynamics.doubts import INACCURATE
 from foldyn.dynamics.inertia import check_mass
-from foldyn.dynamics.initial import begin, check_start
-from foldyn.dynamics.lane_steps import (
-    NOT_FINITE,
-    PENETRATION,
-    LaneLoads,
-    LaneSamples,
-    LaneState,
-    advance_lanes,
-)
-from foldyn.dynamics.methods import METHODS, suited, with_mass
-from foldyn.dynamics.modal_damping import modal_rows
-from foldyn.dynamics.motion import EXPLODED
-from foldyn.dynamics.system import Packed, pack
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.mechanics.lanes import WIDTH, lane_work, lanes, side_by_side, topology
-from foldyn.mechanics.model import BarsHinges
+from foldyn.dynamics.initial import check_start
+from foldyn.dynamics.methods import suited, with_mass
+from foldyn.dynamics.modal_damping import ModalRows, modal_rows
+from foldyn.dynamics.motion import Motion
+from foldyn.dynamics.sampling import Sampler
+from foldyn.dynamics.system import pack
+from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable
 from foldyn.values import number, show, whole
@@ -42,20 +34,14 @@ from foldyn.values import number, show, whole
 if TYPE_CHECKING:
     import xarray
 
-METHOD = METHODS["central_difference"]
-STRETCH = 1000  # steps for which the factors of the loads are in memory
-SAME = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group")
-OUTCOMES = {NOT_FINITE: "not finite", PENETRATION: "panel passed through panel"}
-UNSTABLE = "unstable"
-
 
 class _Member(NamedTuple):
-    """A model, ready to go."""
+    """A model with its state at the start, checked, and what limits its step."""
 
     case: Case
-    packed: Packed
     u: NDArray
     v: NDArray
+    modal: ModalRows
     critical: float
 
 
@@ -115,8 +101,6 @@ def simulate_many(
     start = number("start", start, unit="s")
     duration = number("duration", duration, above=0.0)
     members = [_member(k, case, state) for k, (case, state) in enumerate(many)]
-    for k, member in enumerate(members[1:], 1):
-        _compare(k, member.packed, members[0].packed)
     least = int(np.argmin([member.critical for member in members]))
     critical = members[least].critical
     plan = timing.fixed_steps(duration, dt, every, critical, float(start))
@@ -126,40 +110,27 @@ def simulate_many(
             "take a smaller one or leave dt out (force = true integrates all the same)",
             "dt",
         )
-    first = members[0].case
-    count = timing.expected_samples(plan)
-    nodes, reactions = len(first.structure.nodes), len(first.reaction_dofs)
-    timing.check_samples(count * len(members), nodes, reactions)
     if threads is None:
         threads = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     threads = whole("threads", threads, least=1)
-
-    padded = [members[min(k, len(members) - 1)] for k in range(-(-len(members) // WIDTH) * WIDTH)]
-    names = audited(first.energy_groups)
-    out = (
-        np.full((len(padded), count, nodes, 3), np.nan),
-        np.full((len(padded), count, nodes, 3), np.nan),
-        np.full((len(padded), count, reactions), np.nan),
-        np.full((len(padded), count, len(names)), np.nan),
-    )
+    motions = [_motion(member, plan, force) for member in members]
+    _check_alike(motions)
+    out = room(motions)
+    parts = [slice(k, k + WIDTH) for k in range(0, len(motions), WIDTH)]
     clock = time.perf_counter()
-    runs = [
-        _run(padded[k : k + WIDTH], plan, [array[k : k + WIDTH] for array in out])
-        for k in range(0, len(padded), WIDTH)
-    ]
-    with ThreadPoolExecutor(min(threads, len(runs))) as pool:
-        ran = list(pool.map(lambda run: run(), runs))
+    with ThreadPoolExecutor(min(threads, len(parts))) as pool:
+        ran = list(pool.map(lambda part: integrate(motions[part], [a[part] for a in out]), parts))
     seconds = time.perf_counter() - clock
-    used = [array[: len(members)] for array in out]
-    ended = np.concatenate([codes for codes, _ in ran], axis=1)
-    outcome, error = _judged(members, plan, used, ended)
+    errors = [error for found, _ in ran for error in found]
+    outcome, error = _judged(motions, errors, out)
     facts = {
         "method": METHOD.name, "dt": plan.dt, "steps": plan.steps, "start": plan.start,
         "duration": plan.end - plan.start, "every": plan.every, "critical_step": critical,
         "wall_seconds": seconds, "processor_seconds": sum(spent for _, spent in ran),
-        "threads": min(threads, len(runs)), "energy_error": error,
+        "threads": min(threads, len(parts)), "energy_error": error,
     }  # fmt: skip
-    return _dataset(first, plan, used, names, outcome, facts)
+    case = members[0].case
+    return _dataset(case, plan, out, audited(case.energy_groups), outcome, facts)
 
 
 def _checked(cases: Any, initial: Any) -> list[tuple[Case, State | None]]:
@@ -177,7 +148,7 @@ def _checked(cases: Any, initial: Any) -> list[tuple[Case, State | None]]:
 
 
 def _member(k: int, case: Case, state: State | None) -> _Member:
-    """A case as arrays; refuses what this does not take."""
+    """A case, checked."""
     try:
         case = with_mass(suited(METHOD.name, case), case)
         u, v = check_start(case, state)
@@ -185,146 +156,62 @@ def _member(k: int, case: Case, state: State | None) -> _Member:
             raise InputError(": hold every node, so that nothing can move", "supports")
         check_mass(case.mass, case.constraints.determined)
         modal = modal_rows(case, u)
-        packed = pack(case, 1.0, u, modal)
-        system = packed.system
-        lacks = {
-            "contact": case.contact is not None,
-            "laws with memory": bool(case.remembering),
-            "supports that move": system.moves,
-            "actuated folds": system.turns,
-            "loads that follow the motion": system.follows,
-            "damping by beta or dashpots": bool(system.damping.data.size),
-            "modal damping, dashpots or damped creases": has_dampers.py_func(system.damping),
-            "constraints": len(system.ties.slave) > 0,
-            "a mass matrix that is not lumped": not packed.mass.lumped,
-            "clamped edges, springs, or another model than bars and hinges": not isinstance(
-                packed.model, BarsHinges
-            ),
-        }
-        for what, there in lacks.items():
-            if there:
-                raise InputError(
-                    f": {what}: not taken side by side yet; use simulate for such a case"
-                )
-        if packed.model.addresses.any():
-            raise InputError(": laws of one's own are not taken side by side; use simulate")
-        return _Member(case, packed, u, v, METHOD.critical_step(case, u, modal))
+        return _Member(case, u, v, modal, METHOD.critical_step(case, u, modal))
     except InputError as error:
         raise error.within(f"cases[{k}]{'.' if error.field else ''}") from None
 
 
-def _compare(k: int, packed: Packed, first: Packed) -> None:
-    """Refuse a case of another topology than that of the first."""
-    same = {
-        "nodes": packed.model.rest.shape == first.model.rest.shape,
-        "bars, hinges or kinds of laws": all(
-            np.array_equal(getattr(packed.model, name), getattr(first.model, name)) for name in SAME
-        ),
-        "supported dofs": np.array_equal(packed.system.supported, first.system.supported),
-    }
-    for what, equal in same.items():
-        if not equal:
+def _motion(member: _Member, plan: StepPlan, force: bool) -> Motion:
+    """Its motion."""
+    case, u, v, modal, critical = member
+    sampler = Sampler(case, {}, u, v, plan.start)
+    state = u, v, None, None
+    packed = pack(case, 1.0, u, modal)
+    return Motion(case, METHOD, plan, critical, force, state, packed, sampler)
+
+
+def _check_alike(motions: Sequence[Motion]) -> None:
+    """Refuse what does not go side by side."""
+    for k, motion in enumerate(motions):
+        if what := lacking(motion):
+            raise InputError(
+                f": {what}: not taken side by side yet; use simulate for such a case", f"cases[{k}]"
+            )
+        if what := differing(motion.packed, motions[0].packed):
             raise InputError(
                 f": has other {what} than cases[0]; models side by side share them", f"cases[{k}]"
             )
 
 
-def _run(
-    members: Sequence[_Member], plan: StepPlan, out: Sequence[NDArray]
-) -> Callable[[], tuple[NDArray, float]]:
-    """WIDTH models, ready to run.
-
-    The run returns what became of each, and in which step, (2, WIDTH), and its computing time, s.
-    """
-    first = members[0].packed
-    model, by = first.model, first.numbering
-    courses: list[Course] = [
-        begin(one.case, one.u, one.v, None, None, plan, one.packed) for one in members
-    ]
-    u, v = (side_by_side([getattr(course, name) for course in courses]) for name in ("u", "v"))
-    angle = side_by_side([course.angle for course in courses])
-    groups = len(first.body.energy_groups)
-    terms = [[(by.inward(w), history) for w, history in one.case.load_terms] for one in members]
-    count = max(map(len, terms))
-    values = np.zeros((count, u.size // WIDTH, WIDTH))
-    for lane, own in enumerate(terms):
-        for term, (vector, _) in enumerate(own):
-            values[term, :, lane] = vector.ravel()[: values.shape[1]]
-    dof = np.flatnonzero(values.any(axis=(0, 2)))
-    mass = [np.repeat(one.packed.mass.diagonal, 3) for one in members]
-    loads = LaneLoads(
-        dof, np.ascontiguousarray(values[:, dof].reshape(count, len(dof) * WIDTH)),
-        side_by_side([one.packed.mass.inverse for one in members]), side_by_side(mass),
-        np.array([one.packed.system.damping.alpha for one in members]),
-    )  # fmt: skip
-    zero = np.zeros((4, u.size))
-    own = [np.zeros((4, WIDTH)), np.zeros((groups, WIDTH)), np.zeros((2, WIDTH), np.int64)]
-    state = LaneState._make([u, v, *zero, angle, *own])
-    samples = LaneSamples._make([first.system.order, first.system.supported, *out])
-    shared, each_own = topology(model), lanes([one.packed.model for one in members])
-    work = lane_work(model)
-
-    def run() -> tuple[NDArray, float]:
-        clock = time.thread_time()
-        for begun in range(0, plan.steps, STRETCH):
-            steps = min(STRETCH, plan.steps - begun)
-            times = plan.start + np.arange(begun, begun + steps + 1) * plan.dt
-            factor = np.zeros((steps + 1, count, WIDTH))
-            known: dict[int, NDArray] = {}
-            for lane, each in enumerate(terms):
-                for term, (_, history) in enumerate(each):
-                    if id(history) not in known:
-                        known[id(history)] = np.broadcast_to(history(times), times.shape)
-                    factor[:, term, lane] = known[id(history)]
-            factor = factor.reshape(steps + 1, count * WIDTH)
-            advance_lanes(
-                shared, each_own, loads, factor, state, samples, work, plan.dt, begun, steps,
-                plan.every,
-            )  # fmt: skip
-        return state.outcome, time.thread_time() - clock
-
-    return run
-
-
 def _judged(
-    members: Sequence[_Member], plan: StepPlan, out: Sequence[NDArray], ended: NDArray
+    motions: Sequence[Motion], errors: Sequence[FoldynError | None], out: Sequence[NDArray]
 ) -> tuple[list[str], float]:
     """What became of each model, and the largest relative energy error; nan for what is wrong."""
-    outcome, errors = [], []
-    displacement, energy = out[0], out[3]
-    for k, member in enumerate(members):
-        code, step = ended[:, k].tolist()
-        good = len(energy[k])
-        if code:
-            good = min(good, -(-step // plan.every))
-        balance, rounding = Balance(), Rounding(member.packed.body)
-        balance.add(energy[k, :good], displacement[k, :good])
-        text = OUTCOMES.get(code, "done")
-        if balance.relative > EXPLODED and rounding.reveals(balance):
-            good, text = int(np.argmax(balance.off(energy[k, :good], EXPLODED))), UNSTABLE
-        if good < len(energy[k]):
-            for array in out:
-                array[k, good:] = np.nan
-        errors.append(balance.relative if text == "done" else 0.0)
-        outcome.append(text)
-    failed = [k for k, text in enumerate(outcome) if text != "done"]
+    outcome = ["done" if error is None else str(error) for error in errors]
+    failed = [k for k, error in enumerate(errors) if error is not None]
+    for k in failed:
+        for array in out:
+            array[k, motions[k].stored :] = np.nan
     if failed:
         warnings.warn(
-            f"{len(failed)} of {len(members)} motions ended before their time, the first of "
-            f"cases[{failed[0]}] ({outcome[failed[0]]}): see `outcome`; simulate says more of a "
-            "single one",
+            f"{len(failed)} of {len(motions)} motions ended before their time (see `outcome`), the "
+            f"first of cases[{failed[0]}]: {outcome[failed[0]]}",
             FoldynWarning,
             stacklevel=3,
         )
-    bad = int(np.argmax(errors))
-    if errors[bad] > INACCURATE:
+    off = [
+        motion.audit() if error is None else 0.0
+        for motion, error in zip(motions, errors, strict=True)
+    ]
+    bad = int(np.argmax(off))
+    if off[bad] > INACCURATE:
         warnings.warn(
-            f"the energy balance of cases[{bad}] is off by {errors[bad]:.1%} of the energies at "
-            f"play, the most of all: use a step below {plan.dt:.3g} s",
+            f"the energy balance of cases[{bad}] is off by {off[bad]:.1%} of the energies at "
+            f"play, the most of all: use a step below {motions[bad].plan.dt:.3g} s",
             FoldynWarning,
             stacklevel=3,
         )
-    return outcome, errors[bad]
+    return outcome, off[bad]
 
 
 def _dataset(

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import shared
+from foldyn.dynamics.course import Outcome
+from foldyn.jit.compiled import inner, shared
 from foldyn.jit.intrinsics import borrowed
 from foldyn.mechanics.lanes import (
     WIDTH,
@@ -16,8 +17,16 @@ from foldyn.mechanics.lanes import (
     energies_of_lanes,
 )
 
-GOES_ON, NOT_FINITE, PENETRATION = range(3)
-"""What became of a model."""
+OUTCOME, STEP, HINGE = range(3)
+"""What is noted of a model: how it ended, after which step, at which hinge."""
+
+
+class LanePlan(NamedTuple):
+    """Steps and samples of WIDTH models; one that takes no steps has -1 of them."""
+
+    dt: NDArray  # (WIDTH,) s
+    steps: NDArray  # (WIDTH,)
+    every: NDArray  # (WIDTH,) steps between samples
 
 
 class LaneState(NamedTuple):
@@ -30,9 +39,10 @@ class LaneState(NamedTuple):
     force: NDArray  # N
     position: NDArray  # m
     angle: NDArray  # (nh WIDTH,) at the last step, rad
+    before: NDArray  # (WIDTH,) of the hinge at which a model ended, before that, rad
     work: NDArray  # (4, WIDTH) work and energy dissipated, J, and their powers, W
     strain: NDArray  # (groups, WIDTH) J
-    outcome: NDArray  # (2, WIDTH) int64: what became of it, and in which step
+    note: NDArray  # (3, WIDTH) int64
 
 
 class LaneLoads(NamedTuple):
@@ -56,25 +66,60 @@ class LaneSamples(NamedTuple):
     energy: NDArray  # (WIDTH, k, groups + 3)
 
 
-@shared
-def advance_lanes(topology, own, loads, factor, state, out, work, dt, begun, count, every):
-    """Advance WIDTH models by `count` steps after `begun`; the first call does step 0 too.
+@inner
+def write_samples(topology, own, loads, state, out, work, step, chosen):
+    """Write a sample of each chosen (WIDTH,) model; one that is not finite ends instead."""
+    u, v, strain, energies = state.u, state.v, state.strain, state.work
+    energies_of_lanes(topology, own, u, work.angle, strain)
+    groups = strain.shape[0]
+    for q in range(WIDTH):
+        if chosen[q] == 0:
+            continue
+        k = step // chosen[q]
+        kinetic = 0.0
+        for place in range(out.order.size):
+            for c in range(3):
+                i = (3 * place + c) * WIDTH + q
+                out.displacement[q, k, out.order[place], c] = u[i]
+                out.velocity[q, k, out.order[place], c] = v[i]
+                kinetic += 0.5 * loads.mass[i] * v[i] * v[i]
+        for s in range(out.supported.size):
+            out.reaction[q, k, s] = state.force[out.supported[s] * WIDTH + q]
+        for g in range(groups):
+            out.energy[q, k, g] = strain[g, q]
+        out.energy[q, k, groups] = kinetic
+        out.energy[q, k, groups + 1] = energies[1, q]
+        out.energy[q, k, groups + 2] = energies[0, q]
+        if not abs(out.energy[q, k].sum()) < np.inf:
+            state.note[OUTCOME, q], state.note[STEP, q] = Outcome.NOT_FINITE, step
 
-    factor : (count + 1, t WIDTH) of the histories, from step `begun` on.
+
+@shared
+def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, last):
+    """Do the steps from the first to the last one of WIDTH models; step 0 is the start.
+
+    factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps. A model that
+    has ended, or done its steps, stands still.
     """
     topology, own, loads = borrowed(topology), borrowed(own), borrowed(loads)
     state, out, work = borrowed(state), borrowed(out), borrowed(work)
     u, v, a, ahead, force = state.u, state.v, state.a, state.ahead, state.force
-    position, size = state.position, state.u.size
+    position, size, note = state.position, state.u.size, state.note
     energies = state.work
+    h, finite = np.zeros(WIDTH), np.zeros(WIDTH)
     power_in, power_out = np.zeros(WIDTH), np.zeros(WIDTH)
-    for step in range(begun + 1 if begun > 0 else 0, begun + count + 1):
-        h = dt if step > 0 else 0.0
-        now = step - begun
-        for i in range(size):
-            v[i] += 0.5 * h * a[i]
-            u[i] += h * v[i]
-            ahead[i] = v[i] + 0.5 * h * a[i]
+    chosen = np.zeros(WIDTH, np.int64)
+    for step in range(first, last + 1):
+        now = step - first
+        for q in range(WIDTH):
+            goes_on = note[OUTCOME, q] == Outcome.DONE and step <= plan.steps[q]
+            h[q] = plan.dt[q] if goes_on and step > 0 else 0.0
+            chosen[q] = plan.every[q] if goes_on and step % plan.every[q] == 0 else 0
+        for i in range(0, size, WIDTH):
+            for q in range(WIDTH):
+                v[i + q] += 0.5 * h[q] * a[i + q]
+                u[i + q] += h[q] * v[i + q]
+                ahead[i + q] = v[i + q] + 0.5 * h[q] * a[i + q]
         for i in range(size):
             position[i] = own.rest[i] + u[i]
             force[i] = 0.0
@@ -82,6 +127,7 @@ def advance_lanes(topology, own, loads, factor, state, out, work, dt, begun, cou
         add_hinge_lanes(topology, own, position, force, work)
         power_in[:] = 0.0
         power_out[:] = 0.0
+        finite[:] = 0.0
         for term in range(loads.value.shape[0]):
             for k in range(loads.dof.size):
                 at = loads.dof[k] * WIDTH
@@ -94,44 +140,28 @@ def advance_lanes(topology, own, loads, factor, state, out, work, dt, begun, cou
                 power_out[q] += loads.mass[i + q] * ahead[i + q] * ahead[i + q]
                 rate = -force[i + q] * loads.inverse[i + q] - loads.alpha[q] * ahead[i + q]
                 a[i + q] = rate
-                v[i + q] += 0.5 * h * rate
+                v[i + q] += 0.5 * h[q] * rate
+                finite[q] += 0.0 * v[i + q]  # nan, once one of them is inf or nan
         for q in range(WIDTH):
             power_out[q] *= loads.alpha[q]
-            energies[0, q] += 0.5 * h * (energies[2, q] + power_in[q])
-            energies[1, q] += 0.5 * h * (energies[3, q] + power_out[q])
+            energies[0, q] += 0.5 * h[q] * (energies[2, q] + power_in[q])
+            energies[1, q] += 0.5 * h[q] * (energies[3, q] + power_out[q])
             energies[2, q], energies[3, q] = power_in[q], power_out[q]
+            if finite[q] != 0.0 and note[OUTCOME, q] == Outcome.DONE:
+                note[OUTCOME, q], note[STEP, q] = Outcome.NOT_FINITE, step
+                chosen[q] = 0
         angle, before = work.angle, state.angle
-        wrong = 0
+        jumps = 0
         for i in range(angle.size):
-            wrong += not abs(angle[i] - before[i]) <= np.pi
-        if wrong > 0:
+            jumps += abs(angle[i] - before[i]) > np.pi
+        if jumps > 0:
             for i in range(angle.size):
-                jump, q = abs(angle[i] - before[i]), i % WIDTH
-                if state.outcome[0, q] == GOES_ON and not jump <= np.pi:
-                    state.outcome[0, q] = PENETRATION if jump > np.pi else NOT_FINITE
-                    state.outcome[1, q] = step
+                q = i % WIDTH
+                if abs(angle[i] - before[i]) > np.pi and note[OUTCOME, q] == Outcome.DONE:
+                    note[OUTCOME, q], note[STEP, q] = Outcome.PENETRATION, step
+                    note[HINGE, q], state.before[q] = i // WIDTH, before[i]
+                    chosen[q] = 0
         for i in range(angle.size):
             before[i] = angle[i]
-        if step % every == 0:
-            k = step // every
-            energies_of_lanes(topology, own, u, work.angle, state.strain)
-            groups = state.strain.shape[0]
-            for q in range(WIDTH):
-                kinetic = 0.0
-                for place in range(out.order.size):
-                    for c in range(3):
-                        i = (3 * place + c) * WIDTH + q
-                        out.displacement[q, k, out.order[place], c] = u[i]
-                        out.velocity[q, k, out.order[place], c] = v[i]
-                        kinetic += 0.5 * loads.mass[i] * v[i] * v[i]
-                for s in range(out.supported.size):
-                    out.reaction[q, k, s] = force[out.supported[s] * WIDTH + q]
-                total = 0.0
-                for g in range(groups):
-                    out.energy[q, k, g] = state.strain[g, q]
-                    total += state.strain[g, q]
-                out.energy[q, k, groups] = kinetic
-                out.energy[q, k, groups + 1] = energies[1, q]
-                out.energy[q, k, groups + 2] = energies[0, q]
-                if state.outcome[0, q] == GOES_ON and not abs(total + kinetic) < np.inf:
-                    state.outcome[0, q], state.outcome[1, q] = NOT_FINITE, step
+        if chosen.any():
+            write_samples(topology, own, loads, state, out, work, step, chosen)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,16 @@ from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
 from foldyn.mechanics.threads import run_together
+
+
+class Engine(Protocol):
+    """What advances a motion, as far as it is asked about afterwards."""
+
+    threads: int
+
+    def facts(self) -> dict[str, Any]:
+        """Statistics of its own, for the result's attributes."""
+        ...
 
 
 class Compiled:

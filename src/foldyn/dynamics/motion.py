@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -14,17 +14,18 @@ from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
 from foldyn.dynamics.doubts import doubts
-from foldyn.dynamics.failures import from_closed, reason_for
+from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.keeping import KEY, Keeping
-from foldyn.dynamics.methods import Compiled, Implicit, Integrator
+from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.stability import (
     MARGIN,
     damper_rate,
+    frequency_bound,
     is_stable,
     largest_frequency,
     stability_limit,
@@ -37,11 +38,9 @@ from foldyn.errors import (
     FoldynWarning,
     InstabilityError,
     MotionInterrupted,
-    PenetrationError,
 )
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
-from foldyn.structures.locking import kept_apart
 
 if TYPE_CHECKING:
     import xarray
@@ -54,8 +53,6 @@ EXPLODED = 1.0  # relative energy error above which the motion is stopped
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
 IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
 FEW = 1000  # triangles looked at that take no time to speak of
-SWING = 0.5  # turn (rad) of a hinge in one step that is too much for any law
-MET = 1e-3  # rad from closed: panels that have met
 
 
 class Motion:
@@ -68,13 +65,14 @@ class Motion:
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
-        self._state, self._packed, self._sampler = state, packed, sampler
+        self._state, self.packed, self._sampler = state, packed, sampler
         self._rounding = Rounding(packed.body)
-        self._engine: Compiled | Implicit | None = None
+        self._engine: Engine | None = None
+        self._ended = int(Outcome.DONE), -1
         self._keeping: Keeping | None = None
         self.seconds = 0.0
         self._start()
-        self.at_rest = not (self._course.u.any() or self._course.v.any())
+        self.at_rest = not (self.course.u.any() or self.course.v.any())
 
     @property
     def expected_samples(self) -> int:
@@ -84,7 +82,7 @@ class Motion:
     @property
     def stored(self) -> int:
         """Samples computed so far."""
-        return int(self._course.tally.samples)
+        return int(self.course.tally.samples)
 
     def run(
         self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
@@ -95,17 +93,29 @@ class Motion:
         are many, until the result is saved.
         """
         self._integrated(progress, keeping)
-        crossings = self._crossings()
-        if len(crossings.first):
-            when = f"t = {self._output.time(crossings.first[0]):.6g} s"
-            text = crossings.text(when, self.stored)
-            warnings.warn(text, CrossingWarning, stacklevel=3)
-        return self._dataset(crossings)
+        return self.result()
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
         self._integrated(progress)
+        self._judge()
         return self._output.written(self.stored)
+
+    def result(self) -> xarray.Dataset:
+        """What was integrated, with the warnings that it deserves."""
+        self._judge()
+        crossings = self._crossings()
+        if len(crossings.first):
+            when = f"t = {self._output.time(crossings.first[0]):.6g} s"
+            text = crossings.text(when, self.stored)
+            warnings.warn(text, CrossingWarning, stacklevel=4)
+        return self._dataset(crossings)
+
+    def _judge(self) -> None:
+        self.audit()
+        size, remedy = float(self.course.tally.farthest), smaller_step(self)
+        if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
+            warnings.warn(text, FoldynWarning, stacklevel=5)
 
     def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
         self._keeping = keeping
@@ -116,11 +126,36 @@ class Motion:
             check_room(*size, keeping.room)
         self._start()
         self._output.begin()
-        self._integrate(*reporter(progress))
-        self._audit()
-        size, remedy = float(self._course.tally.farthest), self._smaller_step()
-        if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
-            warnings.warn(text, FoldynWarning, stacklevel=4)
+        report, close = reporter(progress)
+        try:
+            engine = self.method.engine(self.case, self.packed, self.course, self.plan)
+            continued = self._state[3] if self.case.contact is None else None
+            if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
+                engine.go_on_from(continued.values)
+            self._engine = engine
+            for stretch in self._stretches(report, self._resumed(engine)):
+                self._ended = engine.advance(self._output.window, stretch)
+        except KeyboardInterrupt:
+            kept = self._keeping.summary if self._keeping else ""
+            raise MotionInterrupted(
+                f"interrupted at t = {self.course.tally.time:.6g} s{kept}", self._dataset()
+            ) from None
+        finally:
+            close()
+
+    def beside(self, engine: Engine, window: Samples) -> Iterator[int]:
+        """Stretches of steps for an engine that advances several motions; `ended` follows each.
+
+        Its samples go to the window. What there is then is the `result`.
+        """
+        self._keeping = None
+        self._start()
+        self._output.window, self._engine = window, engine
+        return self._stretches(lambda _: None, 0.0)
+
+    def ended(self, code: int, hinge: int) -> None:
+        """Say how the last stretch of steps ended."""
+        self._ended = code, hinge
 
     @property
     def _origin(self) -> str:
@@ -131,65 +166,59 @@ class Motion:
     @property
     def _branches(self) -> int:
         """Number of the branches of laws with memory."""
-        memory = self._packed.body.memory
+        memory = self.packed.body.memory
         return 0 if memory is None else len(memory.own.state)
 
     def _start(self) -> None:
         """Go back to the start."""
-        self._course = begin(self.case, *self._state, self.plan, self._packed)
+        self.course = begin(self.case, *self._state, self.plan, self.packed)
         self._output = Output(self.case, self.plan, self._sampler, self._branches, self._keeping)
 
-    def _integrate(self, report: Reporter, close: Callable[[], None]) -> None:
-        """Advance in stretches; after each, report the progress and audit the motion."""
-        system, callbacks, by = self._packed.system, self._packed.callbacks, self._packed.numbering
-        plan, course, output = self.plan, self._course, self._output
-        memory, earlier = scratch(system), 0.0
+    def _stretches(self, report: Reporter, earlier: float) -> Iterator[int]:
+        """How many steps at most are to follow, again and again until the end.
+
+        After each stretch `_ended` says how it ended; the progress is reported and the motion is
+        audited. `earlier` is the time (s) that was spent before.
+        """
+        system, callbacks, by = self.packed.system, self.packed.callbacks, self.packed.numbering
+        plan, course, output, engine = self.plan, self.course, self._output, self._engine
+        assert engine is not None
+        memory = scratch(system)
         recheck = max(1000, -(-plan.steps // RECHECKS))
         length = 0  # the first call only records the start: it may have to compile
         began = None
-        try:
-            engine = self._engine = self.method.engine(self.case, self._packed, course, plan)
-            continued = self._state[3] if self.case.contact is None else None
-            if isinstance(engine, Implicit) and continued and continued.method == self.method.name:
-                engine.go_on_from(continued.values)
-            earlier = self._resumed(engine)
-            while True:
-                done = int(course.tally.steps)
-                stretch = min(length, recheck - done % recheck, self._fits(length))
-                clock = time.perf_counter()
-                code, hinge = engine.advance(output.window, stretch)
-                clock = time.perf_counter() - clock
-                began = time.perf_counter() if began is None else began
-                self.seconds = earlier + time.perf_counter() - began
-                self._sample()
-                if isinstance(callbacks.error, Exception):
-                    self._stop(str(callbacks.error), cause=callbacks.error)
-                if callbacks.error is not None:
-                    raise callbacks.error
-                if code == Outcome.FULL:
-                    output.more_room(self.stored)
-                elif code != Outcome.DONE:
-                    self._fail(code, hinge)
-                step, now = int(course.tally.steps), float(course.tally.time)
-                ended = step == plan.steps if plan.steps else now >= plan.end
-                report(Progress(now - plan.start, plan.end - plan.start, step, self._audit()))
-                if ended:
-                    return
+        while True:
+            done = int(course.tally.steps)
+            clock = time.perf_counter()
+            yield min(length, recheck - done % recheck, self._fits(length))
+            code, hinge = self._ended
+            clock = time.perf_counter() - clock
+            began = time.perf_counter() if began is None else began
+            self.seconds = earlier + time.perf_counter() - began
+            self._sample()
+            if isinstance(callbacks.error, Exception):
+                self._stop(str(callbacks.error), cause=callbacks.error)
+            if callbacks.error is not None:
+                raise callbacks.error
+            if code == Outcome.FULL:
+                output.more_room(self.stored)
+            elif code != Outcome.DONE:
+                kind, why = failure(self, code, hinge)
+                self._stop(why, kind)
+            step, now = int(course.tally.steps), float(course.tally.time)
+            finished = step == plan.steps if plan.steps else now >= plan.end
+            report(Progress(now - plan.start, plan.end - plan.start, step, self.audit()))
+            if finished:
+                return
+            if isinstance(engine, Compiled | Implicit):
                 self._keep(engine)
-                watched = plan.steps and not self.force and self.method.growth is not None
-                if watched and step % recheck == 0 and step > done:
-                    place(system, course.u, course.v, now, memory)
-                    self._recheck(by.outward(memory.displacement))
-                growth = REPORT_EVERY / max(clock, 1e-9)
-                least = 1 if self.method.implicit else CHUNK
-                length = max(least, min(int(length * min(growth, 8.0)), 100_000))
-        except KeyboardInterrupt:
-            kept = self._keeping.summary if self._keeping else ""
-            raise MotionInterrupted(
-                f"interrupted at t = {course.tally.time:.6g} s{kept}", self._dataset()
-            ) from None
-        finally:
-            close()
+            watched = plan.steps and not self.force and self.method.growth is not None
+            if watched and step % recheck == 0 and step > done:
+                place(system, course.u, course.v, now, memory)
+                self._recheck(by.outward(memory.displacement))
+            growth = REPORT_EVERY / max(clock, 1e-9)
+            least = 1 if self.method.implicit else CHUNK
+            length = max(least, min(int(length * min(growth, 8.0)), 100_000))
 
     def _continuations(self) -> dict[str, tuple[float, Continuation]]:
         """What an implicit method went on from, and needs to go on if it stands at a sample.
@@ -199,11 +228,11 @@ class Motion:
         engine, found = self._engine, {}
         if self.case.contact is not None:
             return found
-        if isinstance(engine, Implicit) and self.stored and self._packed.callbacks.error is None:
+        if isinstance(engine, Implicit) and self.stored and self.packed.callbacks.error is None:
             if self._state[3] and engine.continues:
                 found["continued_from"] = self._output.time(0), self._state[3]
             last = self._output.time(self.stored - 1)
-            if float(self._course.tally.time) == last:
+            if float(self.course.tally.time) == last:
                 end = Continuation(self.method.name, engine.continuation())
                 found["continuation"] = last, end
         return found
@@ -219,10 +248,10 @@ class Motion:
 
     def _fits(self, length: int) -> int:
         """Steps, at most `length`, for whose samples there is room."""
-        fits = self._output.fits(int(self._course.tally.steps), self.stored)
+        fits = self._output.fits(int(self.course.tally.steps), self.stored)
         if fits is not None and fits < 1 <= length:
             self._output.flush(self.stored)
-            fits = self._output.fits(int(self._course.tally.steps), self.stored)
+            fits = self._output.fits(int(self.course.tally.steps), self.stored)
         return length if fits is None else max(0, min(length, fits))
 
     def _keep(self, engine: Compiled | Implicit) -> None:
@@ -232,7 +261,7 @@ class Motion:
         self._output.flush(self.stored)
         standing = {f"engine.{name}": array for name, array in engine.standing().items()}
         standing |= self._output.standing() | {"seconds": np.array(self.seconds)}
-        self._keeping.checkpoint(standing, float(self._course.tally.time))
+        self._keeping.checkpoint(standing, float(self.course.tally.time))
 
     def _resumed(self, engine: Compiled | Implicit) -> float:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
@@ -258,96 +287,41 @@ class Motion:
         """End the motion with an error, which carries what was computed until then."""
         raise kind(message, self._dataset()) from cause
 
-    def _audit(self) -> float:
+    def audit(self) -> float:
         """Relative energy error so far; raises where the energy has exploded."""
         balance = self._output.see(self.stored)
         if balance.relative > EXPLODED and self._rounding.reveals(balance):
             bad = self._output.first_off(self.stored, EXPLODED)
             at = self._output.time(bad)
-            self._course.tally.samples = bad
+            self.course.tally.samples = bad
             self._output.shorten(bad)
             self._stop(
                 f"the motion is unstable: at t = {at:.6g} s the energy balance is "
-                f"off by more than the energies at play; {self._smaller_step()}"
+                f"off by more than the energies at play; {smaller_step(self)}"
             )
         return balance.relative
 
-    def _smaller_step(self) -> str:
-        if not self.plan.steps:
-            return f"use a tolerance below {self.plan.tolerance:.3g}"
-        if self.method.implicit:
-            return f"use a step below {self.plan.dt:.3g} s, or leave dt out"
-        return (
-            f"use a step below {self.plan.dt:.3g} s (critical at the start: {self.critical:.3g} s)"
-        )
-
     def _recheck(self, u: NDArray) -> None:
         """Stop where the structure has stiffened so much that the step is above its limit."""
-        omega, growth = largest_frequency(self.case, u), self.method.growth
-        rate = damper_rate(self.case, u) + self._packed.system.damping.modal_rate
+        growth, damping = self.method.growth, self.case.rayleigh
+        rate = damper_rate(self.case, u) + self.packed.system.damping.modal_rate
         assert growth is not None  # of explicit methods
-        if not is_stable(growth, omega, self.case.rayleigh, self.plan.dt, rate):
-            limit = stability_limit(growth, omega, self.case.rayleigh, rate)
-            self._stop(
-                f"the structure has stiffened: at t = {self._course.tally.time:.6g} s the step of "
-                f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
-                f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
-            )
-
-    def _fail(self, code: int, hinge: int) -> NoReturn:
-        """Say why no further step can be taken."""
-        plan, tally, order = self.plan, self._course.tally, self._packed.numbering.order
-        hinges = self._packed.model.hinges
-        moment = f"at t = {tally.time:.6g} s (step {tally.steps})"
-        rest, rows = self._packed.body.turned()
-        turned = rows[np.isnan(rest)]
-        if len(turned):
-            j, k = order[hinges[turned[0], :2]].tolist()
-            self._stop(
-                f"{moment} the rest dihedral of the crease between nodes {j} and {k} leaves 0 to "
-                "360 degrees: change the angle or the history that actuates it"
-            )
-        if plan.dt > self.critical:
-            moment += f", with a step above the critical one of {self.critical:.3g} s,"
-        if code == Outcome.PENETRATION:
-            j, k, i, l = (int(order[v]) if 0 <= v < len(order) else None for v in hinges[hinge])  # noqa: E741
-            wings = f"wings {i}, {l}" if l is not None else f"wing {i}, the edge is clamped"
-            if self.case.contact is not None:
-                self._stop(
-                    f"{moment} contact was overrun: the dihedral about nodes {j}-{k} ({wings}) "
-                    'jumped by more than pi; use method = "dormand_prince", or a larger '
-                    "contact.stiffness",
-                    PenetrationError,
-                )
-            self._stop(
-                f"{moment} panel passed through panel: the dihedral about nodes {j}-{k} ({wings}) "
-                f"jumped by more than pi; {self._apart(hinge)}",
-                PenetrationError,
-            )
-        if code == Outcome.STUCK and len(hinges):
-            closed = from_closed(self._course.angle)
-            hinge = int(closed.argmin())
-            if closed[hinge] < MET:
-                j, k = order[hinges[hinge, :2]].tolist()
-                self._stop(
-                    f"{moment} the error asks for a step of {tally.wanted:.3g} s: panels meet "
-                    f"about nodes {j}-{k}; {self._apart(hinge)}"
-                )
-        why = reason_for(code, self.case, plan, self.method, self.critical, float(tally.wanted))
-        self._stop(f"{moment} {why}")
-
-    def _apart(self, hinge: int) -> str:
-        """How to keep the panels at a hinge apart; its dihedral is that of the last step."""
-        if self.plan.dt > self.critical or from_closed(self._course.angle[hinge]) > SWING:
-            return f"the hinge has turned too far within a step: {self._smaller_step()}"
-        j, k = self._packed.numbering.order[self._packed.model.hinges[hinge, :2]].tolist()
-        return kept_apart(self.case.structure, j, k)
+        for frequency in (frequency_bound, largest_frequency):  # the first costs less
+            omega = frequency(self.case, u)
+            if np.isfinite(omega) and is_stable(growth, omega, damping, self.plan.dt, rate):
+                return
+        limit = stability_limit(growth, omega, damping, rate)
+        self._stop(
+            f"the structure has stiffened: at t = {self.course.tally.time:.6g} s the step of "
+            f"{self.plan.dt:.3g} s is above the stability limit of {limit:.3g} s; use "
+            f"dt = {0.5 * MARGIN * limit:.3g} or smaller"
+        )
 
     def _crossings(self) -> Crossings:
         """Panels that cross at the samples so far."""
         each = IMPLICIT_WORK if self.method.implicit else 1
         threads = self._engine.threads if self._engine else 1
-        work = each * int(self._course.tally.evaluations) / threads
+        work = each * int(self.course.tally.evaluations) / threads
         few = FEW // max(1, len(getattr(self.case.structure, "triangles", ())))
         looks = max(1, few, int(work / PER_LOOK))
         stride = -(-max(1, self.stored) // looks)
@@ -369,7 +343,7 @@ class Motion:
         return crossings.recorded(self._output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
-        plan, tally, engine = self.plan, self._course.tally, self._engine
+        plan, tally, engine = self.plan, self.course.tally, self._engine
         steps = int(tally.steps)
         facts: dict[str, Any] = {
             "method": self.method.name,

@@ -82,11 +82,21 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     none at rest, cannot make the answer too small. Laws with memory count with what they resist at
     once.
     """
-    tangent = case.elastic_body.tangent(_state(case, u), 1.0)
-    added = instant_stiffness(case, _state(case, u))
-    if added is not None:
-        tangent = sparse.csr_array(tangent + added)
-    return float(np.sqrt(max(_largest_quotient(case, tangent), 0.0)))
+    return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
+
+
+def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
+    """A frequency (rad/s) that the largest one does not exceed, at little cost.
+
+    By Gershgorin's theorem: the largest sum over a row of M^-1/2 K M^-1/2, in size. inf where the
+    mass is not lumped.
+    """
+    if not is_lumped(case.free_mass):
+        return np.inf
+    free, k = np.asarray(case.free_dofs), case.constraints.matrix(_tangent(case, u))
+    root = np.zeros(k.shape[0])
+    root[free] = 1.0 / np.sqrt(case.free_mass.diagonal())
+    return float(np.sqrt((root * (abs(k) @ root)).max()))
 
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
@@ -94,6 +104,13 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     if not case.dashpots and not case.crease_damping.any():
         return 0.0
     return _largest_quotient(case, dampers(case).matrix(case.body.dofs(_state(case, u))))
+
+
+def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
+    """Stiffness that limits the step, about u (n, 3)."""
+    tangent = case.elastic_body.tangent(_state(case, u), 1.0)
+    added = instant_stiffness(case, _state(case, u))
+    return tangent if added is None else sparse.csr_array(tangent + added)
 
 
 def _state(case: Case, u: ArrayLike | None) -> NDArray:

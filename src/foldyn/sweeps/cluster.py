@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from typing import Any, Generic, Self, TypeVar
 
@@ -58,18 +58,32 @@ class Cluster(Generic[Item, Result]):
                 "scheduler",
             )
 
-    def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
-        """Compute an item on one worker, so that the others find its kernels compiled."""
-        self.each([item], keep)
+    @property
+    def count(self) -> int:
+        """Workers that are there."""
+        return max(1, len(self._client.nthreads()))
 
     def each(
         self,
         items: Iterable[Item],
         keep: Callable[[Item, Result], None],
         lost: Callable[[Item, str], Result] | None = None,
+        first: bool = False,
     ) -> None:
-        """Compute something for each item; see `foldyn.workers.Workers.each`."""
-        left, waiting = iter(items), dict[Any, Item]()
+        """Compute something for each item; see `foldyn.workers.Workers.each`.
+
+        first : whether one is computed by one worker before the others.
+        """
+        left = iter(items)
+        if first:
+            self._each(islice(left, 1), keep, lost)
+        self._each(left, keep, lost)
+
+    def _each(
+        self, left: Iterator[Item], keep: Callable[[Item, Result], None],
+        lost: Callable[[Item, str], Result] | None,
+    ) -> None:  # fmt: skip
+        waiting = dict[Any, Item]()
         finished = self._dask.as_completed(loop=self._client.loop)
         self._hand_out(left, waiting, finished)
         try:

@@ -35,6 +35,8 @@ class Evaluation:
         Computing time.
     lasting : bool
         Whether it would be the same again; otherwise it is not kept, as a lack of memory.
+    side_by_side : int
+        How many motions were computed side by side with its own, that included; 1: it alone.
     """
 
     values: Mapping[str, NDArray] = field(default_factory=dict)
@@ -42,6 +44,7 @@ class Evaluation:
     warnings: str = ""
     seconds: float = 0.0
     lasting: bool = True
+    side_by_side: int = 1
 
 
 class Evaluations(Generic[Point]):
@@ -92,11 +95,8 @@ class Evaluations(Generic[Point]):
             Whether one is computed before the others, which then find its kernels compiled.
         """
         new = [point for point in dict.fromkeys(points) if not self._look(point)]
-        if first and len(new) > 1:
-            self.pool.first(new[0], self._keep)
-            del new[0]
         if new:
-            self.pool.each(new, self._keep, lost)
+            self.pool.each(new, self._keep, lost, first)
         return [self._known[point] for point in points]
 
     def _look(self, point: Point) -> bool:
@@ -131,7 +131,8 @@ def _read(file: Path) -> tuple[str, Evaluation]:
         if any(array.dtype.kind not in "iuf" for array in values.values()):
             raise ValueError
         failure, warnings = str(kept["failure"]), str(kept["warnings"])
-        found = Evaluation(values, failure, warnings, float(kept["seconds"]))
+        numbers = {"seconds": float(kept["seconds"]), "side_by_side": int(kept["side_by_side"])}
+        found = Evaluation(values, failure, warnings, **numbers)
         return str(kept["stamp"]), found
 
 
@@ -140,7 +141,8 @@ def _write(file: Path, stamp: str, found: Evaluation) -> None:
     values: dict[str, Any] = {f"{_VALUE}{name}": array for name, array in found.values.items()}
     facts: dict[str, Any] = {name: np.array(text) for name, text in texts.items()}
     with whole(file) as part:
-        np.savez(part, seconds=np.array(found.seconds), **facts, **values)
+        facts |= {name: np.array(getattr(found, name)) for name in ("seconds", "side_by_side")}
+        np.savez(part, **facts, **values)
 
 
 KEPT: Store[Evaluation] = Store(_read, _write, warns=False)

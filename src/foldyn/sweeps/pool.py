@@ -15,8 +15,9 @@ Result = TypeVar("Result")
 class Pool(Protocol[Item, Result]):
     """What computes something for each of many items; a context manager."""
 
-    def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
-        """Compute an item before others, so that kernels are compiled once."""
+    @property
+    def count(self) -> int:
+        """How many items it computes at a time."""
         ...
 
     def each(
@@ -24,11 +25,13 @@ class Pool(Protocol[Item, Result]):
         items: Iterable[Item],
         keep: Callable[[Item, Result], None],
         lost: Callable[[Item, str], Result] | None = None,
+        first: bool = False,
     ) -> None:
         """Compute items; each result is kept, in this process, as soon as it is ready.
 
         lost : result for an item whose process is gone, from the item and the reason; without it
         that is an error.
+        first : whether one is computed before the others, which then find its kernels compiled.
         """
         ...
 
@@ -48,16 +51,15 @@ class Pool(Protocol[Item, Result]):
 class Here(Generic[Item, Result]):
     """A pool that is this process alone."""
 
+    count = 1
+
     def __init__(self, do: Callable[[Item], Result]) -> None:
         self.do = do
 
-    def first(self, item: Item, keep: Callable[[Item, Result], None]) -> None:
-        """Compute an item."""
-        keep(item, self.do(item))
-
     def each(
-        self, items: Iterable[Item], keep: Callable[[Item, Result], None], lost: object = None
-    ) -> None:
+        self, items: Iterable[Item], keep: Callable[[Item, Result], None], lost: object = None,
+        first: bool = False,
+    ) -> None:  # fmt: skip
         """Compute items one after the other."""
         for item in items:
             keep(item, self.do(item))

@@ -29,6 +29,7 @@ ABOUT: Mapping[str, str] = {
     "failure": "why the point has no values",
     "warnings": "what was warned of",
     "seconds": "computing time",
+    "side_by_side": "motions computed side by side, this one included",
 }
 """What every point has."""
 
