@@ -142,8 +142,6 @@ class Integrator(NamedTuple):
         Whether it takes laws with memory.
     conserving : bool
         Whether it needs forces with a discrete gradient, which not every model has.
-    contact : bool
-        Whether it takes contact.
     looks : tuple of float
         Where in a step, from 0 to 1, it looks at the loads.
     """
@@ -158,7 +156,6 @@ class Integrator(NamedTuple):
     massless: bool = False
     remembers: bool = True
     conserving: bool = False
-    contact: bool = False
     looks: tuple[float, ...] = (0.0, 1.0)
 
     @property
@@ -190,9 +187,7 @@ class Integrator(NamedTuple):
 def _explicit(module: Any, evaluations: int, **traits: Any) -> Integrator:
     """The integrator of a file, which has its name."""
     name = module.__name__.rpartition(".")[2]
-    return Integrator(
-        name, module.ORDER, module.advance, module.growth, evaluations, contact=True, **traits
-    )
+    return Integrator(name, module.ORDER, module.advance, module.growth, evaluations, **traits)
 
 
 def _implicit(name: str, module: Any, scheme: Callable[..., Any], **traits: Any) -> Integrator:
@@ -205,15 +200,9 @@ METHODS: Mapping[str, Integrator] = {
         _explicit(rk4, 4, looks=(0.0, 0.5, 1.0)),
         _explicit(central_difference, 1),
         _explicit(dormand_prince, 6, adaptive=True, remembers=False),
+        _implicit("newmark", generalized_alpha, generalized_alpha.newmark, massless=True),
         _implicit(
-            "newmark", generalized_alpha, generalized_alpha.newmark, massless=True, contact=True
-        ),
-        _implicit(
-            "generalized_alpha",
-            generalized_alpha,
-            generalized_alpha.scheme(),
-            massless=True,
-            contact=True,
+            "generalized_alpha", generalized_alpha, generalized_alpha.scheme(), massless=True
         ),
         _implicit(
             "energy_momentum",
@@ -221,7 +210,6 @@ METHODS: Mapping[str, Integrator] = {
             energy_momentum.EnergyMomentum,
             conserving=True,
             remembers=False,
-            contact=True,
         ),
     )
 }
@@ -255,8 +243,6 @@ def with_mass(method: Integrator, case: Case) -> Case:
 def _lacking(method: Integrator, case: Case) -> str:
     """What a method needs and a case lacks, in words; empty where nothing."""
     structure = case.structure
-    if case.contact is not None and not method.contact:
-        return "this method does not take contact"
     if structure.massless and structure.condensed is None and not method.massless:
         return f"{structure.massless} have no mass, which this method needs"
     if method.conserving and not case.body.has_discrete_gradient:

@@ -22,17 +22,10 @@ from foldyn.jit.compiled import kernel
 from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.memory import Memory
+from foldyn.mechanics.contact.motions import farthest, fastest
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.search import (
-    edge_gap,
-    farthest,
-    list_pairs,
-    place,
-    use_all,
-    vertex_gap,
-)
-from foldyn.mechanics.contact.step_limit import fastest
+from foldyn.mechanics.contact.search import edge_gap, list_pairs, place, use_all, vertex_gap
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.tangent import friction_tangent
 from foldyn.mechanics.dihedral import add_hessian
