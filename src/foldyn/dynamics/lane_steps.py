@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Outcome
 from foldyn.jit.compiled import inner, shared
+from foldyn.jit.eights import add_eight, take_eight
 from foldyn.jit.intrinsics import borrowed
 from foldyn.mechanics.lanes import (
     WIDTH,
@@ -106,7 +107,8 @@ def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, l
     u, v, a, ahead, force = state.u, state.v, state.a, state.ahead, state.force
     position, size, note = state.position, state.u.size, state.note
     energies = state.work
-    h, finite = np.zeros(WIDTH), np.zeros(WIDTH)
+    h, half, finite, none = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
+    slowed = -loads.alpha
     power_in, power_out = np.zeros(WIDTH), np.zeros(WIDTH)
     chosen = np.zeros(WIDTH, np.int64)
     for step in range(first, last + 1):
@@ -115,11 +117,12 @@ def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, l
             goes_on = note[OUTCOME, q] == Outcome.DONE and step <= plan.steps[q]
             h[q] = plan.dt[q] if goes_on and step > 0 else 0.0
             chosen[q] = plan.every[q] if goes_on and step % plan.every[q] == 0 else 0
+            half[q] = 0.5 * h[q]
         for i in range(0, size, WIDTH):
-            for q in range(WIDTH):
-                v[i + q] += 0.5 * h[q] * a[i + q]
-                u[i + q] += h[q] * v[i + q]
-                ahead[i + q] = v[i + q] + 0.5 * h[q] * a[i + q]
+            add_eight(v, i, a, i, half, 0)
+            add_eight(u, i, v, i, h, 0)
+            take_eight(v, i, ahead, i)
+            add_eight(ahead, i, a, i, half, 0)
         for i in range(size):
             position[i] = own.rest[i] + u[i]
             force[i] = 0.0
@@ -135,13 +138,14 @@ def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, l
                     load = loads.value[term, k * WIDTH + q] * factor[now, term * WIDTH + q]
                     force[at + q] -= load
                     power_in[q] += load * ahead[at + q]
+        for i in range(size):
+            a[i] = -force[i] * loads.inverse[i]
+            position[i] = loads.mass[i] * ahead[i]  # room for the momentum
         for i in range(0, size, WIDTH):
-            for q in range(WIDTH):
-                power_out[q] += loads.mass[i + q] * ahead[i + q] * ahead[i + q]
-                rate = -force[i + q] * loads.inverse[i + q] - loads.alpha[q] * ahead[i + q]
-                a[i + q] = rate
-                v[i + q] += 0.5 * h[q] * rate
-                finite[q] += 0.0 * v[i + q]  # nan, once one of them is inf or nan
+            add_eight(power_out, 0, position, i, ahead, i)
+            add_eight(a, i, ahead, i, slowed, 0)
+            add_eight(v, i, a, i, half, 0)
+            add_eight(finite, 0, v, i, none, 0)  # nan, once one of them is inf or nan
         for q in range(WIDTH):
             power_out[q] *= loads.alpha[q]
             energies[0, q] += 0.5 * h[q] * (energies[2, q] + power_in[q])
