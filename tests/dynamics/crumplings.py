@@ -43,7 +43,7 @@ def crumpling(seed: int) -> fd.Case:
         planes = [fd.Plane((0, 0, below), (0, 0, 1), friction=0.5 * rng.random())]
     return fd.Case(
         s, [fd.Fix(held)], [fold, *pushes], fd.Rayleigh(alpha=50.0),
-        contact=fd.Contact(planes=planes),
+        contact=fd.Contact(friction=0.5 * rng.random(), planes=planes),
     )  # fmt: skip
 
 

@@ -46,8 +46,8 @@ def sliding() -> fd.Case:
 
 
 def touching() -> fd.Case:
-    """A strip that folds onto itself."""
-    return folded_from_both_ends(fd.Contact())
+    """A strip that folds onto itself and rubs."""
+    return folded_from_both_ends(fd.Contact(friction=0.3))
 
 
 CASES = {

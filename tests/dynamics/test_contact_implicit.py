@@ -85,12 +85,12 @@ def test_a_strip_folded_from_both_ends_stops_where_it_touches():
 
 
 def test_a_conserving_strip_loses_no_energy_where_it_touches():
-    """The same with actuators, damping, guards of hinges and friction on a plane beneath."""
+    """The same with actuators, damping, guards of hinges and friction, also on a plane beneath."""
     pytest.importorskip("ipctk")
-    plane = fd.Plane((0, 0, -0.2e-3), (0, 0, 1), friction=0.3)
+    plane = fd.Plane((0, 0, -0.2e-3), (0, 0, 1))
     case = fd.Case(
         strip(), [fd.Fix(nodes=[2, 3])], [fd.Actuate([0, 1], 8.0, fd.Ramp(0.05))],
-        fd.Rayleigh(alpha=20.0), contact=fd.Contact(planes=[plane]),
+        fd.Rayleigh(alpha=20.0), contact=fd.Contact(friction=0.3, planes=[plane]),
     )  # fmt: skip
     run = fd.simulate(case, 0.075, method="energy_momentum", dt=1e-4, every=1e-3)
     assert crossing(case.structure, run.displacement.values) == 0

@@ -47,7 +47,7 @@ class Pair:
     def __init__(self, kind: str) -> None:
         nodes = np.random.default_rng(0).standard_normal((10, 3))
         sheets = Sheets(
-            nodes, np.array(FAN), np.array([0, 0, 0, 0, 0, 0, 1]), np.full(2, D0), 1.0, True,
+            nodes, np.array(FAN), np.array([0, 0, 0, 0, 0, 0, 1]), np.full(2, D0), 1.0, True, 0.0,
             np.zeros((0, 11)), np.zeros(10, bool),
         )  # fmt: skip
         self.own = tables(sheets, np.zeros((0, 4), np.int64))
@@ -65,7 +65,7 @@ class Pair:
             out = edge_edge(self.own, whole, pushed, *self.edges, D0)
         if force is not None:
             force[:] = pushed[self.nodes]
-        return out
+        return out[0]
 
     def step(self, start, end, tangent=False):
         """Force (4, 3) and its tangent; the energy at the end."""

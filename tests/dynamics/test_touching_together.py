@@ -33,7 +33,7 @@ def closing(contact: fd.Contact | None = None, dihedral: float = 1.6) -> tuple[f
     case = fd.Case(
         s, [fd.Fix(nodes=[0, 1]), fd.BaseMotion("y", fd.Harmonic(2.0), 1e-4)],
         [fd.Gravity((0, 0, -0.01))], fd.Rayleigh(alpha=3.0),
-        contact=contact or fd.Contact(planes=[ground, press]),
+        contact=contact or fd.Contact(friction=0.4, planes=[ground, press]),
     )  # fmt: skip
     v = np.zeros_like(s.nodes)
     v[:, 0] = -1.0 * (s.nodes[:, 0] - s.nodes[0, 0])

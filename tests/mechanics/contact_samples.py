@@ -23,7 +23,7 @@ def miura(dihedral: float, cells: int = 2, **options) -> fd.Structure:
     return fd.discretize(pattern, SHEET, fold_law="linear", **options)
 
 
-def sheets(nodes, triangles, panel, thickness: float, planes=()) -> Sheets:
+def sheets(nodes, triangles, panel, thickness: float, planes=(), friction=0.0) -> Sheets:
     """What may touch of some triangles, with a stiffness of 1 N/m."""
     count = int(np.max(panel)) + 1
     table = np.zeros((len(planes), PLANE_COLUMNS))
@@ -31,7 +31,7 @@ def sheets(nodes, triangles, panel, thickness: float, planes=()) -> Sheets:
         row[:3], row[3:6], row[6], row[10] = point, normal, friction, -1
     return Sheets(
         np.asarray(nodes, float), np.asarray(triangles), np.asarray(panel),
-        np.full(count, thickness), 1.0, True, table, np.zeros(len(nodes), bool),
+        np.full(count, thickness), 1.0, True, friction, table, np.zeros(len(nodes), bool),
     )  # fmt: skip
 
 

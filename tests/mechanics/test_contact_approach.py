@@ -11,8 +11,9 @@ from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.body import TouchingBody, contact_tangent
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import memory
+from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap
 from foldyn.mechanics.contact.planes import slip
-from foldyn.mechanics.contact.search import edge_gap, list_pairs, place, vertex_gap
+from foldyn.mechanics.contact.search import list_pairs, place
 from foldyn.mechanics.contact.tables import tables
 
 NO_HINGES = np.zeros((0, 4), np.int64)

@@ -11,13 +11,12 @@ from foldyn.checks import gradient_error, tangent_error
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.hinge_guards import add_guards
 from foldyn.mechanics.contact.memory import memory
+from foldyn.mechanics.contact.pairs import edge_gap, vertex_gap
 from foldyn.mechanics.contact.search import (
     edge_d0,
-    edge_gap,
     list_pairs,
     panel_d0,
     place,
-    vertex_gap,
 )
 
 

@@ -92,8 +92,8 @@ class Contact(Part):
         Distance (m) of middle surfaces below which panels repel each other; the sheet's thickness
         by default, that of each panel where they differ.
     friction : float, default 0
-        Coefficient of Coulomb friction on planes that have none of their own. Panels slide on each
-        other without friction.
+        Coefficient of Coulomb friction of panels on each other, and on planes that have none of
+        their own.
     stiffness : float, optional
         k (N/m) of the potential k d0^2 (1 - d/d0)^3 / (d/d0)^4; 0.03 times Young's modulus times
         the thickness by default.
@@ -158,6 +158,7 @@ class Contact(Part):
             thickness=own if self.thickness is None else np.full(count, self.thickness),
             stiffness=stiffness,
             panels=self.panels,
+            friction=self.friction,
             planes=self._table(origin),
             held=held,
         )
@@ -165,6 +166,12 @@ class Contact(Part):
     def friction_on(self, plane: Plane) -> float:
         """Coefficient of friction on a plane: its own, or else that of all."""
         return self.friction if plane.friction is None else plane.friction
+
+    @property
+    def rubs(self) -> bool:
+        """Whether there is friction, between panels or on a plane."""
+        between = self.panels and self.friction > 0.0
+        return between or any(self.friction_on(plane) > 0.0 for plane in self.planes)
 
     def _table(self, origin: NDArray[np.float64]) -> NDArray[np.float64]:
         table = np.zeros((len(self.planes), PLANE_COLUMNS))

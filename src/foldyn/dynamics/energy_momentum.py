@@ -126,6 +126,11 @@ class EnergyMomentum(Scheme):
         assert self._contact is not None
         return self._contact.push
 
+    def rub(self, before: NDArray, after: NDArray) -> NDArray:
+        """See `Scheme`."""
+        assert self._contact is not None
+        return self._contact.rub
+
     def works(self, h: float) -> tuple[float, float]:
         """See `Scheme`; exactly those of the step's forces."""
         (model, system, mass), old, new = self._arrays, self.old, self.new

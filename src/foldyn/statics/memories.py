@@ -1,4 +1,4 @@
-"""What the accepted steps of a path change: creases that yield, and friction on planes.
+"""What the accepted steps of a path change: creases that yield, and friction.
 
 Both are functions of the state within a step. Only an accepted step moves what they start from, so
 iterations, steps that are cut and points that are located between others leave no trace.
@@ -77,7 +77,7 @@ class Memories:
             self._friction.start()
 
     def slips(self) -> bool:
-        """Whether a node slips where the body was evaluated last."""
+        """Whether anything slips where the body was evaluated last."""
         return self._friction is not None and self._friction.slips()
 
     def commit(self) -> Kept:
@@ -120,7 +120,7 @@ def _rubs(case: Case, flow: str) -> bool:
         It has, and the solver cannot have it.
     """
     contact = case.contact
-    if contact is None or not any(contact.friction_on(plane) > 0.0 for plane in contact.planes):
+    if contact is None or not contact.rubs:
         return False
     if flow == REFUSED:
         raise InputError(

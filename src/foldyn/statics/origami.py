@@ -263,7 +263,7 @@ class OrigamiProblem:
         self.memories.recall(kept)
 
     def slips(self, u: NDArray) -> bool:
-        """Whether a node slips on a plane in a state (m,)."""
+        """Whether anything slips in a state (m,)."""
         if not self.memories.rubs:
             return False
         self._evaluate(u)
@@ -284,8 +284,8 @@ class OrigamiProblem:
         out = {"contact_force": body.touch(q)}
         if self.case.contact.planes:
             out["plane_force"] = body.plane_forces(q)
-        if self.memories.rubs:
-            out["plane_friction"] = body.plane_friction(q)
+            if self.memories.rubs:
+                out["plane_friction"] = body.plane_friction(q)
         return out
 
     def clear(self, u: NDArray, step: NDArray) -> float:

@@ -17,11 +17,10 @@ from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
+from foldyn.mechanics.contact.pairs import EDGES, VERTEX
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.second import apart_of, half_square
 from foldyn.mechanics.contact.vertex_triangle import PARTS, share_of, weigh_triangle
-
-VERTEX, EDGES = 0, 1  # kinds of pairs, as in `mechanics.contact.memory`
 
 
 @kernel

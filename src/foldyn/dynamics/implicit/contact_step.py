@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.dynamics.implicit.contact_measure import new_move
-from foldyn.dynamics.implicit.contact_pairs import EDGES, VERTEX, edges_step, vertex_step
+from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.dynamics.implicit.contact_quotient import quotient
 from foldyn.dynamics.implicit.discrete_gradient import discrete_gradient
 from foldyn.jit.compiled import kernel
@@ -23,9 +23,19 @@ from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.motions import farthest, fastest
+from foldyn.mechanics.contact.pairs import (
+    EDGES,
+    VERTEX,
+    closest_of,
+    gap_of,
+    nodes_of,
+    put_corners,
+)
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.search import edge_gap, list_pairs, place, use_all, vertex_gap
+from foldyn.mechanics.contact.rubbing import add_rub
+from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
+from foldyn.mechanics.contact.search import list_pairs, place, use_all
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.tangent import friction_tangent
 from foldyn.mechanics.dihedral import add_hessian
@@ -48,11 +58,14 @@ class StepContact:
         Mean gradient (N) of the potential in a step, and friction.
     push : ndarray, shape (q, n, 4)
         Mean gradient (N) of friction of each plane at each node, and the normal force.
+    rub : ndarray, shape (n, 3)
+        Mean gradient (N) of friction of panels on each other.
     """
 
     def __init__(self, tables: Tables, memory: Memory, rows: int) -> None:
         self._tables, self._memory = tables, memory
         self.force, self.push = np.zeros((rows, 3)), np.zeros_like(memory.friction)
+        self.rub = np.zeros_like(memory.x)
         self._start, self._middle = np.zeros((2, *memory.x.shape))
         self._moved = np.zeros((2, len(tables.planes), 3))
         self._pairs = np.zeros((2, memory.d0.shape[1]), np.int64)
@@ -70,6 +83,10 @@ class StepContact:
         self.force[:] = 0.0
         self._counts = _find(self._tables, u0, u1, self._start, self._middle, kept, self._pairs)
         kept.facts.energy = self._steps(False, self.force)[2]
+        if self._tables.friction > 0.0:
+            _add_rubs(
+                self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, self.force
+            )
         _add_others(
             self._tables, self._start, self._middle, self._moved, kept, self._move, self.push,
             self.force,
@@ -83,8 +100,8 @@ class StepContact:
         count = sum(self._counts)
         nodes, blocks = np.empty((count, 4), np.int64), np.zeros((count, 12, 12))
         energy = _pair_steps(
-            self._tables, self._start, self._memory, self._pairs, *self._counts, self._move,
-            tangent, nodes, blocks, force,
+            self._tables, self._start, self._middle, self._memory, self._pairs, *self._counts,
+            self._move, tangent, nodes, blocks, force,
         )  # fmt: skip
         return nodes, blocks, energy
 
@@ -120,25 +137,19 @@ def _find(tables, u0, u1, start, middle, memory, pairs):
     middle[:] = 0.5 * (start + memory.x)
     # by how much a distance in the middle and one at the ends may differ
     reach, found = fastest(memory.x - start, len(start)), np.zeros(2, np.int64)
+    triangles, edges = tables.triangles, tables.edges
     for kind in range(2):
         listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for k in range(listed):
             one, other, d0 = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1], memory.d0[kind, k]
-            if not _gap(tables, middle, kind, one, other) < d0 + reach:
+            if not gap_of(triangles, edges, middle, kind, one, other) < d0 + reach:
                 continue
-            before = _gap(tables, start, kind, one, other)
-            if min(before, _gap(tables, memory.x, kind, one, other)) < d0:
+            before = gap_of(triangles, edges, start, kind, one, other)
+            after = gap_of(triangles, edges, memory.x, kind, one, other)
+            if min(before, after) < d0:
                 pairs[kind, found[kind]] = k
                 found[kind] += 1
     return found[0], found[1]
-
-
-@kernel
-def _gap(tables, x, kind, one, other):
-    """Distance (m) of a pair."""
-    if kind == VERTEX:
-        return vertex_gap(x, tables.triangles, one, other)
-    return edge_gap(x, tables.edges, one, other)
 
 
 @kernel
@@ -157,36 +168,23 @@ def _list(tables, u0, u1, memory):
 
 
 @kernel
-def _gather(tables, memory, kind, pair, start, move, nodes):
-    """The four nodes of a listed pair, and where they are in a step."""
-    one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
-    if kind == VERTEX:
-        nodes[0] = one
-        for i in range(3):
-            nodes[1 + i] = tables.triangles[other, i]
-    else:
-        for i in range(2):
-            nodes[i], nodes[2 + i] = tables.edges[one, i], tables.edges[other, i]
-    for i in range(4):
-        for c in range(3):
-            move.start[i, c], move.end[i, c] = start[nodes[i], c], memory.x[nodes[i], c]
-    return one, other
-
-
-@kernel
 def _pair_steps(
-    tables, start, memory, pairs, first, second, move, tangent, nodes, blocks, force
+    tables, start, middle, memory, pairs, first, second, move, tangent, nodes, blocks, force
 ):  # fmt: skip
     """Nodes (k, 4), tangents (k, 12, 12) and forces of the pairs that touch; their energy (J).
 
     Those of either kind are `first` and `second` many.
     """
     push, energy = np.empty(12), 0.0
+    triangles, edges = tables.triangles, tables.edges
     for k in range(first + second):
         kind = VERTEX if k < first else EDGES
         pair = pairs[kind, k if k < first else k - first]
-        one, other = _gather(tables, memory, kind, pair, start, move, nodes[k])
-        d0 = memory.d0[kind, pair]
+        one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
+        own, d0 = nodes_of(triangles, edges, kind, one, other), memory.d0[kind, pair]
+        nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3] = own
+        put_corners(start, own, move.start)
+        put_corners(memory.x, own, move.end)
         push[:] = 0.0
         if kind == VERTEX:
             energy += vertex_step(tables, other, d0, move, tangent, push, blocks[k])
@@ -194,7 +192,25 @@ def _pair_steps(
             energy += edges_step(tables, one, other, d0, move, tangent, push, blocks[k])
         for i in range(12):
             force[nodes[k, i // 3], i % 3] += push[i]
+        if tables.friction > 0.0 and tangent:
+            add_rub_tangent(tables, memory, middle, kind, pair, 0.5, blocks[k])
     return energy
+
+
+@kernel
+def _add_rubs(tables, middle, memory, pairs, first, second, rub, force):
+    """Add the friction of the pairs that touch, by their springs halfway; it goes to rub, too."""
+    rub[:] = 0.0
+    for k in range(first + second):
+        kind = VERTEX if k < first else EDGES
+        pair = pairs[kind, k if k < first else k - first]
+        one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
+        p, q, inside = closest_of(tables.triangles, tables.edges, middle, kind, one, other)
+        if inside:
+            add_rub(tables, memory, middle, rub, kind, pair, math.inf, p, q)
+    for i in range(len(rub)):
+        for c in range(3):
+            force[i, c] += rub[i, c]
 
 
 @kernel
@@ -285,13 +301,11 @@ def _add_others(tables, start, middle, moved, memory, move, push, force):
 def _plane_quotient(tables, start, moved, memory, p, i):
     """Mean normal force over -k d0 and its slope, of node i at plane p; its energy (J) at the end.
 
-    memory.moved : that of the end, also afterwards.
+    moved : (2, q, 3) displacements of the planes at both ends.
     """
     d0 = 0.5 * tables.node_thickness[i]
-    after = height(tables, memory.x, memory, p, i) / d0
-    memory.moved[p, :3] = moved[0, p]
-    before = height(tables, start, memory, p, i) / d0
-    memory.moved[p, :3] = moved[1, p]
+    before = height(tables, start, moved[0], p, i) / d0
+    after = height(tables, memory.x, moved[1], p, i) / d0
     energy = tables.stiffness * d0 * d0 * barrier(after)[0] if after < 1.0 else 0.0
     value, slope = quotient(before, after)
     return value, slope, energy
@@ -300,7 +314,7 @@ def _plane_quotient(tables, start, moved, memory, p, i):
 @kernel
 def _add_planes(tables, start, middle, moved, memory, push, force):
     """Add the forces of the planes; they go to push (q, n, 4), too."""
-    k = tables.stiffness
+    k, halfway = tables.stiffness, 0.5 * (moved[0] + moved[1])
     push[:] = 0.0
     for p in range(len(tables.planes)):
         plane = tables.planes[p]
@@ -314,9 +328,7 @@ def _add_planes(tables, start, middle, moved, memory, push, force):
             for c in range(3):
                 force[i, c] -= push[p, i, 3] * plane[NORMAL + c]
             if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
-                memory.moved[p, :3] = 0.5 * (moved[0, p] + moved[1, p])
-                stretch = stretch_of(tables, middle, memory, p, i)
-                memory.moved[p, :3] = moved[1, p]
+                stretch = stretch_of(tables, middle, halfway, memory, p, i)
                 most = farthest_stretch(tables, memory, p, i)
                 share = k if stretch[3] <= most else k * most / stretch[3]
                 for c in range(3):
@@ -327,7 +339,7 @@ def _add_planes(tables, start, middle, moved, memory, push, force):
 @kernel
 def _plane_tangents(tables, start, middle, moved, memory, out):
     """Derivatives (n, 3, 3) of the forces of planes."""
-    spring = np.empty((3, 3))
+    spring, halfway = np.empty((3, 3)), 0.5 * (moved[0] + moved[1])
     for p in range(len(tables.planes)):
         plane = tables.planes[p]
         for m in range(tables.meeting.size):
@@ -341,9 +353,7 @@ def _plane_tangents(tables, start, middle, moved, memory, out):
                     out[i, a, b] += tables.stiffness * slope * normal
             if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
                 spring[:] = 0.0
-                memory.moved[p, :3] = 0.5 * (moved[0, p] + moved[1, p])
-                friction_tangent(tables, middle, memory, p, i, 0.0, spring)
-                memory.moved[p, :3] = moved[1, p]
+                friction_tangent(tables, middle, halfway, memory, p, i, 0.0, spring)
                 for a in range(3):
                     for b in range(3):
                         out[i, a, b] += 0.5 * spring[a, b]

@@ -149,6 +149,13 @@ class Scheme(ABC):
         """
         return 0.5 * (before + after)
 
+    def rub(self, before: NDArray, after: NDArray) -> NDArray:
+        """Gradient of friction between panels, N, that does its work in a step.
+
+        before, after : (n, 3) at its ends.
+        """
+        return 0.5 * (before + after)
+
     def iterate(
         self, matrix: StepMatrix, goal: Goal, h: float, t: float, last: float, lowest: float,
         most: int,

@@ -13,7 +13,7 @@ Where nothing has touched, a step is first solved as if there were no contact, w
 may serve several steps, and accepted if all stays apart on the straight way to its end.
 
 Friction takes the normal force of the end of the last step, so that within a step it has a
-potential. Anchors follow nodes that slip where a step is accepted, as in explicit methods.
+potential. Anchors and ties follow what slips where a step is accepted, as in explicit methods.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.body import TouchingBody
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, slip
+from foldyn.mechanics.contact.rubbing import add_rubs, slip_pairs
 from foldyn.mechanics.contact.search import place as put_at
 from foldyn.mechanics.contact.tables import NORMAL, POINT
 
@@ -67,6 +68,7 @@ class TouchingNewton(Newton):
         self._free[matrix.free] = True
         self._moved = np.zeros((len(self._tables.planes), 3))  # of planes at the start of the step
         self._pushed = self._memory.friction.copy()  # and what they did to nodes there
+        self._rubbed = np.zeros_like(self._memory.x)  # and panels to each other
         self._touched = False
 
     @property
@@ -80,18 +82,29 @@ class TouchingNewton(Newton):
         self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
         self._touched = float(kept.facts.energy) > 0.0
         slip(self._tables, kept.x, kept)
+        if self._tables.friction > 0.0:
+            self._rubbed[:] = self._rub()
+            slip_pairs(self._tables, kept.x, kept)
 
     def works(self) -> tuple[float, float]:
         """Work (J) of planes that move in a step that has been solved, and what friction took."""
-        kept, scheme = self._memory, self.scheme
-        if not len(self._moved):
-            return 0.0, 0.0
-        push = scheme.plane_push(self._pushed, kept.friction)
-        along = (kept.moved[:, :3] - self._moved)[:, None, :]
-        motion = (scheme.moved() - scheme.displacement())[: push.shape[1]]
-        normal = push[:, :, 3:] * self._tables.planes[:, None, NORMAL : NORMAL + 3]
-        done = float(((normal - push[:, :, :3]) * along).sum())
-        return done, float((push[:, :, :3] * (motion - along)).sum())
+        kept, scheme, done, lost = self._memory, self.scheme, 0.0, 0.0
+        motion = (scheme.moved() - scheme.displacement())[: len(kept.x)]
+        if len(self._moved):
+            push = scheme.plane_push(self._pushed, kept.friction)
+            along = (kept.moved[:, :3] - self._moved)[:, None, :]
+            normal = push[:, :, 3:] * self._tables.planes[:, None, NORMAL : NORMAL + 3]
+            done = float(((normal - push[:, :, :3]) * along).sum())
+            lost = float((push[:, :, :3] * (motion - along)).sum())
+        if self._tables.friction > 0.0:
+            lost += float((scheme.rub(self._rubbed, self._rub()) * motion).sum())
+        return done, lost
+
+    def _rub(self) -> NDArray:
+        """Gradient (n, 3), N, of friction between panels where forces were evaluated last."""
+        force = np.zeros_like(self._memory.x)
+        add_rubs(self._tables, self._memory, force)
+        return force
 
     def solve(self, h: float, t: float) -> int:
         """See `Newton`."""

@@ -18,16 +18,9 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.mechanics.contact.distances import (
-    apart,
-    between,
-    closest_of_segments,
-    closest_on_triangle,
-    dot,
-    point,
-)
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import farthest, fastest
+from foldyn.mechanics.contact.pairs import VERTEX, corners_gap, nodes_of, put_corners
 from foldyn.mechanics.contact.planes import height
 from foldyn.mechanics.contact.search import list_pairs, place, use_all
 from foldyn.mechanics.contact.tables import NORMAL
@@ -37,19 +30,6 @@ NEAR = 0.01  # of the goal: gaps so little above it have reached it
 ADVANCES = 100  # of one pair
 LISTS = 40  # of pairs along one motion
 HALVINGS = 40  # where a hinge would pass
-
-
-@kernel
-def _distance(corners, kind):
-    """Distance (m) of a vertex from a triangle, kind 0, or of two edges, of corners (4, 3)."""
-    a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
-    if kind == 0:
-        wb, wc, wd, _ = closest_on_triangle(a, b, c, d)
-        r = apart(a, b, c, d, wb, wc, wd)
-    else:
-        s, t, _ = closest_of_segments(a, b, c, d)
-        r = between(a, b, c, d, s, t)
-    return math.sqrt(dot(r, r))
 
 
 @scalar
@@ -66,8 +46,8 @@ def _pair_share(corners, motion, kind, keep, best):
             motion[i, c] -= mean
     one, two = _length(motion, 0), _length(motion, 1)
     three, four = _length(motion, 2), _length(motion, 3)
-    fast = one + max(two, three, four) if kind == 0 else max(one, two) + max(three, four)
-    d = _distance(corners, kind)
+    fast = one + max(two, three, four) if kind == VERTEX else max(one, two) + max(three, four)
+    d = corners_gap(kind, corners)
     goal, now = keep * d, 0.0
     for _ in range(ADVANCES):
         if not fast * (best - now) > d - goal:
@@ -77,7 +57,7 @@ def _pair_share(corners, motion, kind, keep, best):
         for i in range(4):
             for c in range(3):
                 corners[i, c] += more * motion[i, c]
-        d = _distance(corners, kind)
+        d = corners_gap(kind, corners)
         if not d > (1.0 + NEAR) * goal:
             break
     return min(best, now)
@@ -87,21 +67,14 @@ def _pair_share(corners, motion, kind, keep, best):
 def _pairs_share(tables, memory, step, keep, best):
     """Share of a motion (n, 3) that leaves all listed pairs apart."""
     x, corners, motion = memory.x, np.empty((4, 3)), np.empty((4, 3))
-    nodes = np.empty(4, np.int64)
+    triangles, edges = tables.triangles, tables.edges
     for kind in range(2):
-        listed = memory.counts.listed_first if kind == 0 else memory.counts.listed_second
+        listed = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for k in range(listed):
             one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
-            if kind == 0:
-                nodes[0] = one
-                for i in range(3):
-                    nodes[1 + i] = tables.triangles[other, i]
-            else:
-                for i in range(2):
-                    nodes[i], nodes[2 + i] = tables.edges[one, i], tables.edges[other, i]
-            for i in range(4):
-                for c in range(3):
-                    corners[i, c], motion[i, c] = x[nodes[i], c], step[nodes[i], c]
+            nodes = nodes_of(triangles, edges, kind, one, other)
+            put_corners(x, nodes, corners)
+            put_corners(step, nodes, motion)
             best = _pair_share(corners, motion, kind, keep, best)
     return best
 
@@ -115,7 +88,9 @@ def _planes_share(tables, memory, step, moves, keep, best):
             for c in range(3):
                 closing += (moves[p, c] - step[i, c]) * tables.planes[p, NORMAL + c]
             if closing > 0.0:
-                best = min(best, (1.0 - keep) * height(tables, memory.x, memory, p, i) / closing)
+                best = min(
+                    best, (1.0 - keep) * height(tables, memory.x, memory.moved, p, i) / closing
+                )
     return best
 
 

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.mechanics.block_matrix import assembled, pairs_within
-from foldyn.mechanics.body import Blocks, Body, Unstrained, unit_rows
+from foldyn.mechanics.body import Blocks, Body, Unstrained
 from foldyn.mechanics.contact.approach import KEEP, clear_share
 from foldyn.mechanics.contact.forces import add_contact
-from foldyn.mechanics.contact.friction import Friction
+from foldyn.mechanics.contact.friction import Friction, stored
+from foldyn.mechanics.contact.holding import held_by_panels, held_by_planes
 from foldyn.mechanics.contact.memory import Memory, memories, memory
 from foldyn.mechanics.contact.model import Touching, TouchingWork
-from foldyn.mechanics.contact.tables import FRICTION, HISTORY, NORMAL, Sheets, Tables, tables
+from foldyn.mechanics.contact.rubbing import add_rubs
+from foldyn.mechanics.contact.tables import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     pair_tangents,
@@ -117,13 +119,15 @@ class TouchingBody(WrappedBody):
     def touch(self, q: NDArray) -> NDArray:
         """Size (n,), N, of the force of contact on each node, without friction."""
         force = self.contact(q)[1]
-        return np.linalg.norm(force - self._memory.friction[:, :, :3].sum(axis=0), axis=1)
+        rub = np.zeros_like(force)
+        if self.tables.friction > 0.0:
+            add_rubs(self.tables, self._memory, rub)
+        return np.linalg.norm(force - rub - self._memory.friction[:, :, :3].sum(axis=0), axis=1)
 
     def energies(self, q: NDArray) -> NDArray:
         """See `Body`; what springs of friction store counts to contact."""
-        energy, pull = self.contact(q)[0], self._memory.friction[:, :, :3]
-        stored = float((pull * pull).sum()) / (2.0 * self.tables.stiffness)
-        return np.append(self.inner.energies(q), energy + stored)
+        energy = self.contact(q)[0] + stored(self.tables, self._memory)
+        return np.append(self.inner.energies(q), energy)
 
     def internal(self, q: NDArray, work: TouchingWork | None = None) -> NDArray:
         """See `Body`."""
@@ -201,23 +205,19 @@ class TouchingBody(WrappedBody):
         return self.inner.nominal(q)
 
     def holds(self, q: NDArray) -> sparse.csr_array:
-        """See `Body`: planes hold nodes that touch them."""
+        """See `Body`: planes hold nodes that touch them, and panels each other."""
         return sparse.csr_array(sparse.vstack([self.inner.holds(q), self._held(q)]))
 
     def _held(self, q: NDArray) -> sparse.csr_array:
-        """Unit rows (s, m): normals of planes at nodes that touch, all axes where these rub."""
+        """Rows (s, m): distances of what touches, and motions along all axes where it rubs."""
         self.contact(q)
-        plane, node = np.nonzero(self._memory.friction[:, :, 3])
-        rubs = (self.tables.planes[plane, FRICTION] > 0.0) & (
-            self._memory.anchor[plane, node, 3] > 0.0
+        on_planes = held_by_planes(self.tables, self._memory, self.size)
+        return sparse.csr_array(
+            sparse.vstack([on_planes, held_by_panels(self.tables, self._memory, self.size)])
         )
-        normals = self.tables.planes[plane, NORMAL : NORMAL + 3]
-        nodes = np.concatenate([node, np.repeat(node[rubs], 3)])[:, None]
-        axes = np.tile(np.eye(3), (int(rubs.sum()), 1))
-        return unit_rows(nodes, np.concatenate([normals, axes]), self.size)
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
-        """See `Body`: of contact, planes alone."""
+        """See `Body`: of contact, what holds."""
         inner, held = self.inner.unstrained(q), self._held(q)
         if inner is None or not held.shape[0]:
             return inner

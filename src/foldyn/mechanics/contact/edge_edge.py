@@ -42,44 +42,53 @@ def mollifier(cc, c0):
 
 @kernel
 def _part(x, force, nodes, s, t, d0, k):
-    """Energy of k d0^2 f(d/d0) between the points at s and t of two edges; adds its gradient."""
+    """Energy of k d0^2 f(d/d0) between the points at s and t of two edges, its force along d.
+
+    Adds its gradient, unless force is None.
+    """
     a, b, c, d = nodes
     r = between(point(x, a), point(x, b), point(x, c), point(x, d), s, t)
     distance = math.sqrt(dot(r, r))
     if distance >= d0:
-        return 0.0
+        return 0.0, 0.0
     f, f1, _ = barrier(distance / d0)
-    by = k * d0 * f1 / distance
-    for axis in range(3):
-        force[a, axis] += by * (1.0 - s) * r[axis]
-        force[b, axis] += by * s * r[axis]
-        force[c, axis] -= by * (1.0 - t) * r[axis]
-        force[d, axis] -= by * t * r[axis]
-    return k * d0 * d0 * f
+    if force is not None:
+        by = k * d0 * f1 / distance
+        for axis in range(3):
+            force[a, axis] += by * (1.0 - s) * r[axis]
+            force[b, axis] += by * s * r[axis]
+            force[c, axis] -= by * (1.0 - t) * r[axis]
+            force[d, axis] -= by * t * r[axis]
+    return k * d0 * d0 * f, -k * d0 * f1
 
 
 @kernel
 def edge_edge(tables, x, force, i, j, d0):
-    """Energy (J) of the edges i and j at positions x (n, 3); adds the gradient."""
+    """Energy (J) of the edges i and j at positions x (n, 3), and their normal force (N).
+
+    Adds the gradient to force (n, 3), unless that is None. Returns the fractions of both edges at
+    which they are closest, too.
+    """
     a, b = tables.edges[i, 0], tables.edges[i, 1]
     c, d = tables.edges[j, 0], tables.edges[j, 1]
     pa, pb, pc, pd = point(x, a), point(x, b), point(x, c), point(x, d)
-    s, t, inside = closest_of_segments(pa, pb, pc, pd)
+    first, second, inside = closest_of_segments(pa, pb, pc, pd)
     if not inside:
-        return 0.0
-    r = between(pa, pb, pc, pd, s, t)
+        return 0.0, 0.0, first, second
+    r = between(pa, pb, pc, pd, first, second)
     if dot(r, r) >= d0 * d0:
-        return 0.0
+        return 0.0, 0.0, first, second
     e, g = minus(pb, pa), minus(pd, pc)
     n = cross(e, g)
     cc = dot(n, n)
     m, m1, _ = mollifier(cc, PARALLEL * tables.edge_square[i] * tables.edge_square[j])
     nodes, k = (a, b, c, d), m * tables.stiffness
-    energy = _part(x, force, nodes, s, t, d0, k)
+    energy, pressed = _part(x, force, nodes, first, second, d0, k)
     s, t, square = closest_end(pa, pb, pc, pd)
     if square < d0 * d0:
-        energy += _part(x, force, nodes, s, t, d0, -k)
-    if m1 > 0.0 and m > 0.0:
+        more, push = _part(x, force, nodes, s, t, d0, -k)
+        energy, pressed = energy + more, pressed + push
+    if force is not None and m1 > 0.0 and m > 0.0:
         by = 2.0 * m1 * energy / m
         ee, gg, eg = dot(e, e), dot(g, g), dot(e, g)
         for axis in range(3):
@@ -89,7 +98,7 @@ def edge_edge(tables, x, force, i, j, d0):
             force[a, axis] -= de
             force[d, axis] += dg
             force[c, axis] -= dg
-    return energy
+    return energy, pressed, first, second
 
 
 @kernel

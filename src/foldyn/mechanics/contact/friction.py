@@ -1,9 +1,9 @@
-"""Friction on planes along a path of equilibria: what an accepted step changes.
+"""Friction along a path of equilibria: what an accepted step changes.
 
-Within a step friction is a function of the state: springs from the anchors of the last accepted
-step, each with no more than mu N, N the present normal force (`planes`). So a step is the return
-mapping of Coulomb friction by the backward Euler method. A node that does not touch is tied where
-it is, so that it rubs in the step in which it comes to touch.
+Within a step friction is a function of the state: springs from the anchors and ties of the last
+accepted step, each with no more than mu N, N the present normal force (`planes`, `rubbing`). So a
+step is the return mapping of Coulomb friction by the backward Euler method. A node or pair that
+does not touch is tied where it is, so that it rubs in the step in which it comes to touch.
 
 An anchor that goes its way under a mean of the forces mu N at both ends of the step dissipates
 their product; a spring that lets go loses what it holds.
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import LEAST, slip
+from foldyn.mechanics.contact.rubbing import rub_state, slip_pairs, tie_pairs
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL, Tables
+from foldyn.mechanics.contact.ties import lay_ties, take_ties
 
 
 class Friction:
@@ -42,7 +44,7 @@ class Friction:
 
     def start(self) -> None:
         """Tie all nodes where the body was evaluated last; springs are at rest."""
-        self._kept.anchor[:] = 0.0
+        self._kept.anchor[:], self._kept.tie[:] = 0.0, 0.0
         self._stored[:], self._lost[:] = 0.0, 0.0
         self._tie()
 
@@ -54,16 +56,15 @@ class Friction:
         bound = 0.5 * self._coefficient * (before[:, :, 3] + anchor[:, :, 3])
         lost = np.where(anchor[:, :, 3] > 0.0, bound * way, self._stored)
         self._lost += lost.sum()
-        self._stored[:] = self.stored()
+        if self._tables.friction > 0.0:
+            self._lost += slip_pairs(self._tables, self._kept.x, self._kept)
+        self._stored[:] = stored_on_planes(self._tables, self._kept)
         self._tie()
 
-    def stored(self) -> NDArray:
-        """Energy (q, n), J, of the springs where the body was evaluated last."""
-        pull = self._kept.friction[:, :, :3]
-        return (pull * pull).sum(axis=2) / (2.0 * self._tables.stiffness)
-
     def slips(self) -> bool:
-        """Whether a node slips where the body was evaluated last."""
+        """Whether a node or a pair slips where the body was evaluated last."""
+        if self._tables.friction > 0.0 and rub_state(self._tables, self._kept)[1]:
+            return True
         kept, normal = self._kept, self._tables.planes[:, None, NORMAL : NORMAL + 3]
         apart = kept.x - kept.moved[:, None, :3] - kept.anchor[:, :, :3]
         along = apart - (apart * normal).sum(axis=2, keepdims=True) * normal
@@ -78,12 +79,15 @@ class Friction:
 
     def snapshot(self) -> tuple[NDArray, ...]:
         """The last accepted step, to `recall`."""
-        return tuple(array.copy() for array in self._state)
+        tied = take_ties(self._kept) if self._tables.friction > 0.0 else ()
+        return (*(array.copy() for array in self._state), *tied)
 
     def recall(self, snapshot: Sequence[NDArray]) -> None:
         """Go back to an accepted step."""
-        for array, kept in zip(self._state, snapshot, strict=True):
+        for array, kept in zip(self._state, snapshot, strict=False):
             array[:] = kept
+        if self._tables.friction > 0.0:
+            lay_ties(self._kept, *snapshot[len(self._state) :])
 
     @property
     def _state(self) -> tuple[NDArray, ...]:
@@ -94,3 +98,17 @@ class Friction:
         loose = anchor[:, :, 3] == 0.0
         anchor[:, :, :3] = np.where(loose[:, :, None], self._kept.x - moved, anchor[:, :, :3])
         anchor[:, :, 3] = np.where(loose, LEAST, anchor[:, :, 3])
+        if self._tables.friction > 0.0:
+            tie_pairs(self._tables, self._kept)
+
+
+def stored_on_planes(tables: Tables, kept: Memory) -> NDArray:
+    """Energy (q, n), J, of the springs on planes where forces were found last."""
+    pull = kept.friction[:, :, :3]
+    return (pull * pull).sum(axis=2) / (2.0 * tables.stiffness)
+
+
+def stored(tables: Tables, kept: Memory) -> float:
+    """Energy (J) of all springs of friction where forces were found last."""
+    on_planes = float(stored_on_planes(tables, kept).sum())
+    return on_planes + (rub_state(tables, kept)[0] if tables.friction > 0.0 else 0.0)

@@ -28,6 +28,10 @@ class Memory(NamedTuple):
     d0: NDArray  # (2, m) m
     gap: NDArray  # (2, m) distance less d0 when they were listed, m
     near: NDArray  # (2, m) pairs that may come within d0 in this step
+    tie: (
+        NDArray  # (2, m, 4) with friction between panels, else (2, 0, 4): where a pair is tied (see
+    )
+    # `pairs.weights_of`), the normal force when it was, N, 0 if it is not, the spring's stretch, m
     anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m, and the normal
     # force when it was, N; 0 if it is not
     friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force
@@ -86,6 +90,7 @@ def memories(
         d0=np.empty((2, room)),
         gap=np.empty((2, room)),
         near=near,
+        tie=np.zeros((2, room if tables.friction > 0.0 else 0, 4)),
         anchor=np.zeros((q, n, 4)),
         friction=np.zeros((q, n, 4)),
         moved=np.zeros((q, 6)),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from foldyn.mechanics.contact.forces import add_contact
 from foldyn.mechanics.contact.memory import Memory
 from foldyn.mechanics.contact.planes import move_planes, plane_powers
+from foldyn.mechanics.contact.rubbing import rub_power
 from foldyn.mechanics.contact.share import energy_of_all
 from foldyn.mechanics.contact.step_limit import limited
 from foldyn.mechanics.contact.tables import Tables
@@ -94,7 +95,14 @@ def _obstacles(model, factor, work):
 def _powers(model, v, work):
     if model.instance_class is not Touching:
         return None
-    return lambda model, v, work: plane_powers(model.contact, v, work.memory)
+
+    def powers(model, v, work):
+        given, taken = plane_powers(model.contact, v, work.memory)
+        if model.contact.friction > 0.0:
+            taken += rub_power(model.contact, v, work.memory)
+        return given, taken
+
+    return powers
 
 
 @overload(contact_limit, inline="always")

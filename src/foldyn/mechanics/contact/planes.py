@@ -33,13 +33,11 @@ def move_planes(tables, factor, memory):
 
 
 @kernel
-def height(tables, x, memory, p, i):
-    """Distance (m) of node i from plane p, positive on its side."""
-    out = 0.0
+def height(tables, x, moved, p, i):
+    """Distance (m) of node i from plane p, positive on its side, as planes have moved (q, 3)."""
+    plane, out = tables.planes[p], 0.0
     for c in range(3):
-        out += (x[i, c] - tables.planes[p, POINT + c] - memory.moved[p, c]) * tables.planes[
-            p, NORMAL + c
-        ]
+        out += (x[i, c] - plane[POINT + c] - moved[p, c]) * plane[NORMAL + c]
     return out
 
 
@@ -53,7 +51,7 @@ def add_planes(tables, x, memory, force):
             i = tables.meeting[m]
             push = memory.friction[p, i]
             push[0] = push[1] = push[2] = push[3] = 0.0
-            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
             if d >= d0:
                 continue
             f, f1, _ = barrier(d / d0)
@@ -62,7 +60,7 @@ def add_planes(tables, x, memory, force):
             for c in range(3):
                 force[i, c] -= push[3] * plane[NORMAL + c]
             if plane[FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
-                stretch = stretch_of(tables, x, memory, p, i)
+                stretch = stretch_of(tables, x, memory.moved, memory, p, i)
                 most = farthest_stretch(tables, memory, p, i)
                 share = k if stretch[3] <= most else k * most / stretch[3]
                 for c in range(3):
@@ -80,10 +78,13 @@ def farthest_stretch(tables, memory, p, i):
 
 
 @kernel
-def stretch_of(tables, x, memory, p, i):
-    """Stretch (m) of the spring of node i on plane p: its vector along the plane, its length."""
-    plane, moved, anchor = tables.planes[p], memory.moved[p], memory.anchor[p, i]
-    a, b, c = x[i, 0] - moved[0], x[i, 1] - moved[1], x[i, 2] - moved[2]
+def stretch_of(tables, x, moved, memory, p, i):
+    """Stretch (m) of the spring of node i on plane p: its vector along the plane, its length.
+
+    moved : (q, 3) displacement of the planes, m.
+    """
+    plane, anchor = tables.planes[p], memory.anchor[p, i]
+    a, b, c = x[i, 0] - moved[p, 0], x[i, 1] - moved[p, 1], x[i, 2] - moved[p, 2]
     a, b, c = a - anchor[0], b - anchor[1], c - anchor[2]
     out = a * plane[NORMAL] + b * plane[NORMAL + 1] + c * plane[NORMAL + 2]
     a -= out * plane[NORMAL]
@@ -103,7 +104,7 @@ def slip(tables, x, memory):
         for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
             anchor = memory.anchor[p, i]
-            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
             if d >= d0:
                 anchor[3] = 0.0
                 continue
@@ -114,7 +115,7 @@ def slip(tables, x, memory):
                     anchor[c] = x[i, c] - moved[c]
                 continue
             most = plane[FRICTION] * pressed
-            stretch = stretch_of(tables, x, memory, p, i)
+            stretch = stretch_of(tables, x, memory.moved, memory, p, i)
             if stretch[3] > most:
                 for c in range(3):
                     anchor[c] += (1.0 - most / stretch[3]) * stretch[c]

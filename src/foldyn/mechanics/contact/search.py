@@ -1,7 +1,7 @@
 """Lists of the pairs that are near, found by sorting into the cells of a grid.
 
-A list holds all pairs nearer than d0 + skin. It serves until a node has moved by half of the skin
-against the mean motion of all.
+A list holds all pairs nearer than d0 + skin, and those that friction ties. It serves until a node
+has moved by half of the skin against the mean motion of all.
 """
 
 from __future__ import annotations
@@ -11,16 +11,10 @@ import math
 import numpy as np
 
 from foldyn.jit.compiled import kernel, scalar
-from foldyn.mechanics.contact.distances import (
-    apart,
-    between,
-    closest_of_segments,
-    closest_on_triangle,
-    dot,
-    point,
-)
 from foldyn.mechanics.contact.motions import farthest
+from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
 from foldyn.mechanics.contact.share import pass_on
+from foldyn.mechanics.contact.ties import put_ties, take_ties
 
 CELLS = 8.0  # per node, at most
 THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
@@ -56,26 +50,6 @@ def edge_d0(ranges, edges, panels, i, j):
         if p >= 0:
             best = min(best, 0.5 * (panel_d0(ranges, c, p) + panel_d0(ranges, d, p)))
     return best
-
-
-@scalar
-def vertex_gap(x, triangles, v, t):
-    """Distance (m) of a vertex from a triangle."""
-    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    p, pa, pb, pc = point(x, v), point(x, a), point(x, b), point(x, c)
-    wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
-    r = apart(p, pa, pb, pc, wa, wb, wc)
-    return math.sqrt(dot(r, r))
-
-
-@scalar
-def edge_gap(x, edges, i, j):
-    """Distance (m) of two edges."""
-    pa, pb = point(x, edges[i, 0]), point(x, edges[i, 1])
-    pc, pd = point(x, edges[j, 0]), point(x, edges[j, 1])
-    s, t, _ = closest_of_segments(pa, pb, pc, pd)
-    r = between(pa, pb, pc, pd, s, t)
-    return math.sqrt(dot(r, r))
 
 
 @kernel
@@ -162,7 +136,7 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
     ranges, pairs = tables.ranges, memory.pairs[kind]
     ds, gaps = memory.d0[kind], memory.gap[kind]
     found, room = 0, len(ds)
-    elements = tables.triangles if kind == 0 else tables.edges
+    elements = tables.triangles if kind == VERTEX else tables.edges
     for e in range(len(elements)):
         _corners(x, elements[e], below, above)
         for c in range(3):
@@ -175,7 +149,7 @@ def _pairs(tables, x, kind, far, skin, low, size, counts, half, start, items, me
                 row = (i * counts[1] + j) * counts[2]
                 for at in range(start[row + first[2]], start[row + last[2] + 1]):
                     one, other, d0, gap = e, items[at], 0.0, math.inf
-                    if kind == 0:
+                    if kind == VERTEX:
                         one, other = surface[other], e
                         if _within(x, one, below, above):
                             gap = vertex_gap(x, elements, one, e)
@@ -203,6 +177,8 @@ def list_pairs(tables, u, memory):
     """
     x, counts, facts = memory.x, memory.counts, memory.facts
     counts.has_list = 0
+    if tables.friction > 0.0:
+        tied, ties = take_ties(memory)
     low, high, dims = np.empty(3), np.empty(3), np.empty(3, np.int64)
     counts.listed_first = counts.listed_second = 0
     if not _corners(x, tables.surface, low, high):
@@ -222,17 +198,20 @@ def list_pairs(tables, u, memory):
     for i in range(len(vertices)):
         for c in range(3):
             vertices[i, c] = x[tables.surface[i], c]
-    skin, thinnest = tables.skin, THINNEST * tables.skin
+    skin, thinnest, found = tables.skin, THINNEST * tables.skin, np.zeros(2, np.int64)
     while True:
         far = tables.farthest + skin
         size = _cells(low, high, max(0.7 * mean, far), CELLS * len(x) + 64.0, dims)
         start = np.empty(dims[0] * dims[1] * dims[2] + 1, np.int64)
         items = np.empty(max(len(vertices), e), np.int64)
         _sort(vertices, low, size, dims, start, items)
-        first = _pairs(tables, x, 0, far, skin, low, size, dims, none, start, items, memory)
+        found[0] = _pairs(tables, x, 0, far, skin, low, size, dims, none, start, items, memory)
         _sort(middle, low, size, dims, start, items)
-        second = _pairs(tables, x, 1, far, skin, low, size, dims, half, start, items, memory)
-        if max(first, second) <= memory.d0.shape[1]:
+        found[1] = _pairs(tables, x, 1, far, skin, low, size, dims, half, start, items, memory)
+        room = memory.d0.shape[1]
+        if tables.friction > 0.0 and found.max() <= room:
+            put_ties(tables, memory, tied, ties, found)
+        if found.max() <= room:
             break
         skin *= 0.5
         if skin < thinnest:
@@ -240,7 +219,7 @@ def list_pairs(tables, u, memory):
             return
     counts.full, counts.has_list = 0, 1
     counts.lists += 1
-    counts.listed_first, counts.listed_second = first, second
+    counts.listed_first, counts.listed_second = found[0], found[1]
     facts.skin = skin
     for i in range(len(x)):
         for c in range(3):
@@ -267,7 +246,7 @@ def place(tables, u, memory):
 def use_all(memory):
     """Take all listed pairs for near."""
     for kind in range(2):
-        count = memory.counts.listed_first if kind == 0 else memory.counts.listed_second
+        count = memory.counts.listed_first if kind == VERTEX else memory.counts.listed_second
         for k in range(count):
             memory.near[kind, k] = k
     memory.counts.near_first = memory.counts.listed_first

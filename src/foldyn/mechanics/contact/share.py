@@ -14,6 +14,7 @@ from typing import NamedTuple
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar, kernel, scalar
+from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.threads import Team, part, total, wait
 
 # places of a member's notes to its team: shares of the mean velocity and of the mean motion since
@@ -58,7 +59,7 @@ def gather(memory):
     """Make the near pairs that the members have found one list, that of one thread."""
     counts, team = memory.counts, memory.share.team
     for kind in range(2):
-        listed = counts.listed_first if kind == 0 else counts.listed_second
+        listed = counts.listed_first if kind == VERTEX else counts.listed_second
         if team.size > 1:
             begin, at = part(team, listed)[0], 0
             for member in range(team.number):
@@ -66,7 +67,7 @@ def gather(memory):
             for k in range(int(team.note[team.number, NEAR + kind])):
                 memory.near[kind, at + k] = memory.share.found[kind, begin + k]
         near = int(total(team, NEAR + kind))
-        if kind == 0:
+        if kind == VERTEX:
             counts.near_first = near
         else:
             counts.near_second = near

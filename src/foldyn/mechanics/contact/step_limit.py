@@ -25,8 +25,10 @@ from foldyn.mechanics.contact.distances import (
 )
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
 from foldyn.mechanics.contact.motions import motions
+from foldyn.mechanics.contact.pairs import VERTEX
 from foldyn.mechanics.contact.planes import height, slip
 from foldyn.mechanics.contact.potential import barrier
+from foldyn.mechanics.contact.rubbing import slip_pairs
 from foldyn.mechanics.contact.search import place, relist
 from foldyn.mechanics.contact.share import HINGES, LIMIT, NEAR, gather
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
@@ -39,13 +41,18 @@ MARGIN = 0.05  # of the skin: how much farther, as speeds change within a step
 
 
 @scalar
+def _spring_bound(limit, rate):
+    """The lesser of a step and what a spring allows, of stiffness over mass `rate` (1/s2)."""
+    return min(limit, RESOLVED / math.sqrt(rate)) if rate > 0.0 else limit
+
+
+@scalar
 def _bound(limit, d, d0, closing, stiffness, lightness):
     """The lesser of a step (s) and what a gap d allows that closes at some speed."""
     if closing > 0.0:
         limit = min(limit, (max(d - d0, 0.0) + APPROACH * min(d, d0)) / closing)
     if d < d0:
-        rate = stiffness * barrier(d / d0)[2] * lightness
-        limit = min(limit, RESOLVED / math.sqrt(rate)) if rate > 0.0 else limit
+        limit = _spring_bound(limit, stiffness * barrier(d / d0)[2] * lightness)
     return limit
 
 
@@ -61,6 +68,8 @@ def _vertex_bound(tables, x, v, lightness, i, t, d0, reach, limit):
         return np.nan
     w = apart(point(v, i), point(v, a), point(v, b), point(v, c), wa, wb, wc)
     light = lightness[i] + wa * wa * lightness[a] + wb * wb * lightness[b] + wc * wc * lightness[c]
+    if d < d0 and tables.friction > 0.0:
+        limit = _spring_bound(limit, tables.stiffness * light)
     return _bound(limit, d, d0, -dot(r, w) / d, tables.stiffness, light)
 
 
@@ -77,6 +86,8 @@ def _edge_bound(tables, x, v, lightness, i, j, d0, reach, limit):
     w = between(point(v, a), point(v, b), point(v, c), point(v, d), s, t)
     light = (1.0 - s) ** 2 * lightness[a] + s * s * lightness[b]
     light += (1.0 - t) ** 2 * lightness[c] + t * t * lightness[d]
+    if distance < d0 and tables.friction > 0.0:
+        limit = _spring_bound(limit, tables.stiffness * light)
     return _bound(limit, distance, d0, -dot(r, w) / distance, tables.stiffness, light)
 
 
@@ -85,7 +96,7 @@ def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
     """See `_bound`, for a member's part of all listed pairs; notes those that are near."""
     counts, team = memory.counts, memory.share.team
     for kind in range(2):
-        listed = counts.listed_first if kind == 0 else counts.listed_second
+        listed = counts.listed_first if kind == VERTEX else counts.listed_second
         first, last = part(team, listed)
         found = first
         for k in range(first, last):
@@ -93,7 +104,7 @@ def _pairs_bound(tables, x, v, lightness, far, reach, limit, memory):
                 continue
             one, other = memory.pairs[kind, k, 0], memory.pairs[kind, k, 1]
             d0 = memory.d0[kind, k]
-            if kind == 0:
+            if kind == VERTEX:
                 now = _vertex_bound(tables, x, v, lightness, one, other, d0, reach, limit)
             else:
                 now = _edge_bound(tables, x, v, lightness, one, other, d0, reach, limit)
@@ -141,14 +152,14 @@ def _planes_bound(tables, x, v, lightness, memory, limit):
     for p in range(len(tables.planes)):
         for m in range(mine[0], mine[1]):
             i = tables.meeting[m]
-            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
             closing = 0.0
             for c in range(3):
                 speed = memory.moved[p, 3 + c] - v[i, c]
                 closing += speed * tables.planes[p, NORMAL + c]
             limit = _bound(limit, d, d0, closing, k, lightness[i])
-            if d < d0 and tables.planes[p, FRICTION] > 0.0 and lightness[i] > 0.0:
-                limit = min(limit, RESOLVED / math.sqrt(k * lightness[i]))
+            if d < d0 and tables.planes[p, FRICTION] > 0.0:
+                limit = _spring_bound(limit, k * lightness[i])
     return limit
 
 
@@ -163,13 +174,18 @@ def limited(tables, u, v, angle, dt, lightness, memory):
     angle : dihedrals (nh,) at u; lightness : (n,) 1 / mass of the nodes, 1/kg.
     """
     limit, counts, x, team = dt, memory.counts, memory.x, memory.share.team
+    rubs = tables.friction > 0.0
     panels = memory.d0.shape[1] > 0
     place(tables, u, memory)
     if panels:
         fast, far = motions(u, v, memory)
         skin = memory.facts.skin
+        if rubs:
+            slip_pairs(tables, x, memory)
         fresh = counts.has_list == 1 and far < MARGIN * skin
         if counts.has_list == 0 or (not fresh and not far + 2.0 * fast * dt < 0.5 * skin):
+            if rubs:
+                wait(team)  # for the ties of the others
             relist(tables, u, memory)
             far, skin = 0.0, memory.facts.skin
         if 2.0 * fast * dt > 0.5 * skin - far:

@@ -40,6 +40,8 @@ class Sheets:
         k of the potential, N/m.
     panels : bool
         Whether panels touch each other.
+    friction : float
+        Coefficient of friction of panels on each other.
     planes : (q, 11)
         A point (m), the unit normal on the side of the sheet, the coefficient of friction, the
         displacement (m) at factor 1, and the number of the history of the factor.
@@ -53,6 +55,7 @@ class Sheets:
     thickness: NDArray
     stiffness: float
     panels: bool
+    friction: float
     planes: NDArray
     held: NDArray
 
@@ -99,6 +102,7 @@ class Tables(NamedTuple):
     hinge_stiffness: NDArray  # (h,) N m/rad
     planes: NDArray  # (q, 11)
     stiffness: float  # N/m
+    friction: float  # coefficient of that of panels on each other
     farthest: float  # largest d0, m
     skin: float  # of lists of pairs, m
 
@@ -160,6 +164,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         hinge_stiffness=stiffness[guarded],
         planes=np.ascontiguousarray(sheets.planes, float).reshape(-1, PLANE_COLUMNS),
         stiffness=float(sheets.stiffness),
+        friction=float(sheets.friction) if sheets.panels else 0.0,
         farthest=max([float(thickest.max(initial=0.0)), *d0]) if sheets.panels else 0.0,
         skin=SKIN * float(np.sqrt(square).mean()),
     )

@@ -11,9 +11,18 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
+from foldyn.mechanics.contact.pairs import (
+    EDGES,
+    VERTEX,
+    closest_of,
+    edge_gap,
+    nodes_of,
+    vertex_gap,
+    weights_of,
+)
 from foldyn.mechanics.contact.planes import farthest_stretch, height, stretch_of
 from foldyn.mechanics.contact.potential import barrier
-from foldyn.mechanics.contact.search import edge_gap, vertex_gap
+from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
 from foldyn.mechanics.contact.tables import FRICTION, NORMAL
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle_tangent
 from foldyn.mechanics.dihedral import add_hessian
@@ -43,20 +52,44 @@ def touching_pairs(tables, memory):
 
 @kernel
 def pair_tangents(tables, memory, first, second, nodes, blocks):
-    """Second derivatives of some listed pairs to nodes (k, 4) and blocks (k, 12, 12)."""
-    x = memory.x
-    for k in range(first.size):
-        v, t = memory.pairs[0, first[k], 0], memory.pairs[0, first[k], 1]
-        nodes[k, 0] = v
+    """Derivatives of the forces of some listed pairs, to nodes (k, 4) and blocks (k, 12, 12)."""
+    x, triangles, edges = memory.x, tables.triangles, tables.edges
+    for k in range(first.size + second.size):
+        kind = VERTEX if k < first.size else EDGES
+        pair = first[k] if kind == VERTEX else second[k - first.size]
+        one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
+        d0, own = memory.d0[kind, pair], nodes_of(triangles, edges, kind, one, other)
+        nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3] = own
+        if kind == VERTEX:
+            vertex_triangle_tangent(tables, x, one, other, d0, blocks[k])
+        else:
+            edge_edge_tangent(tables, x, one, other, d0, blocks[k])
+        if tables.friction > 0.0:
+            add_rub_tangent(tables, memory, x, kind, pair, 1.0, blocks[k])
+
+
+@kernel
+def pair_directions(tables, memory, first, second, nodes, weights, normals):
+    """Nodes (k, 4), weights (k, 4) and direction (k, 3) of the distances of some listed pairs.
+
+    After them whether friction ties each (k,).
+    """
+    tied = np.zeros(first.size + second.size, np.bool_)
+    for k in range(first.size + second.size):
+        kind = VERTEX if k < first.size else EDGES
+        pair = first[k] if kind == VERTEX else second[k - first.size]
+        one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
+        own = nodes_of(tables.triangles, tables.edges, kind, one, other)
+        p, q, _ = closest_of(tables.triangles, tables.edges, memory.x, kind, one, other)
+        nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3] = own
+        weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3] = weights_of(kind, p, q)
         for c in range(3):
-            nodes[k, 1 + c] = tables.triangles[t, c]
-        vertex_triangle_tangent(tables, x, v, t, memory.d0[0, first[k]], blocks[k])
-    for m in range(second.size):
-        k = first.size + m
-        i, j = memory.pairs[1, second[m], 0], memory.pairs[1, second[m], 1]
-        for end in range(2):
-            nodes[k, end], nodes[k, 2 + end] = tables.edges[i, end], tables.edges[j, end]
-        edge_edge_tangent(tables, x, i, j, memory.d0[1, second[m]], blocks[k])
+            normals[k, c] = 0.0
+            for i in range(4):
+                normals[k, c] += weights[k, i] * memory.x[nodes[k, i], c]
+        normals[k] /= math.sqrt((normals[k] * normals[k]).sum())
+        tied[k] = tables.friction > 0.0 and memory.tie[kind, pair, 2] > 0.0
+    return tied
 
 
 @kernel
@@ -94,7 +127,7 @@ def plane_tangents(tables, x, memory):
     for p in range(len(tables.planes)):
         for m in range(tables.meeting.size):
             i = tables.meeting[m]
-            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory, p, i)
+            d0, d = 0.5 * tables.node_thickness[i], height(tables, x, memory.moved, p, i)
             if d >= d0:
                 continue
             stiffness = tables.stiffness * barrier(d / d0)[2]
@@ -103,18 +136,19 @@ def plane_tangents(tables, x, memory):
                     normal = tables.planes[p, NORMAL + a] * tables.planes[p, NORMAL + b]
                     out[p, i, a, b] += stiffness * normal
             if tables.planes[p, FRICTION] > 0.0 and memory.anchor[p, i, 3] > 0.0:
-                friction_tangent(tables, x, memory, p, i, stiffness, out[p, i])
+                friction_tangent(tables, x, memory.moved, memory, p, i, stiffness, out[p, i])
     return out
 
 
 @kernel
-def friction_tangent(tables, x, memory, p, i, stiffness, out):
+def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
     """Add the derivative of the spring of node i on plane p to out (3, 3).
 
+    moved : (q, 3) displacement of the planes, m.
     stiffness : the rate, N/m, with which the present normal force falls as the node rises; where
     it bounds friction, the derivative of a node that slips is not symmetric.
     """
-    k, stretch = tables.stiffness, stretch_of(tables, x, memory, p, i)
+    k, stretch = tables.stiffness, stretch_of(tables, x, moved, memory, p, i)
     most = farthest_stretch(tables, memory, p, i)
     slips = stretch[3] > most
     share = most / stretch[3] if slips else 1.0

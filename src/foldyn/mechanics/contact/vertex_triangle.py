@@ -49,32 +49,42 @@ def _one(i, j):
 
 @kernel
 def _part(x, force, nodes, wa, wb, wc, d0, k):
-    """Energy of k d0^2 f(d/d0) for weights of the closest point; adds its gradient."""
+    """Energy of k d0^2 f(d/d0) for weights of the closest point, and its force along d.
+
+    Adds its gradient, unless force is None.
+    """
     v, a, b, c = nodes
     r = apart(point(x, v), point(x, a), point(x, b), point(x, c), wa, wb, wc)
     d = math.sqrt(dot(r, r))
     if d >= d0:
-        return 0.0
+        return 0.0, 0.0
     f, f1, _ = barrier(d / d0)
-    by = k * d0 * f1 / d
-    _push(force, v, by, r)
-    _push(force, a, -wa * by, r)
-    _push(force, b, -wb * by, r)
-    _push(force, c, -wc * by, r)
-    return k * d0 * d0 * f
+    if force is not None:
+        by = k * d0 * f1 / d
+        _push(force, v, by, r)
+        _push(force, a, -wa * by, r)
+        _push(force, b, -wb * by, r)
+        _push(force, c, -wc * by, r)
+    return k * d0 * d0 * f, -k * d0 * f1
 
 
 @kernel
 def vertex_triangle(tables, x, force, v, t, d0):
-    """Energy (J) of vertex v against triangle t at positions x (n, 3); adds the gradient."""
+    """Energy (J) of vertex v against triangle t at positions x (n, 3), and their normal force (N).
+
+    Adds the gradient to force (n, 3), unless that is None. Returns the weights of the second and
+    the third corner in the closest point, too. The normal forces of all parts of a triangle are
+    summed like their energies: over a flat sheet that is the force, everywhere.
+    """
     a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
     nodes, k = (v, a, b, c), tables.stiffness
     p, pa, pb, pc = point(x, v), point(x, a), point(x, b), point(x, c)
     wa, wb, wc, _ = closest_on_triangle(p, pa, pb, pc)
     r = apart(p, pa, pb, pc, wa, wb, wc)
+    second, third = wb, wc
     if dot(r, r) >= d0 * d0:
-        return 0.0
-    energy = _part(x, force, nodes, wa, wb, wc, d0, k)
+        return 0.0, 0.0, second, third
+    energy, pressed = _part(x, force, nodes, wa, wb, wc, d0, k)
     for side in range(3):
         share = tables.shared_side[t, side]
         if share > 0.0:
@@ -87,12 +97,14 @@ def vertex_triangle(tables, x, force, v, t, d0):
             else:
                 s = closest_on_segment(p, pc, pa)
                 wa, wb, wc = s, 0.0, 1.0 - s
-            energy += _part(x, force, nodes, wa, wb, wc, d0, -k * share)
+            more, push = _part(x, force, nodes, wa, wb, wc, d0, -k * share)
+            energy, pressed = energy + more, pressed + push
         share = tables.shared_corner[tables.triangles[t, side]]
         if share > 0.0:
             wa, wb, wc = _one(side, 0), _one(side, 1), _one(side, 2)
-            energy += _part(x, force, nodes, wa, wb, wc, d0, k * share)
-    return energy
+            more, push = _part(x, force, nodes, wa, wb, wc, d0, k * share)
+            energy, pressed = energy + more, pressed + push
+    return energy, pressed, second, third
 
 
 @scalar
