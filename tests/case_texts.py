@@ -26,3 +26,28 @@ nodes = [4, 5]
 nodes = [0, 1]
 axes = "z"
 """
+MODES_TEXT = f"""{HELD_MIURA_TEXT}[analysis]
+kind = "modes"
+count = 4
+"""
+LIFTED_TEXT = """[pattern]
+kind = "simple_fold"
+a = 1.0
+b = 1.0
+dihedral = 60
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+[[supports]]
+nodes = [0, 1, 2, 3]
+axes = "xyz"
+[[contact.planes]]
+point = [0, 0, -0.006]
+normal = [0, 0, 1]
+motion = [0, 0, 0.02]
+[analysis]
+kind = "statics"
+method = "displacement"
+steps = 2
+"""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from case_texts import LIFTED_TEXT
 from foldyn.cases.contact import contact_from
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
@@ -105,30 +106,12 @@ duration = 0.1
         fd.read_case(path)
 
 
-def test_in_a_path_the_load_factor_moves_planes(tmp_path):
-    path = tmp_path / "path.toml"
-    text = """
-[pattern]
-kind = "simple_fold"
-a = 1.0
-b = 1.0
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-[[supports]]
-nodes = [0, 1, 2, 3]
-axes = "xyz"
-[[contact.planes]]
-point = [0, 0, -0.006]
-normal = [0, 0, 1]
-motion = [0, 0, 0.02]
-[analysis]
-kind = "statics"
-method = "displacement"
-steps = 2
-"""
+SHELL = '[model]\nkind = "shell"\ndivisions = 2\n'
+
+
+@pytest.mark.parametrize("model", ["", SHELL], ids=["bars and hinges", "shell"])
+def test_in_a_path_the_load_factor_moves_planes(tmp_path, model):
+    path, text = tmp_path / "path.toml", model + LIFTED_TEXT
     path.write_text(text)
     found = fd.read_case(path).run()
     lifted = found.displacement.sel(node=[4, 5], axis="z").values

@@ -251,6 +251,7 @@ def test_the_energy_balance_closes_with_springs_and_damping(method):
     assert float(motion.strain_springs.max()) > 0.01 * float(motion.work.max())
 
 
+@pytest.mark.slow
 def test_the_energy_balance_of_a_shell_closes_with_springs():
     s = structure("shell", FOLD, HEAVY)
     case = fd.Case(s, SOME, [fd.Force([2], (3.0, 1.0, 2.0), fd.HalfSine(0.05))])

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT
+from case_texts import MODES_TEXT
 
-MODES = HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 3\n'
 THICK = ("--vary", "sheet.thickness=0.01,0.02")
 
 
 @pytest.fixture
 def sweep(workplace):
-    def call(*arguments: str, text: str = MODES):
+    def call(*arguments: str, text: str = MODES_TEXT):
         workplace.write(text)
         return workplace.call("sweep", "case.toml", *arguments)
 
@@ -77,7 +76,7 @@ def test_a_sweep_of_which_all_points_fail_fails(sweep):
 
 def test_the_table_and_the_command_line(sweep, workplace):
     table = '[sweep]\nmeasures = ["frequencies"]\n[sweep.vary]\n"sheet.thickness" = [0.01]\n'
-    assert sweep("--processes", "1", "--no-figures", text=MODES + table).status == 0
+    assert sweep("--processes", "1", "--no-figures", text=MODES_TEXT + table).status == 0
     found = fd.load(workplace.folder / "case-sweep" / "sweep.nc")
     assert found["thickness"].values.tolist() == [0.01]
     done = workplace.call("run", "case.toml", "--no-figures")  # as if it were not there
@@ -108,7 +107,7 @@ def test_bad_input_leaves_nothing(sweep, arguments, message):
 def test_own_code_is_never_named_by_a_case_file(sweep, workplace):
     table = '[sweep]\nmeasures = ["mine.py:tip"]\n[sweep.vary]\n"sheet.thickness" = [0.01]\n'
     workplace.write("raise SystemExit(9)\n", "mine.py")
-    done = sweep(text=MODES + table)
+    done = sweep(text=MODES_TEXT + table)
     assert done.status == 2
     assert "measures[0]" in done.err
 

@@ -15,11 +15,10 @@ import pytest
 from processes import children, running, start, wait_for
 
 import foldyn as fd
-from case_texts import HELD_MIURA_TEXT
+from case_texts import MODES_TEXT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
-MODES = HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 4\n'
 MEASURE = """
 import time
 
@@ -46,7 +45,7 @@ def more(points: Path, there: int, process: subprocess.Popen[str]) -> bool:
 
 def killed_and_resumed(folder: Path, count: int, kills: int, seconds: float) -> None:
     """Sweep, killed at random moments after new points were kept."""
-    (folder / "case.toml").write_text(MODES)
+    (folder / "case.toml").write_text(MODES_TEXT)
     (folder / "mine.py").write_text(MEASURE.format(seconds=seconds))
     vary = f"sheet.thickness=0.005:0.02:{count}"
     command = ("sweep", "case.toml", "--vary", vary, "--measure", "mine.py:slow")
@@ -102,7 +101,7 @@ def deadly(result, case):
 
 
 def test_a_point_that_ends_its_process_does_not_stop_the_rest(tmp_path):
-    (tmp_path / "case.toml").write_text(MODES)
+    (tmp_path / "case.toml").write_text(MODES_TEXT)
     (tmp_path / "mine.py").write_text(DEADLY)
     command = ("sweep", "case.toml", "--vary", "sheet.thickness=0.005:0.02:6")
     one = start(tmp_path, *command, "--measure", "mine.py:deadly", "--processes", "2")

@@ -27,10 +27,10 @@ def sheets(nodes, triangles, panel, thickness: float, planes=(), friction=0.0) -
     """What may touch of some triangles, with a stiffness of 1 N/m."""
     count = int(np.max(panel)) + 1
     table = np.zeros((len(planes), PLANE_COLUMNS))
-    for row, (point, normal, friction) in zip(table, planes, strict=True):
-        row[:3], row[3:6], row[6], row[10] = point, normal, friction, -1
+    for row, (point, normal, rough) in zip(table, planes, strict=True):
+        row[:3], row[3:6], row[6], row[10] = point, normal, rough, -1
     return Sheets(
-        np.asarray(nodes, float), np.asarray(triangles), np.asarray(panel),
+        np.array(nodes, float), np.array(triangles), np.array(panel),
         np.full(count, thickness), 1.0, True, friction, table, np.zeros(len(nodes), bool),
     )  # fmt: skip
 

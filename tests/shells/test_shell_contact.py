@@ -296,38 +296,3 @@ def test_auto_takes_a_method_that_shells_have():
     case = fd.Case(strip_shell(2, divisions=1), contact=fd.Contact())
     run = fd.simulate(case, 1e-4, method="auto", every=1e-4)
     assert run.attrs["method"] == "generalized_alpha"
-
-
-def test_a_case_file_has_a_shell_with_contact(tmp_path):
-    path = tmp_path / "ground.toml"
-    path.write_text(
-        """
-[pattern]
-kind = "simple_fold"
-a = 1.0
-b = 1.0
-dihedral = 60
-[model]
-kind = "shell"
-divisions = 2
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-[[supports]]
-nodes = [0, 1, 2, 3]
-axes = "xyz"
-[[contact.planes]]
-point = [0, 0, -0.006]
-normal = [0, 0, 1]
-motion = [0, 0, 0.02]
-[analysis]
-kind = "statics"
-method = "displacement"
-steps = 2
-"""
-    )
-    found = fd.read_case(path).run()
-    lifted = found.displacement.sel(node=[4, 5], axis="z").values
-    assert np.abs(lifted[0]).max() < 1e-9 and lifted[-1].min() > 0.014 - 0.005
-    assert float(found.contact[-1]) > 0.0

@@ -8,9 +8,9 @@ import time
 
 from numba.core.dispatcher import Dispatcher
 
-from case_texts import FOLD_TEXT, HELD_MIURA_TEXT
+from case_texts import FOLD_TEXT, HELD_MIURA_TEXT, MODES_TEXT
 
-MODES = HELD_MIURA_TEXT + '[analysis]\nkind = "modes"\ncount = 4\n'
+MODES = MODES_TEXT
 DAMPED = HELD_MIURA_TEXT + "[damping]\nalpha = 0.2\n"
 FRF = (
     DAMPED

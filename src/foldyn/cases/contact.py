@@ -143,7 +143,8 @@ class Contact(Part):
 
     def sheets(self, structure: Any, held: NDArray[np.bool_]) -> Sheets:
         """What may touch of a structure whose nodes are held along all axes, or not (n,)."""
-        panel = np.asarray(structure.triangle_panel)
+        # copies: arrays that may be written to and those that may not have kernels of their own
+        panel = np.array(structure.triangle_panel)
         count, sheet = int(panel.max(initial=-1)) + 1, structure.sheet
         own = sheet.values("thickness", count)
         moduli = sheet.values("youngs_modulus", count)
@@ -153,9 +154,9 @@ class Contact(Part):
         origin = structure.nodes.mean(axis=0)  # far from the origin digits are lost
         return Sheets(
             nodes=structure.nodes - origin,
-            triangles=np.asarray(structure.triangles),
+            triangles=np.array(structure.triangles),
             panel=panel,
-            thickness=own if self.thickness is None else np.full(count, self.thickness),
+            thickness=np.array(own) if self.thickness is None else np.full(count, self.thickness),
             stiffness=stiffness,
             panels=self.panels,
             friction=self.friction,

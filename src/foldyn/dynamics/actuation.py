@@ -38,7 +38,7 @@ def actuators(body: Body, numbers: NDArray, span: NDArray, row: NDArray) -> tupl
     laws = [body.rest_law(number) for number in numbers.tolist()]
     if len(numbers):
         body, hinge, place = body.actuated(numbers)
-    lowest = body.lowest_nodes(hinge)
+    lowest = body.lowest_nodes(hinge).astype(np.int64)
     along = np.argsort(lowest, kind="stable")
     hinge, place = hinge[along], place[along]
     code = np.array([law.code for law in laws], np.int64)

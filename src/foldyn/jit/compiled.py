@@ -26,7 +26,12 @@ _FUSED = {"contract"}
 
 
 class AloneLibrary(JITCodeLibrary):
-    """The machine code of one compiled function, with private copies of those it calls."""
+    """The machine code of one compiled function, with private copies of those it calls.
+
+    One that only compiled functions call is never run itself: it has no machine code.
+    """
+
+    called_alone = False  # whether only compiled functions call it
 
     def _finalize_final_module(self) -> None:
         # what callers link in: as Numba does it, where this function gives way to equal ones
@@ -38,6 +43,8 @@ class AloneLibrary(JITCodeLibrary):
                 shared.get_function(function.name).linkage = Linkage.linkonce_odr
             elif function.linkage == Linkage.linkonce_odr:  # copies of what it calls
                 function.linkage = Linkage.internal
+            if self.called_alone:
+                function.linkage = Linkage.available_externally
         self._shared_module = shared
         super()._finalize_final_module()
 
@@ -49,6 +56,7 @@ class Alone(Compiler):
         """Compile a Python function."""
         self.state.library = AloneLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
+        self.state.library.called_alone = self.state.flags.no_cpython_wrapper
         return super().compile_extra(func)
 
 
@@ -60,7 +68,8 @@ def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
     """
     # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
     # of a branch in every loop
-    options |= {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
+    # nothing calls by address what has a name here, so none gets Numba's wrapper for that
+    options |= {"no_cpython_wrapper": inner, "no_cfunc_wrapper": True}
     compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
 
     def decorate(function: Callable[..., Any]) -> Any:

@@ -88,7 +88,7 @@ def clamps(x: NDArray, rows: NDArray, stiffness: NDArray, group: int) -> Clamps:
         nodes=rows,
         points=np.ascontiguousarray(np.concatenate([points, wings], axis=1) - x.mean(axis=0)),
         rest=np.full(len(rows), np.pi),
-        stiffness=stiffness,
+        stiffness=np.array(stiffness),
         group=group,
     )
 

@@ -1,0 +1,48 @@
+"""Compiled loops are made for types of arguments: cases of one kind have the same ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import typeof
+
+import foldyn as fd
+from foldyn.dynamics.system import pack
+from foldyn.dynamics.warm_up import MODELS
+
+FOLD = fd.patterns.simple_fold(a=1.0, b=1.3, dihedral=100)
+SHEET = fd.Sheet(1e6, 0.3, 0.01, density=100.0)
+HELD = fd.Fix([0, 1])
+SPRING = fd.Spring(2.0, [4])
+TURN = fd.Actuate([0], 150.0, fd.Ramp(0.2))
+
+
+def packed(model, supports=(), loads=(), contact=None, **options):
+    if model == "shell":
+        structure = fd.shell(FOLD, SHEET, 2, **options)
+    else:
+        structure = fd.discretize(FOLD, SHEET, preset=model, **options)
+    return pack(fd.Case(structure, [HELD, *supports], loads, contact=contact), 1e-4)
+
+
+def test_springs_and_clamps_are_one_type_of_model():
+    """Not so in shells, which clamp edges by themselves."""
+    springs, clamps = packed("herkal", [SPRING]), packed("herkal", clamped=[(0, 1)])
+    assert typeof(springs.model) == typeof(clamps.model)
+
+
+@pytest.mark.parametrize("loads", [(), [TURN], [fd.Gravity("-z"), fd.Pressure(1.0)]])
+@pytest.mark.parametrize("supports", [(), [SPRING]])
+def test_what_does_not_depend_on_the_model_has_one_type(supports, loads):
+    wanted = typeof(packed("herkal").system)
+    for model in MODELS:
+        assert typeof(packed(model, supports, loads).system) == wanted, model
+
+
+def test_what_touches_has_one_type():
+    plane = fd.Plane((0, 0, -2), (0, 0, 1))
+    contacts = [fd.Contact(), fd.Contact(planes=[plane], panels=False), fd.Contact(thickness=0.01)]
+    tables = [packed(model, contact=of).model.contact for model in MODELS for of in contacts]
+    assert len({typeof(arrays) for arrays in tables}) == 1
+    whole = [array for array in tables[0] if isinstance(array, np.ndarray)]
+    assert all(array.flags.writeable for array in whole)
