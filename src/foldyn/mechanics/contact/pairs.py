@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, scalar
 from foldyn.mechanics.contact.distances import (
     apart,
     between,
@@ -37,7 +37,7 @@ def weights_of(kind, p, q):
     return 1.0 - p, p, q - 1.0, -q
 
 
-@kernel
+@inner
 def put_corners(x, nodes, out):
     """Set out (4, 3) to the positions of four nodes."""
     a, b, c, d = nodes
@@ -76,7 +76,7 @@ def edge_gap(x, edges, i, j):
     return edge_distance(pa, pb, point(x, edges[j, 0]), point(x, edges[j, 1]))
 
 
-@kernel
+@inner
 def gap_of(triangles, edges, x, kind, one, other):
     """Distance (m) of a pair."""
     if kind == VERTEX:
@@ -84,7 +84,7 @@ def gap_of(triangles, edges, x, kind, one, other):
     return edge_gap(x, edges, one, other)
 
 
-@kernel
+@inner
 def closest_of(triangles, edges, x, kind, one, other):
     """Where the parts of a pair are closest, see `weights_of`; whether inside both edges."""
     a, b, c, d = nodes_of(triangles, edges, kind, one, other)
@@ -95,7 +95,7 @@ def closest_of(triangles, edges, x, kind, one, other):
     return closest_of_segments(pa, pb, pc, pd)
 
 
-@kernel
+@inner
 def corners_gap(kind, corners):
     """Distance (m) of a pair of corners (4, 3)."""
     a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)

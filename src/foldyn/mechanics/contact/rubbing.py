@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from foldyn.jit.compiled import kernel, scalar
+from foldyn.jit.compiled import inner, kernel, scalar
 from foldyn.mechanics.contact.distances import dot, point
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.pairs import VERTEX, closest_of, gap_of, nodes_of, weights_of
@@ -48,7 +48,7 @@ def _across(x, nodes, weights):
     )
 
 
-@kernel
+@inner
 def stretch_of_pair(tables, memory, x, kind, pair, p, q):
     """Stretch (m) of the spring of a pair that is closest at p, q.
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
 from foldyn.mechanics.contact.edge_edge import PARALLEL, mollifier, square_of_cross, weigh_edges
 from foldyn.mechanics.contact.pairs import VERTEX, nodes_of, put_corners, weights_of
@@ -71,7 +71,7 @@ def add_rub_tangent(tables, memory, x, kind, pair, share, out):
             out[i, j] += share * value
 
 
-@kernel
+@inner
 def _add_slope(corners, weights, d0, k, out):
     """Add the gradient of -k d0 f'(d/d0) to out (12,); the value (N)."""
     r = np.empty(3)
@@ -84,7 +84,7 @@ def _add_slope(corners, weights, d0, k, out):
     return -k * d0 * f1
 
 
-@kernel
+@inner
 def _vertex_slope(tables, corners, t, d0, weights, moves, out):
     """Gradient (12,) of the normal force of a vertex and triangle t."""
     for which in range(PARTS):
@@ -94,7 +94,7 @@ def _vertex_slope(tables, corners, t, d0, weights, moves, out):
             _add_slope(corners, weights, d0, share * tables.stiffness, out)
 
 
-@kernel
+@inner
 def _edges_slope(tables, corners, i, j, d0, weights, moves, out):
     """That of the edges i and j."""
     e, g = minus(point(corners, 1), point(corners, 0)), minus(point(corners, 3), point(corners, 2))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foldyn.jit.compiled import kernel
+from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.pairs import VERTEX, gap_of
 
 
@@ -50,7 +50,7 @@ def lay_ties(memory, parts, ties):
             counts.listed_second = k + 1
 
 
-@kernel
+@inner
 def put_ties(tables, memory, parts, ties, found):
     """Tie pairs of a new list, of found[kind] pairs, by what `take_ties` gave.
 
@@ -82,7 +82,7 @@ def put_ties(tables, memory, parts, ties, found):
         memory.tie[kind, k] = ties[m, 1:]
 
 
-@kernel
+@inner
 def _begin(pairs, key, value, count):
     """The first of the pairs (m, 2), ordered by a column, in which this has at least a value."""
     low, high = 0, count
