@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.cases.history import History
 from foldyn.dynamics.audit import audited
 from foldyn.dynamics.course import Outcome, Samples
 from foldyn.dynamics.damping import has_dampers
 from foldyn.dynamics.lane_steps import (
+    HINGE,
     OUTCOME,
     LaneLoads,
     LanePlan,
@@ -25,13 +28,13 @@ from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.system import Packed
 from foldyn.dynamics.timing import check_samples
 from foldyn.errors import FoldynError
-from foldyn.mechanics.lanes import WIDTH, lane_work, lanes, side_by_side, topology
+from foldyn.mechanics.lanes import WIDTH, lanes, side_by_side, topology
 from foldyn.mechanics.model import BarsHinges
 
 METHOD = METHODS["central_difference"]
 STRETCH = 1000  # steps for which the factors of the loads are in memory
-LEAST = 7  # motions alone take as long as WIDTH side by side, where vectors gain least
-MOST_NODES = 1000  # above which vectors of WIDTH models leave the cache, and gain nothing
+LEAST = 4  # motions alone take as long as WIDTH side by side, where vectors gain least
+MOST_NODES = 3000  # above which several threads share a motion that is alone
 SAME = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group")
 
 
@@ -213,10 +216,10 @@ class _Vector:
             for name in ("u", "v", "angle")
         )
         self.note = np.zeros((3, WIDTH), np.int64)
+        self.note[HINGE] = -1
+        nothing = [side_by_side([np.zeros(u.size // WIDTH)] * WIDTH) for _ in range(3)]
         energies = np.zeros((4, WIDTH)), np.zeros((len(first.body.energy_groups), WIDTH))
-        self.state = LaneState._make(
-            [u, v, *np.zeros((4, u.size)), angle, np.zeros(WIDTH), *energies, self.note]
-        )
+        self.state = LaneState._make([u, v, *nothing, angle, np.zeros(WIDTH), *energies, self.note])
         steps = np.full(WIDTH, -1)
         steps[: len(self.plans)] = [plan.steps for plan in self.plans]
         self.plan = LanePlan(
@@ -226,15 +229,19 @@ class _Vector:
         self._load(all_of)
         self.samples = LaneSamples._make([first.system.order, first.system.supported, *self.out])
         self.arrays = topology(shape), lanes([motion.packed.model for motion in all_of])
-        self.work = lane_work(shape)
 
     def _load(self, motions: Sequence[Motion]) -> None:
         """Loads and masses, with a value for each lane."""
-        self.terms = [motion.case.load_terms for motion in motions]
-        count, size = max(map(len, self.terms)), self.state.u.size // WIDTH
+        terms = [motion.case.load_terms for motion in motions]
+        self.histories: list[History] = []
+        for _, history in chain.from_iterable(terms):
+            if history not in self.histories:
+                self.histories.append(history)
+        self.factors = [[self.histories.index(history) for _, history in own] for own in terms]
+        count, size = max(map(len, terms)), self.state.u.size // WIDTH
         values = np.zeros((count, size, WIDTH))
-        for lane, (motion, terms) in enumerate(zip(motions, self.terms, strict=True)):
-            for term, (vector, _) in enumerate(terms):
+        for lane, (motion, own) in enumerate(zip(motions, terms, strict=True)):
+            for term, (vector, _) in enumerate(own):
                 values[term, :, lane] = motion.packed.numbering.inward(vector).ravel()[:size]
         dof = np.flatnonzero(values.any(axis=(0, 2)))
         masses = [motion.packed.mass for motion in motions]
@@ -248,17 +255,13 @@ class _Vector:
     def _factors(self, first: int, last: int) -> NDArray:
         """Factors of the histories at the ends of some steps, (steps, terms WIDTH)."""
         factor = np.zeros((last - first + 1, len(self.loads.value), WIDTH))
-        known: dict[tuple[int, int], NDArray] = {}  # lanes may share a history, and its times
-        times = {
-            lane: plan.start + np.arange(first, last + 1) * plan.dt
-            for lane, plan in enumerate(self.plans)
-        }
-        for lane, at in times.items():
-            alike = next(k for k in times if np.array_equal(times[k], at))
-            for term, (_, history) in enumerate(self.terms[lane]):
-                key = id(history), alike
+        known: dict[tuple[int, float, float], NDArray] = {}  # lanes may share a history and times
+        for lane, plan in enumerate(self.plans):
+            for term, number in enumerate(self.factors[lane]):
+                key = number, plan.start, plan.dt
                 if key not in known:
-                    known[key] = np.broadcast_to(history(at), at.shape)
+                    at = plan.start + np.arange(first, last + 1) * plan.dt
+                    known[key] = np.broadcast_to(self.histories[number](at), at.shape)
                 factor[:, term, lane] = known[key]
         return factor.reshape(len(factor), -1)
 
@@ -268,7 +271,7 @@ class _Vector:
             first, last = self.done + 1, min(end, self.done + STRETCH)
             advance_lanes(
                 *self.arrays, self.loads, self._factors(first, last), self.state, self.samples,
-                self.work, self.plan, first, last,
+                self.plan, first, last,
             )  # fmt: skip
             self.done = last
 

@@ -59,7 +59,7 @@ def check_mass(mass: sparse.csr_array, fixed: NDArray) -> None:
 
 def is_lumped(mass: sparse.csr_array) -> bool:
     """Whether a mass matrix is diagonal."""
-    return sparse.csr_array(mass - sparse.diags_array(mass.diagonal())).count_nonzero() == 0
+    return mass.count_nonzero() == np.count_nonzero(mass.diagonal())
 
 
 def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties) -> Inertia:

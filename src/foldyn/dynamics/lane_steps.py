@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics.course import Outcome
 from foldyn.jit.compiled import inner, shared
-from foldyn.jit.eights import add_eight, take_eight
+from foldyn.jit.eights import eight, put
 from foldyn.jit.intrinsics import borrowed
 from foldyn.mechanics.lanes import (
     WIDTH,
@@ -36,14 +36,13 @@ class LaneState(NamedTuple):
     u: NDArray  # (d WIDTH,) m
     v: NDArray  # m/s
     a: NDArray  # m/s2
-    ahead: NDArray  # velocity that drag sees, m/s
     force: NDArray  # N
     position: NDArray  # m
     angle: NDArray  # (nh WIDTH,) at the last step, rad
     before: NDArray  # (WIDTH,) of the hinge at which a model ended, before that, rad
     work: NDArray  # (4, WIDTH) work and energy dissipated, J, and their powers, W
     strain: NDArray  # (groups, WIDTH) J
-    note: NDArray  # (3, WIDTH) int64
+    note: NDArray  # (3, WIDTH) int64; of the hinge -1 before
 
 
 class LaneLoads(NamedTuple):
@@ -68,10 +67,10 @@ class LaneSamples(NamedTuple):
 
 
 @inner
-def write_samples(topology, own, loads, state, out, work, step, chosen):
+def write_samples(topology, own, loads, state, out, step, chosen):
     """Write a sample of each chosen (WIDTH,) model; one that is not finite ends instead."""
     u, v, strain, energies = state.u, state.v, state.strain, state.work
-    energies_of_lanes(topology, own, u, work.angle, strain)
+    energies_of_lanes(topology, own, u, state.angle, strain)
     groups = strain.shape[0]
     for q in range(WIDTH):
         if chosen[q] == 0:
@@ -96,21 +95,21 @@ def write_samples(topology, own, loads, state, out, work, step, chosen):
 
 
 @shared
-def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, last):
+def advance_lanes(topology, own, loads, factor, state, out, plan, first, last):
     """Do the steps from the first to the last one of WIDTH models; step 0 is the start.
 
     factor : (last - first + 1, t WIDTH) of the histories, at the ends of these steps. A model that
     has ended, or done its steps, stands still.
     """
     topology, own, loads = borrowed(topology), borrowed(own), borrowed(loads)
-    state, out, work = borrowed(state), borrowed(out), borrowed(work)
-    u, v, a, ahead, force = state.u, state.v, state.a, state.ahead, state.force
+    state, out = borrowed(state), borrowed(out)
+    u, v, a, force = state.u, state.v, state.a, state.force
     position, size, note = state.position, state.u.size, state.note
-    energies = state.work
-    h, half, finite, none = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    slowed = -loads.alpha
-    power_in, power_out = np.zeros(WIDTH), np.zeros(WIDTH)
-    chosen = np.zeros(WIDTH, np.int64)
+    energies, alpha = state.work, loads.alpha
+    h, half, none = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
+    power_in, power_out, finite = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
+    chosen, scratch = np.zeros(WIDTH, np.int64), np.zeros(WIDTH)
+    zero, slowed = eight(none, 0), eight(alpha, 0)
     for step in range(first, last + 1):
         now = step - first
         for q in range(WIDTH):
@@ -118,54 +117,47 @@ def advance_lanes(topology, own, loads, factor, state, out, work, plan, first, l
             h[q] = plan.dt[q] if goes_on and step > 0 else 0.0
             chosen[q] = plan.every[q] if goes_on and step % plan.every[q] == 0 else 0
             half[q] = 0.5 * h[q]
+            power_in[q] = 0.0
+        span, kick = eight(h, 0), eight(half, 0)
         for i in range(0, size, WIDTH):
-            add_eight(v, i, a, i, half, 0)
-            add_eight(u, i, v, i, h, 0)
-            take_eight(v, i, ahead, i)
-            add_eight(ahead, i, a, i, half, 0)
-        for i in range(size):
-            position[i] = own.rest[i] + u[i]
-            force[i] = 0.0
-        add_bar_lanes(topology, own, u, force, work)
-        add_hinge_lanes(topology, own, position, force, work)
-        power_in[:] = 0.0
-        power_out[:] = 0.0
-        finite[:] = 0.0
+            speed = eight(v, i) + kick * eight(a, i)
+            there = eight(u, i) + span * speed
+            put(v, i, speed)
+            put(u, i, there)
+            put(position, i, eight(own.rest, i) + there)
+            put(force, i, zero)
+        add_bar_lanes(topology, own, u, force, scratch)
+        jumped = add_hinge_lanes(
+            topology, own, position, force, scratch, state.angle, state.before, note[HINGE]
+        )
         for term in range(loads.value.shape[0]):
             for k in range(loads.dof.size):
                 at = loads.dof[k] * WIDTH
                 for q in range(WIDTH):
                     load = loads.value[term, k * WIDTH + q] * factor[now, term * WIDTH + q]
                     force[at + q] -= load
-                    power_in[q] += load * ahead[at + q]
-        for i in range(size):
-            a[i] = -force[i] * loads.inverse[i]
-            position[i] = loads.mass[i] * ahead[i]  # room for the momentum
+                    power_in[q] += load * (v[at + q] + half[q] * a[at + q])
+        drag, wrong = zero, zero
         for i in range(0, size, WIDTH):
-            add_eight(power_out, 0, position, i, ahead, i)
-            add_eight(a, i, ahead, i, slowed, 0)
-            add_eight(v, i, a, i, half, 0)
-            add_eight(finite, 0, v, i, none, 0)  # nan, once one of them is inf or nan
+            speed, old = eight(v, i), eight(a, i)
+            ahead = speed + kick * old  # velocity that drag sees
+            new = -eight(force, i) * eight(loads.inverse, i) - slowed * ahead
+            speed = speed + kick * new
+            put(a, i, new)
+            put(v, i, speed)
+            drag = drag + eight(loads.mass, i) * ahead * ahead
+            wrong = wrong + zero * speed  # nan, once one of them is inf or nan
+        put(power_out, 0, drag * slowed)
+        put(finite, 0, wrong)
         for q in range(WIDTH):
-            power_out[q] *= loads.alpha[q]
             energies[0, q] += 0.5 * h[q] * (energies[2, q] + power_in[q])
             energies[1, q] += 0.5 * h[q] * (energies[3, q] + power_out[q])
             energies[2, q], energies[3, q] = power_in[q], power_out[q]
             if finite[q] != 0.0 and note[OUTCOME, q] == Outcome.DONE:
                 note[OUTCOME, q], note[STEP, q] = Outcome.NOT_FINITE, step
                 chosen[q] = 0
-        angle, before = work.angle, state.angle
-        jumps = 0
-        for i in range(angle.size):
-            jumps += abs(angle[i] - before[i]) > np.pi
-        if jumps > 0:
-            for i in range(angle.size):
-                q = i % WIDTH
-                if abs(angle[i] - before[i]) > np.pi and note[OUTCOME, q] == Outcome.DONE:
-                    note[OUTCOME, q], note[STEP, q] = Outcome.PENETRATION, step
-                    note[HINGE, q], state.before[q] = i // WIDTH, before[i]
-                    chosen[q] = 0
-        for i in range(angle.size):
-            before[i] = angle[i]
+            if jumped and note[HINGE, q] >= 0 and note[OUTCOME, q] == Outcome.DONE:
+                note[OUTCOME, q], note[STEP, q] = Outcome.PENETRATION, step
+                chosen[q] = 0
         if chosen.any():
-            write_samples(topology, own, loads, state, out, work, step, chosen)
+            write_samples(topology, own, loads, state, out, step, chosen)

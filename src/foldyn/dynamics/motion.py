@@ -149,7 +149,8 @@ class Motion:
         Its samples go to the window. What there is then is the `result`.
         """
         self._keeping = None
-        self._start()
+        if self.stored:
+            self._start()
         self._output.window, self._engine = window, engine
         return self._stretches(lambda _: None, 0.0)
 

@@ -1,57 +1,171 @@
-"""Eight numbers in a row as one vector, in compiled code: copy, and multiply and add.
+"""Eight numbers as one value in compiled code, with the arithmetic of a single one.
 
-Number by number the compiler cannot know that what is written is not what is read next. The vectors
-are LLVM's own: they run on any processor, in narrower registers where it has no wide ones.
+Formulas without branches take them in place of numbers: `+ - * /`, comparisons, `abs`, `math.sqrt`,
+`choose`. The vectors are LLVM's own: they run on any processor, in narrower registers where it has
+no wide ones. Loops over numbers leave it to the compiler to find them, which it does not where it
+cannot know that what is written is not what is read next.
 """
 
 from __future__ import annotations
 
+import math
+import operator
+from typing import Any
+
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import models, register_model
 
-from foldyn.jit.intrinsics import DOUBLE, data_of, intrinsic
+from foldyn.jit.intrinsics import DOUBLE, INT64, data_of, intrinsic
 
-EIGHT = ir.VectorType(DOUBLE, 8)
+COUNT = 8
+VECTOR, BITS = ir.VectorType(DOUBLE, COUNT), ir.VectorType(ir.IntType(1), COUNT)
 
 
+class Eight(types.Type):
+    """Type of eight numbers."""
+
+
+class Truths(types.Type):
+    """Type of eight answers: what their comparisons give."""
+
+
+EIGHT, TRUTHS = Eight("eight"), Truths("truths")
+
+
+@register_model(Eight)
+class _EightModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, VECTOR)
+
+
+@register_model(Truths)
+class _TruthsModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, BITS)
+
+
+@lower_cast(types.Float, Eight)
+def _spread(context, builder, source, target, value):
+    one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, ir.IntType(32)(0))
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), COUNT), [0] * COUNT)
+    return builder.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), everywhere)
+
+
+# ------------------------------------------------------------------ arithmetic
+template: Any = infer_global
+
+
+def _define(function: Any, count: int, result: types.Type, build: Any) -> None:
+    """Give a function its meaning for eights, some of which may be numbers."""
+
+    @template(function)
+    class _Template(AbstractTemplate):
+        def generic(self, args, kws):
+            known = all(isinstance(kind, Eight | types.Float) for kind in args)
+            if len(args) == count and known and EIGHT in args:
+                return signature(result, *[EIGHT] * count)
+            return None
+
+    @lower_builtin(function, *[EIGHT] * count)
+    def _lower(context, builder, signature, arguments):
+        return build(builder, *arguments)
+
+
+def _of_llvm(name: str) -> Any:
+    def build(builder, value):
+        kind = ir.FunctionType(VECTOR, [VECTOR])
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v8f64")
+        return builder.call(function, [value])
+
+    return build
+
+
+def _compared(sign: str) -> Any:
+    return lambda builder, one, other: builder.fcmp_ordered(sign, one, other)
+
+
+_define(operator.add, 2, EIGHT, ir.IRBuilder.fadd)
+_define(operator.sub, 2, EIGHT, ir.IRBuilder.fsub)
+_define(operator.mul, 2, EIGHT, ir.IRBuilder.fmul)
+_define(operator.truediv, 2, EIGHT, ir.IRBuilder.fdiv)
+_define(operator.neg, 1, EIGHT, ir.IRBuilder.fneg)
+_define(operator.gt, 2, TRUTHS, _compared(">"))
+_define(operator.lt, 2, TRUTHS, _compared("<"))
+_define(math.sqrt, 1, EIGHT, _of_llvm("sqrt"))
+_define(abs, 1, EIGHT, _of_llvm("fabs"))
+
+
+@intrinsic
+def choose(typing_context, condition, one, other):
+    """`one` where the condition holds, else `other`: of eights, or of numbers without a branch."""
+    kind = EIGHT if isinstance(condition, Truths) else types.float64
+
+    def codegen(context, builder, signature, arguments):
+        return builder.select(*arguments)
+
+    return kind(condition, kind, kind), codegen
+
+
+@intrinsic
+def any_of(typing_context, truths):
+    """Whether one of eight answers is true."""
+
+    def codegen(context, builder, signature, arguments):
+        bits = builder.bitcast(arguments[0], ir.IntType(COUNT))
+        return builder.icmp_unsigned("!=", bits, ir.IntType(COUNT)(0))
+
+    return types.boolean(truths), codegen
+
+
+@intrinsic
+def per_cube_root(typing_context, x):
+    """x^(-1/3) of an eight or a number, by its exponent: 3 % off."""
+    many = isinstance(x, Eight)
+
+    def codegen(context, builder, signature, arguments):
+        kind = ir.VectorType(INT64, COUNT) if many else INT64
+
+        def same(number):
+            return ir.Constant(kind, [number] * COUNT if many else number)
+
+        high = builder.ashr(builder.bitcast(arguments[0], kind), same(32))
+        third = builder.ashr(builder.mul(high, same(0x55555556)), same(32))
+        guess = builder.shl(builder.sub(same(0x553EF0FF), third), same(32))
+        return builder.bitcast(guess, VECTOR if many else DOUBLE)
+
+    kind = EIGHT if many else types.float64
+    return kind(kind), codegen
+
+
+# ------------------------------------------------------------------ in arrays
 def _pointer(context, builder, kind, array, at):
     data = data_of(context, builder, kind, array)
-    return builder.bitcast(builder.gep(data, [at]), EIGHT.as_pointer())
-
-
-def _load(builder, pointer):
-    value = builder.load(pointer)
-    value.align = 8
-    return value
+    return builder.bitcast(builder.gep(data, [at]), VECTOR.as_pointer())
 
 
 @intrinsic
-def take_eight(typing_context, source, at, out, place):
-    """out[place :][:8] = source[at :][:8]."""
-    i8 = types.int64
+def eight(typing_context, array, at):
+    """array[at :][:8]."""
 
     def codegen(context, builder, signature, arguments):
-        source_array, at, out_array, place = arguments
-        value = _load(builder, _pointer(context, builder, source, source_array, at))
-        builder.store(value, _pointer(context, builder, out, out_array, place)).align = 8
-        return context.get_dummy_value()
+        value = builder.load(_pointer(context, builder, array, *arguments))
+        value.align = 8
+        return value
 
-    return types.void(source, i8, out, i8), codegen
+    return EIGHT(array, types.int64), codegen
 
 
 @intrinsic
-def add_eight(typing_context, out, place, value, at, g, row):
-    """out[place :][:8] += value[at :][:8] * g[row :][:8]."""
-    i8 = types.int64
+def put(typing_context, array, at, value):
+    """array[at :][:8] = value."""
 
     def codegen(context, builder, signature, arguments):
-        out_array, place, value_array, at, g_array, row = arguments
-        target = _pointer(context, builder, out, out_array, place)
-        factor = _load(builder, _pointer(context, builder, value, value_array, at))
-        other = _load(builder, _pointer(context, builder, g, g_array, row))
-        product = builder.fmul(factor, other, flags=("contract",))
-        total = builder.fadd(_load(builder, target), product, flags=("contract",))
-        builder.store(total, target).align = 8
+        *place, number = arguments
+        builder.store(number, _pointer(context, builder, array, *place)).align = 8
         return context.get_dummy_value()
 
-    return types.void(out, i8, value, i8, g, i8), codegen
+    return types.void(array, types.int64, EIGHT), codegen

@@ -1,4 +1,4 @@
-"""What compiled code does below Python, as Numba's intrinsics: bits, addresses, views, memory.
+"""What compiled code does below Python, as Numba's intrinsics: addresses, views, memory.
 
 The typing context stands first among the arguments of an intrinsic as it is written; compiled code
 calls it without.
@@ -29,26 +29,6 @@ def intrinsic(function: Callable[..., Any]) -> Any:
 def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
     """Pointer to the first number of an array."""
     return make_array(kind)(context, builder, array).data
-
-
-# ------------------------------------------------------------------ bits of a number
-def _bitcast(kind):
-    def codegen(context, builder, signature, arguments):
-        return builder.bitcast(arguments[0], kind)
-
-    return codegen
-
-
-@intrinsic
-def bits_of(typing_context, x):
-    """The 64 bits of a float64 as an int64."""
-    return types.int64(types.float64), _bitcast(INT64)
-
-
-@intrinsic
-def float_of(typing_context, bits):
-    """The float64 with these 64 bits."""
-    return types.float64(types.int64), _bitcast(DOUBLE)
 
 
 # ------------------------------------------------------------------ functions by their address

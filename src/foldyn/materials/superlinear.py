@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foldyn.jit.compiled import scalar
-from foldyn.jit.intrinsics import bits_of, float_of
+from foldyn.jit.eights import choose, per_cube_root
 from foldyn.materials.law import HingeLaw
 
 CODE = 1
@@ -29,12 +29,11 @@ def moment(theta, rest):
     """Moment / k.
 
     Without branches, so that loops over it vectorize: (d y)(|d| y) with y = |d|^(-1/3) from a guess
-    by its exponent (3 % off) and two steps of order 4; exact to 3 ulp.
+    (3 % off) and two steps of order 4; exact to 3 ulp.
     """
     d = theta - rest
-    a = max(abs(d), 1e-200)  # below, y^3 would overflow and the moment is zero anyway
-    third = ((bits_of(a) >> 32) * 0x55555556) >> 32
-    y = float_of((0x553EF0FF - third) << 32)
+    a = choose(abs(d) > 1e-200, abs(d), 1e-200)  # below, y^3 would overflow; the moment is zero
+    y = per_cube_root(a)
     r = 1.0 - a * y * y * y
     y = y + y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))
     r = 1.0 - a * y * y * y

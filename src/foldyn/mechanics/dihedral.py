@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from foldyn.jit.compiled import inner, inner_scalar, scalar
+from foldyn.jit.eights import choose
 
 PI = math.pi
 TAN_PI_8 = math.sqrt(2.0) - 1.0
@@ -29,10 +30,9 @@ def branch_free_atan2(y, x):
     """
     ax, ay = abs(x), abs(y)
     steep = ay > ax
-    low = ax if steep else ay
-    high = ay if steep else ax
+    low, high = choose(steep, ax, ay), choose(steep, ay, ax)
     upper = low > TAN_PI_8 * high
-    t = (low - high if upper else low) / (low + high if upper else high)
+    t = choose(upper, low - high, low) / choose(upper, low + high, high)
     u = t * t
     q = -0.01917688711906226 * u + 0.03923165829558719
     q = q * u - 0.0508544973794026
@@ -45,10 +45,10 @@ def branch_free_atan2(y, x):
     q = q * u + 0.1999999999999552
     q = q * u - 0.3333333333333333
     angle = t + t * u * q
-    angle = angle + 0.25 * PI if upper else angle
-    angle = 0.5 * PI - angle if steep else angle
-    angle = PI - angle if x < 0.0 else angle
-    return -angle if y < 0.0 else angle
+    angle = choose(upper, angle + 0.25 * PI, angle)
+    angle = choose(steep, 0.5 * PI - angle, angle)
+    angle = choose(x < 0.0, PI - angle, angle)
+    return choose(y < 0.0, -angle, angle)
 
 
 @inner_scalar

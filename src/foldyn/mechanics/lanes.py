@@ -2,7 +2,7 @@
 
 Every number of a node or an element stands in memory as WIDTH numbers in a row, one of each model.
 Nothing has to be gathered from scattered places then; the formulas are those of `mechanics.force`,
-and what is computed at once is GROUP elements of WIDTH models.
+of one element of WIDTH models at once, from load to sum in registers.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.jit.compiled import inner
-from foldyn.jit.eights import add_eight, take_eight
-from foldyn.materials import enhanced_linear, ogden, superlinear
+from foldyn.jit.compiled import inner, inner_scalar
+from foldyn.jit.eights import any_of, eight, put
+from foldyn.jit.intrinsics import LINE
+from foldyn.materials import ogden, superlinear
 from foldyn.materials.enhanced_linear import AS_PUBLISHED, STRESS_FREE
+from foldyn.materials.linear import CODE as LINEAR
 from foldyn.materials.switch import bar_energy, bar_stress, hinge_energy, hinge_moment
 from foldyn.mechanics.dihedral import dihedral_gradient
 from foldyn.mechanics.model import BarsHinges
 
 WIDTH = 8  # models side by side
-GROUP = 8  # elements that are computed at once
-BLOCK = GROUP * WIDTH
 
 
 class Topology(NamedTuple):
@@ -49,15 +49,6 @@ class Lanes(NamedTuple):
     hinge_parameters: NDArray  # (4, nh WIDTH)
 
 
-class LaneWork(NamedTuple):
-    """Memory of the force kernels, flat."""
-
-    points: NDArray  # (12 BLOCK,)
-    gradient: NDArray  # (13 BLOCK,)
-    value: NDArray  # (BLOCK,)
-    angle: NDArray  # (nh WIDTH,) rad, of the last evaluation
-
-
 def topology(model: BarsHinges) -> Topology:
     """What a model shares with those beside it."""
     return Topology(
@@ -67,8 +58,11 @@ def topology(model: BarsHinges) -> Topology:
 
 
 def side_by_side(arrays: Sequence[NDArray]) -> NDArray:
-    """Arrays of equal shapes, of WIDTH models, as one flat array."""
-    return np.ascontiguousarray(np.stack(arrays, axis=-1), float).ravel()
+    """Arrays of equal shapes, of WIDTH models, as one flat array from the start of a cache line."""
+    room = np.empty(sum(array.size for array in arrays) + WIDTH)
+    out = room[-room.ctypes.data % LINE // room.itemsize :][: room.size - WIDTH]
+    np.stack(arrays, axis=-1, out=out.reshape(*arrays[0].shape, len(arrays)))
+    return out
 
 
 def lanes(models: Sequence[BarsHinges]) -> Lanes:
@@ -76,118 +70,105 @@ def lanes(models: Sequence[BarsHinges]) -> Lanes:
     columns = (
         "rest", "bar_vector", "bar_per_length2", "bar_stiffness", "hinge_stiffness", "hinge_rest",
     )  # fmt: skip
-    parameters = np.stack([model.hinge_parameters.T for model in models], axis=-1)
+    parameters = side_by_side([model.hinge_parameters.T for model in models])
     numbers = [side_by_side([getattr(model, name) for model in models]) for name in columns]
-    return Lanes._make([*numbers, np.ascontiguousarray(parameters.reshape(4, -1))])
+    return Lanes._make([*numbers, parameters.reshape(4, -1)])
 
 
-def lane_work(model: BarsHinges) -> LaneWork:
-    """Memory for the kernels."""
-    rows = (12 * BLOCK, 13 * BLOCK, BLOCK, len(model.hinges) * WIDTH)
-    return LaneWork(*map(np.zeros, rows))
+@inner_scalar
+def take(array, row):
+    """Three eights of a node or an element."""
+    at = 3 * WIDTH * np.int64(row)
+    return eight(array, at), eight(array, at + WIDTH), eight(array, at + 2 * WIDTH)
+
+
+@inner_scalar
+def add(array, row, x, y, z):
+    """Add three eights to those of a node."""
+    at = 3 * WIDTH * np.int64(row)
+    put(array, at, eight(array, at) + x)
+    put(array, at + WIDTH, eight(array, at + WIDTH) + y)
+    put(array, at + 2 * WIDTH, eight(array, at + 2 * WIDTH) + z)
 
 
 @inner
-def add_bar_lanes(topology, own, u, force, work):
-    """Add the forces of the bars at u to `force`, both (3 n WIDTH,)."""
-    x, s, minus = work.points, work.value, work.gradient
-    bars, vector = topology.bars, own.bar_vector
+def add_bar_lanes(topology, own, u, force, value):
+    """Add the forces of the bars at u to `force`, both (3 n WIDTH,); value (WIDTH,) is scratch."""
+    bars = topology.bars
     for run in range(topology.bar_runs.shape[0]):
         code = topology.bar_runs[run, 2]
-        start, end = topology.bar_runs[run, 0], topology.bar_runs[run, 1]
-        for first in range(start, end, GROUP):
-            m = min(GROUP, end - first)
-            for k in range(m):
-                e = first + k
-                for c in range(3):
-                    for v in range(2):
-                        node = np.int64(bars[2 * e + v])
-                        take_eight(u, (3 * node + c) * WIDTH, x, (3 * v + c) * BLOCK + k * WIDTH)
-                    take_eight(vector, (3 * e + c) * WIDTH, x, (6 + c) * BLOCK + k * WIDTH)
-                take_eight(own.bar_per_length2, e * WIDTH, s, k * WIDTH)
-            for q in range(BLOCK):
-                dx, vx = x[3 * BLOCK + q] - x[q], x[6 * BLOCK + q]
-                dy, vy = x[4 * BLOCK + q] - x[BLOCK + q], x[7 * BLOCK + q]
-                dz, vz = x[5 * BLOCK + q] - x[2 * BLOCK + q], x[8 * BLOCK + q]
-                s[q] *= dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
-                x[q], x[BLOCK + q], x[2 * BLOCK + q] = vx + dx, vy + dy, vz + dz
+        for e in range(topology.bar_runs[run, 0], topology.bar_runs[run, 1]):
+            one, other = bars[2 * e], bars[2 * e + 1]
+            x1, y1, z1 = take(u, one)
+            x2, y2, z2 = take(u, other)
+            vx, vy, vz = take(own.bar_vector, e)
+            dx, dy, dz = x2 - x1, y2 - y1, z2 - z1
+            at = e * WIDTH
+            excess = eight(own.bar_per_length2, at) * (
+                dx * (2.0 * vx + dx) + dy * (2.0 * vy + dy) + dz * (2.0 * vz + dz)
+            )
             if code == ogden.CODE:
-                for q in range(BLOCK):
-                    s[q] = ogden.stress_of_excess(s[q])
+                s = ogden.stress_of_excess(excess)
             else:
-                for q in range(m * WIDTH):
-                    s[q] = bar_stress(code, s[q] / (1.0 + math.sqrt(1.0 + s[q])), 0)
-            for q in range(m * WIDTH):
-                s[q] *= own.bar_stiffness[first * WIDTH + q]
-                minus[q] = -s[q]
-            for k in range(m):
-                one, other = np.int64(bars[2 * (first + k)]), np.int64(bars[2 * (first + k) + 1])
-                for c in range(3):
-                    row = c * BLOCK + k * WIDTH
-                    add_eight(force, (3 * one + c) * WIDTH, minus, k * WIDTH, x, row)
-                    add_eight(force, (3 * other + c) * WIDTH, s, k * WIDTH, x, row)
+                put(value, 0, excess / (1.0 + math.sqrt(1.0 + excess)))
+                for q in range(WIDTH):
+                    value[q] = bar_stress(code, value[q], 0)
+                s = eight(value, 0)
+            s = s * eight(own.bar_stiffness, at)
+            fx, fy, fz = s * (vx + dx), s * (vy + dy), s * (vz + dz)
+            add(force, one, -fx, -fy, -fz)
+            add(force, other, fx, fy, fz)
 
 
 @inner
-def add_hinge_lanes(topology, own, position, force, work):
-    """Add the forces of the hinges at the positions to `force`, both (3 n WIDTH,)."""
-    x, g, value, hinges = work.points, work.gradient, work.value, topology.hinges
-    angle, rest, stiffness = g[12 * BLOCK :], own.hinge_rest, own.hinge_stiffness
-    p = own.hinge_parameters
+def add_hinge_lanes(topology, own, position, force, value, angles, before, hinge):
+    """Add the forces of the hinges at the positions to `force`, both (3 n WIDTH,).
+
+    The angles of the last evaluation, which are updated, tell whether a hinge has passed through 0
+    or 360 degrees: returned. Of each model the first such hinge and its angle before are then
+    noted. value (WIDTH,) is scratch.
+    """
+    hinges, p, passed = topology.hinges, own.hinge_parameters, False
     for run in range(topology.hinge_runs.shape[0]):
         code = topology.hinge_runs[run, 2]
-        start, end = topology.hinge_runs[run, 0], topology.hinge_runs[run, 1]
-        for first in range(start, end, GROUP):
-            m = min(GROUP, end - first)
-            for k in range(m):
-                for v in range(4):
-                    node = np.int64(hinges[4 * (first + k) + v])
-                    for c in range(3):
-                        at = (3 * v + c) * BLOCK + k * WIDTH
-                        take_eight(position, (3 * node + c) * WIDTH, x, at)
-            for q in range(BLOCK):
-                (
-                    g[12 * BLOCK + q],
-                    g[q], g[BLOCK + q], g[2 * BLOCK + q],
-                    g[3 * BLOCK + q], g[4 * BLOCK + q], g[5 * BLOCK + q],
-                    g[6 * BLOCK + q], g[7 * BLOCK + q], g[8 * BLOCK + q],
-                    g[9 * BLOCK + q], g[10 * BLOCK + q], g[11 * BLOCK + q],
-                ) = dihedral_gradient(
-                    x[q], x[BLOCK + q], x[2 * BLOCK + q],
-                    x[3 * BLOCK + q], x[4 * BLOCK + q], x[5 * BLOCK + q],
-                    x[6 * BLOCK + q], x[7 * BLOCK + q], x[8 * BLOCK + q],
-                    x[9 * BLOCK + q], x[10 * BLOCK + q], x[11 * BLOCK + q],
-                )  # fmt: skip
-            there, count = first * WIDTH, m * WIDTH
-            for q in range(count):
-                work.angle[there + q] = angle[q]
+        for e in range(topology.hinge_runs[run, 0], topology.hinge_runs[run, 1]):
+            j, k, i, l = hinges[4 * e], hinges[4 * e + 1], hinges[4 * e + 2], hinges[4 * e + 3]  # noqa: E741
+            jx, jy, jz = take(position, j)
+            kx, ky, kz = take(position, k)
+            ix, iy, iz = take(position, i)
+            lx, ly, lz = take(position, l)
+            angle, jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz = dihedral_gradient(
+                jx, jy, jz, kx, ky, kz, ix, iy, iz, lx, ly, lz
+            )
+            at = e * WIDTH
+            if any_of(abs(angle - eight(angles, at)) > math.pi):
+                passed = True
+                put(value, 0, angle)
+                for q in range(WIDTH):
+                    if abs(value[q] - angles[at + q]) > math.pi and hinge[q] < 0:
+                        hinge[q], before[q] = e, angles[at + q]
+            put(angles, at, angle)
+            rest = eight(own.hinge_rest, at)
             if code == superlinear.CODE:
-                for q in range(count):
-                    e = there + q
-                    value[q] = stiffness[e] * superlinear.moment(angle[q], rest[e])
-            elif (code == STRESS_FREE) | (code == AS_PUBLISHED):
-                beyond = 0
-                for q in range(count):
-                    e = there + q
-                    beyond += (angle[q] < p[0, e]) | (angle[q] > p[1, e])
-                    value[q] = stiffness[e] * (angle[q] - rest[e] - p[2, e])
-                if beyond > 0:
-                    for q in range(count):
-                        e = there + q
-                        at = enhanced_linear.moment(angle[q], rest[e], p[0, e], p[1, e]) - p[2, e]
-                        value[q] = stiffness[e] * at
+                moment = superlinear.moment(angle, rest)
+            elif code == LINEAR:
+                moment = angle - rest
             else:
-                for q in range(count):
-                    e = there + q
-                    value[q] = stiffness[e] * hinge_moment(
-                        code, angle[q], rest[e], p[0, e], p[1, e], p[2, e], p[3, e], 0
-                    )
-            for k in range(m):
-                for v in range(4):
-                    node = np.int64(hinges[4 * (first + k) + v])
-                    for c in range(3):
-                        row = (3 * v + c) * BLOCK + k * WIDTH
-                        add_eight(force, (3 * node + c) * WIDTH, value, k * WIDTH, g, row)
+                moment = angle - rest - eight(p[2], at)
+                plain = (code == STRESS_FREE) | (code == AS_PUBLISHED)
+                if not plain or any_of(angle < eight(p[0], at)) or any_of(angle > eight(p[1], at)):
+                    for q in range(WIDTH):
+                        n, r = at + q, own.hinge_rest[at + q]
+                        value[q] = hinge_moment(
+                            code, angles[n], r, p[0, n], p[1, n], p[2, n], p[3, n], 0
+                        )
+                    moment = eight(value, 0)
+            m = eight(own.hinge_stiffness, at) * moment
+            add(force, j, m * jx, m * jy, m * jz)
+            add(force, k, m * kx, m * ky, m * kz)
+            add(force, i, m * ix, m * iy, m * iz)
+            add(force, l, m * lx, m * ly, m * lz)
+    return passed
 
 
 @inner
