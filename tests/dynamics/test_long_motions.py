@@ -77,9 +77,13 @@ KINDS = {  # name of the case, its arguments, and what of the methods
     "sliding": (["newmark", "energy_momentum"], {"duration": 0.02, "every": 0.001}),
     "touching": (["dormand_prince"], {"duration": 0.24, "every": 0.01}),
 }
-LONG = {"touching": [pytest.mark.slow]}
+# what compiles long for one run: memory and contact have others here
+LONG = [
+    ("touching", "dormand_prince"), ("creeping", "generalized_alpha"),
+    ("sliding", "energy_momentum"),
+]  # fmt: skip
 RUNS = [
-    pytest.param(kind, method, marks=LONG.get(kind, ()))
+    pytest.param(kind, method, marks=[pytest.mark.slow] if (kind, method) in LONG else [])
     for kind, (methods, _) in KINDS.items()
     for method in methods
 ]

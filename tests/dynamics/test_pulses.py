@@ -77,7 +77,7 @@ def random_pulses(count: int, seed: int):
 @pytest.mark.parametrize("method", [*METHODS, "auto"])
 def test_random_pulses_on_an_oscillator_at_rest(method):
     """The response is Duhamel's integral to the tolerance, or the method says that it is not."""
-    for history in random_pulses(12, seed=20):
+    for history in random_pulses(6, seed=20):
         motion, told = tried(pushed(history), 5.0, method, every=0.25)
         assert not (told and method in ADAPTIVE)  # they need no excuse
         if told:

@@ -188,7 +188,9 @@ def test_statics_and_actuation():
     assert float(path.strain_bends[-1]) < 1e-12
 
 
-@pytest.mark.parametrize("method", ["generalized_alpha", "newmark", "rk4"])
+@pytest.mark.parametrize(
+    "method", ["generalized_alpha", "newmark", pytest.param("rk4", marks=pytest.mark.slow)]
+)
 def test_motions_close_their_energy_audit(method):
     load = fd.Force([6, 7, 8], (0, 0, 1e-3), fd.HalfSine(0.5))
     case = fd.Case(miura(), [fd.Fix([0, 1, 2], "xyz")], [load], fd.Rayleigh(0.1, 1e-3))

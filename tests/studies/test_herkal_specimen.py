@@ -289,6 +289,7 @@ def released(motion, tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_damping_and_press_are_found_again(released) -> None:
     assert released.press == pytest.approx(calibration.PRESSED, rel=5e-3)  # it still rings
     fit = released.fits["glued"]
@@ -302,6 +303,7 @@ def test_damping_and_press_are_found_again(released) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_support_decides_frequency_and_damping(released) -> None:
     """Held on the plate near the paper's 9.5 Hz, by the glue alone far below."""
     motions = evaluation.motions(released)
@@ -502,6 +504,7 @@ def test_what_is_said_of_the_supports_is_what_was_found() -> None:
     assert "no peak" in told(flat)
 
 
+@pytest.mark.slow
 def test_true_motion_is_taken_at_the_times_of_the_film(released, motion) -> None:
     """The film began 32.1 ms before the release."""
     positions = np.zeros((240, 63, 3))
