@@ -12,6 +12,7 @@ from foldyn.mechanics.contact.memory import memory
 from foldyn.mechanics.contact.pairs import EDGES, VERTEX
 from foldyn.mechanics.contact.rubbing import (
     add_rub,
+    add_rubs,
     pressed_pair,
     rub_power,
     rub_state,
@@ -47,14 +48,20 @@ class Rubbing:
     def _edge(self, a: int, b: int) -> int:
         return int(np.flatnonzero((self.tables.edges == sorted((a, b))).all(axis=1))[0])
 
-    def touching(self, rng) -> np.ndarray:
-        """Positions (10, 3) at which the pair touches, tied a part of d0 beside that."""
+    def touching(self, rng, beside: bool = False) -> np.ndarray:
+        """Positions (10, 3) at which the pair touches, tied a part of d0 beside that.
+
+        beside : a vertex near a side, edges that are nearly parallel.
+        """
         most = rng.choice([0.2, np.inf])  # N: what is pressed less slips
         while True:
             x = rng.standard_normal((10, 3))
             if self.kind == VERTEX:
-                x[0] = rng.dirichlet([3.0] * 3) @ x[1:4] + 0.08 * rng.standard_normal(3)
+                within = rng.dirichlet([30.0, 30.0, 1.0] if beside else [3.0] * 3)
+                x[0] = within @ x[1:4] + 0.08 * rng.standard_normal(3)
             else:
+                if beside:
+                    x[8] = x[0] + (x[2] - x[1]) + 0.02 * rng.standard_normal(3)
                 s, t = rng.uniform(0.2, 0.8, 2)
                 off = x[1] + s * (x[2] - x[1]) - x[0] - t * (x[8] - x[0])
                 x[[0, 8]] += off + 0.08 * rng.standard_normal(3)
@@ -135,12 +142,14 @@ def test_what_sticks_has_a_potential(pair):
     assert (np.median(errors, axis=0) < [1e-8, 1e-8]).all()
 
 
+@pytest.mark.parametrize("where", ["anywhere", "beside"])
 @pytest.mark.parametrize("lagged", [False, True])
-def test_tangents_of_what_slips_are_exact(pair, lagged):
+def test_tangents_of_what_slips_are_exact(pair, lagged, where):
+    """Also beside inner sides, whose parts count then, and of edges that are nearly parallel."""
     rng, errors = np.random.default_rng(4), []
     pair.kept.counts.lagged = int(lagged)
     while len(errors) < 30:
-        x = pair.touching(rng)
+        x = pair.touching(rng, where == "beside")
         if not pair.state(x)[1]:
             continue
         errors.append(
@@ -151,8 +160,9 @@ def test_tangents_of_what_slips_are_exact(pair, lagged):
         )  # fmt: skip
         tangent = pair.tangent(x)
         uneven = np.abs(tangent - tangent.T).max() > 1e-9 * np.abs(tangent).max()
-        assert uneven == (not lagged)
-    assert np.median(errors) < 1e-8
+        assert uneven == (not lagged) or where == "beside"
+    # where a closest point passes to another part, differences straddle a kink
+    assert np.quantile(errors, 0.8) < 1e-7 and np.median(errors) < 1e-8
 
 
 def test_friction_is_bounded_along_the_parts_and_has_no_moment(pair):
@@ -229,6 +239,7 @@ def test_ties_stay_where_lists_are_made_anew(pair):
     """Also where the new list does not have their pair."""
     rng = np.random.default_rng(10)
     x, kept = pair.touching(rng), pair.kept
+    kept.tie[:, :, 3] = 1.0
     tie, parts = pair.tie.copy(), kept.pairs[pair.kind, 0].copy()
     for positions in (x, x + 20.0 * rng.standard_normal((10, 3)), x):
         kept.x[:] = positions
@@ -239,3 +250,20 @@ def test_ties_stay_where_lists_are_made_anew(pair):
         (place,) = np.flatnonzero((pairs == parts).all(axis=1) | (pairs == parts[::-1]).all(axis=1))
         assert (kept.tie[pair.kind, place] == tie).all()
         assert np.count_nonzero(kept.tie[pair.kind, :listed, 2]) == 1
+        assert (
+            np.count_nonzero(kept.tie[pair.kind, :listed, 3]) == 1
+        )  # no stretch is left in other rows
+
+
+def test_ties_stay_where_no_list_can_be_made(pair):
+    rng = np.random.default_rng(11)
+    x, kept = pair.touching(rng), pair.kept
+    force = pair.force(x)
+    for positions in (np.full_like(x, np.nan), x):
+        kept.x[:] = positions
+        list_pairs(pair.tables, positions - pair.tables.rest, kept)
+        use_all(kept)
+        assert kept.counts.full == np.isnan(positions).any()
+    rub = np.zeros((10, 3))
+    add_rubs(pair.tables, kept, rub)
+    assert_allclose(rub, force, rtol=1e-12)

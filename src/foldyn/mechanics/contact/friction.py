@@ -2,8 +2,9 @@
 
 Within a step friction is a function of the state: springs from the anchors and ties of the last
 accepted step, each with no more than mu N, N the present normal force (`planes`, `rubbing`). So a
-step is the return mapping of Coulomb friction by the backward Euler method. A node or pair that
-does not touch is tied where it is, so that it rubs in the step in which it comes to touch.
+step is the return mapping of Coulomb friction by the backward Euler method. A node, or a pair in
+the list, that does not touch is tied where it is, so that it rubs in the step in which it comes to
+touch.
 
 An anchor that goes its way under a mean of the forces mu N at both ends of the step dissipates
 their product; a spring that lets go loses what it holds.

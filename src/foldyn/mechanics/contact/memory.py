@@ -28,10 +28,9 @@ class Memory(NamedTuple):
     d0: NDArray  # (2, m) m
     gap: NDArray  # (2, m) distance less d0 when they were listed, m
     near: NDArray  # (2, m) pairs that may come within d0 in this step
-    tie: (
-        NDArray  # (2, m, 4) with friction between panels, else (2, 0, 4): where a pair is tied (see
-    )
-    # `pairs.weights_of`), the normal force when it was, N, 0 if it is not, the spring's stretch, m
+    # with friction between panels, else (2, 0, 4): where a pair is tied (see `pairs.weights_of`),
+    # the normal force when it was, N, 0 if it is not, and the stretch of its spring, m
+    tie: NDArray  # (2, m, 4)
     anchor: NDArray  # (q, n, 4) where friction's spring is tied on the plane, m, and the normal
     # force when it was, N; 0 if it is not
     friction: NDArray  # (q, n, 4) gradient of friction, N, and the normal force at the last force

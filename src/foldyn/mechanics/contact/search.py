@@ -14,7 +14,7 @@ from foldyn.jit.compiled import kernel, scalar
 from foldyn.mechanics.contact.motions import farthest
 from foldyn.mechanics.contact.pairs import VERTEX, edge_gap, vertex_gap
 from foldyn.mechanics.contact.share import pass_on
-from foldyn.mechanics.contact.ties import put_ties, take_ties
+from foldyn.mechanics.contact.ties import lay_ties, put_ties, take_ties
 
 CELLS = 8.0  # per node, at most
 THINNEST = 1e-3  # of the skin: where lists are full it is halved, at most to that
@@ -183,6 +183,8 @@ def list_pairs(tables, u, memory):
     counts.listed_first = counts.listed_second = 0
     if not _corners(x, tables.surface, low, high):
         counts.full = 1
+        if tables.friction > 0.0:
+            lay_ties(memory, tied, ties)
         return
     e = len(tables.edges)
     middle, half, none, mean = np.empty((e, 3)), np.zeros(3), np.zeros(3), 0.0
@@ -210,12 +212,14 @@ def list_pairs(tables, u, memory):
         found[1] = _pairs(tables, x, 1, far, skin, low, size, dims, half, start, items, memory)
         room = memory.d0.shape[1]
         if tables.friction > 0.0 and found.max() <= room:
-            put_ties(tables, memory, tied, ties, found)
+            put_ties(tables, memory, tied, ties, skin == tables.skin, found)
         if found.max() <= room:
             break
         skin *= 0.5
         if skin < thinnest:
             counts.full = 1
+            if tables.friction > 0.0:
+                lay_ties(memory, tied, ties)
             return
     counts.full, counts.has_list = 0, 1
     counts.lists += 1

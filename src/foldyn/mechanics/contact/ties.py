@@ -9,6 +9,7 @@ import numpy as np
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.mechanics.contact.pairs import VERTEX, gap_of
+from foldyn.mechanics.contact.planes import LEAST
 
 
 @kernel
@@ -51,14 +52,14 @@ def lay_ties(memory, parts, ties):
 
 
 @inner
-def put_ties(tables, memory, parts, ties, found):
+def put_ties(tables, memory, parts, ties, loose, found):
     """Tie pairs of a new list, of found[kind] pairs, by what `take_ties` gave.
 
-    Those that are not in it are added, and found counts them. Fresh lists are ordered by triangles
-    and first edges.
+    Those that are not in it are added, and found counts them; `loose` tells whether also those that
+    did not touch. Fresh lists are ordered by triangles and first edges.
     """
     for kind in range(2):
-        memory.tie[kind, : found[kind], 2] = 0.0
+        memory.tie[kind, : found[kind], 2:] = 0.0
     fresh = found[0], found[1]
     for m in range(len(parts)):
         kind = parts[m, 0]
@@ -69,6 +70,8 @@ def put_ties(tables, memory, parts, ties, found):
                 break
             k += 1
         if k == last or pairs[k, key] != parts[m, 1 + key]:
+            if ties[m, 3] <= LEAST and not loose:
+                continue
             k = found[kind]
             if k == len(pairs):
                 found[kind] = len(pairs) + 1  # no room
