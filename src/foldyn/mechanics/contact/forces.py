@@ -7,9 +7,8 @@ import numpy as np
 from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.edge_edge import edge_edge
 from foldyn.mechanics.contact.hinge_guards import add_guards
-from foldyn.mechanics.contact.pairs import EDGES, VERTEX
 from foldyn.mechanics.contact.planes import add_planes
-from foldyn.mechanics.contact.rubbing import add_rub
+from foldyn.mechanics.contact.rubbing import add_rubs
 from foldyn.mechanics.contact.search import follow, place
 from foldyn.mechanics.contact.share import ENERGY, finish, reaches
 from foldyn.mechanics.contact.vertex_triangle import vertex_triangle
@@ -29,20 +28,14 @@ def _add_pairs(tables, angle, force, memory):
     for k in range(first, last):
         p = memory.near[0, k]
         v, t = memory.pairs[0, p, 0], memory.pairs[0, p, 1]
-        more, pressed, one, two = vertex_triangle(tables, x, force, v, t, memory.d0[0, p])
-        energy += more
-        if tables.friction > 0.0:
-            add_rub(tables, memory, x, force, VERTEX, p, pressed, one, two)
+        energy += vertex_triangle(tables, x, force, v, t, memory.d0[0, p])[0]
         a, b, c = tables.triangles[t, 0], tables.triangles[t, 1], tables.triangles[t, 2]
         low, high = min(low, v, a, b, c), max(high, v + 1, a + 1, b + 1, c + 1)
     first, last = part(team, counts.near_second)
     for k in range(first, last):
         p = memory.near[1, k]
         i, j = memory.pairs[1, p, 0], memory.pairs[1, p, 1]
-        more, pressed, one, two = edge_edge(tables, x, force, i, j, memory.d0[1, p])
-        energy += more
-        if tables.friction > 0.0:
-            add_rub(tables, memory, x, force, EDGES, p, pressed, one, two)
+        energy += edge_edge(tables, x, force, i, j, memory.d0[1, p])[0]
         for e in (i, j):
             a, b = tables.edges[e, 0], tables.edges[e, 1]
             low, high = min(low, a, b), max(high, a + 1, b + 1)
@@ -77,6 +70,8 @@ def add_contact(tables, u, angle, force, memory):
             follow(tables, u, memory)
         into = force if team.size == 1 else share.sums[team.number]
         energy += _add_pairs(tables, angle, into, memory)
+        if tables.friction > 0.0:
+            add_rubs(tables, memory, into)
     if len(tables.planes) > 0:
         energy += add_planes(tables, memory.x, memory, force)
     memory.facts.energy = team.note[team.number, ENERGY] = energy

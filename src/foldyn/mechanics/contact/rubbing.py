@@ -91,10 +91,12 @@ def add_rub(tables, memory, x, force, kind, pair, pressed, p, q):
 
 @kernel
 def add_rubs(tables, memory, force):
-    """Add that of all near pairs, where forces were found last."""
+    """Add that of a member's part of all near pairs, where forces were found last."""
+    team = memory.share.team
     for kind in range(2):
         near = memory.counts.near_first if kind == VERTEX else memory.counts.near_second
-        for k in range(near):
+        first, last = part(team, near)
+        for k in range(first, last):
             pair = memory.near[kind, k]
             if memory.tie[kind, pair, 2] > 0.0:
                 pressed, p, q = pressed_pair(tables, memory, memory.x, kind, pair)
