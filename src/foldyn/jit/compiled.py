@@ -69,7 +69,7 @@ def _decorator(*, inner: bool = False, **options: Any) -> Callable[..., Any]:
     # error_model="numpy": a division by zero gives inf or nan (looked for by the solvers) instead
     # of a branch in every loop
     # nothing calls by address what has a name here; but without Numba's wrapper for that LLVM puts
-    # the function into the one for Python, with its counts of references: contact took twice as long
+    # the function into the one for Python, which counts references: contact took twice as long
     options |= {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
     compiled = njit(error_model="numpy", pipeline_class=Alone, **options)
 
