@@ -30,16 +30,7 @@ MODES_TEXT = f"""{HELD_MIURA_TEXT}[analysis]
 kind = "modes"
 count = 4
 """
-LIFTED_TEXT = """[pattern]
-kind = "simple_fold"
-a = 1.0
-b = 1.0
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-[[supports]]
+LIFTED_TEXT = f"""{FOLD_TEXT}[[supports]]
 nodes = [0, 1, 2, 3]
 axes = "xyz"
 [[contact.planes]]

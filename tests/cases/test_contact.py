@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import foldyn as fd
-from case_texts import LIFTED_TEXT
+from case_texts import FOLD_TEXT, LIFTED_TEXT
 from foldyn.cases.contact import contact_from
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
@@ -73,24 +73,13 @@ def test_tables_name_what_is_wrong(table, message):
 def test_a_case_file_has_contact(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(
-        """
-[pattern]
-kind = "simple_fold"
-a = 1.0
-b = 1.0
-dihedral = 60
-[sheet]
-youngs_modulus = 1e6
-poissons_ratio = 0.25
-thickness = 0.01
-density = 1.0
-[contact]
+        f"""{FOLD_TEXT}[contact]
 friction = 0.2
 [[contact.planes]]
 point = [0, 0, -0.1]
 normal = [0, 0, 1]
 motion = [0, 0, 0.2]
-history = { kind = "ramp", duration = 1.0 }
+history = {{ kind = "ramp", duration = 1.0 }}
 [analysis]
 kind = "dynamics"
 method = "rk4"

@@ -35,3 +35,15 @@ def plates(case: fd.Case, path) -> tuple[np.ndarray, np.ndarray]:
     """Force of the first plane along its normal, N, and length of the sheet along x, m."""
     x = (case.structure.nodes + path.displacement.values)[:, :, 0]
     return path.plane_force.values[:, 0] @ case.contact.planes[0].normal, np.ptp(x, axis=1)
+
+
+def cycle(dragged) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Work of each cycle of a sheet that is dragged forth and back, what it loses, and its energy.
+
+    dragged : returns its path over some load factors, first. The energy is that at cycles' ends.
+    """
+    turn = np.append(np.linspace(0.0, 0.02, 61), 2.0)  # the springs turn within the first ones
+    path = dragged([0.0, *(1.0 - turn), *(turn[1:] - 1.0)])[0]
+    ends = np.flatnonzero(path.load_factor.values == 1.0)
+    work, lost = (np.diff(path[name].values[ends]) for name in ("work", "dissipated"))
+    return work, lost, sum(path[group].values for group in ("strain_bars", "contact"))[ends]
