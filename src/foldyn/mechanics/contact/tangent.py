@@ -11,15 +11,7 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.contact.distances import closest_of_segments, point
 from foldyn.mechanics.contact.edge_edge import edge_edge_tangent
 from foldyn.mechanics.contact.hinge_guards import TURN, gradient_at
-from foldyn.mechanics.contact.pairs import (
-    EDGES,
-    VERTEX,
-    closest_of,
-    edge_gap,
-    nodes_of,
-    vertex_gap,
-    weights_of,
-)
+from foldyn.mechanics.contact.pairs import EDGES, VERTEX, edge_gap, nodes_of, vertex_gap
 from foldyn.mechanics.contact.planes import farthest_stretch, height, stretch_of
 from foldyn.mechanics.contact.potential import barrier
 from foldyn.mechanics.contact.rubbing_tangent import add_rub_tangent
@@ -66,30 +58,6 @@ def pair_tangents(tables, memory, first, second, nodes, blocks):
             edge_edge_tangent(tables, x, one, other, d0, blocks[k])
         if tables.friction > 0.0:
             add_rub_tangent(tables, memory, x, kind, pair, 1.0, blocks[k])
-
-
-@kernel
-def pair_directions(tables, memory, first, second, nodes, weights, normals):
-    """Nodes (k, 4), weights (k, 4) and direction (k, 3) of the distances of some listed pairs.
-
-    After them whether friction ties each (k,).
-    """
-    tied = np.zeros(first.size + second.size, np.bool_)
-    for k in range(first.size + second.size):
-        kind = VERTEX if k < first.size else EDGES
-        pair = first[k] if kind == VERTEX else second[k - first.size]
-        one, other = memory.pairs[kind, pair, 0], memory.pairs[kind, pair, 1]
-        own = nodes_of(tables.triangles, tables.edges, kind, one, other)
-        p, q, _ = closest_of(tables.triangles, tables.edges, memory.x, kind, one, other)
-        nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3] = own
-        weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3] = weights_of(kind, p, q)
-        for c in range(3):
-            normals[k, c] = 0.0
-            for i in range(4):
-                normals[k, c] += weights[k, i] * memory.x[nodes[k, i], c]
-        normals[k] /= math.sqrt((normals[k] * normals[k]).sum())
-        tied[k] = tables.friction > 0.0 and memory.tie[kind, pair, 2] > 0.0
-    return tied
 
 
 @kernel
