@@ -35,8 +35,9 @@ def kernels(tmp_path, monkeypatch):
 
     def make(text: str = "return 2.0 * x"):
         path.write_text(f"def double(x):\n    {text}\n", "utf-8")
-        for cached in (sources.digest, sources.imported, sources._text, sources._content):
-            cached.cache_clear()
+        for cached in vars(sources).values():
+            if hasattr(cached, "cache_clear"):
+                cached.cache_clear()
         spec = importlib.util.spec_from_file_location(f"double{next(_numbers)}", path)
         module = importlib.util.module_from_spec(spec)
         exec(compile(path.read_text("utf-8"), str(path), "exec"), module.__dict__)

@@ -16,10 +16,9 @@ from numba import typeof
 import foldyn as fd
 from foldyn.jit import sources
 from foldyn.jit.kept import _spelled
-from foldyn.jit.sources import PACKAGE, digest, imports, made_from
+from foldyn.jit.sources import PACKAGE, digest, imports, made_from, read
 
 FILES = sorted(PACKAGE.rglob("*.py"))
-KERNELS = [path for path in FILES if "foldyn.jit.compiled import" in path.read_text("utf-8")]
 HALF_SINE = ("s = math.sin(math.pi * t / a)", "s = 3.0 * math.sin(math.pi * t / a)")
 LAW = (
     "def moment(theta, rest):",
@@ -51,23 +50,99 @@ def test_kernels_follow_the_sources_of_what_they_call(tmp_path, named):
         assert ask(package, **where) == (1.0, 1.0, 1)
 
 
-def test_what_a_kernel_is_made_from():
-    def names(path: str) -> set[str]:
-        return {found.relative_to(PACKAGE).as_posix() for found in made_from(PACKAGE / path)}
+def files_of(path: str, name: str) -> set[str]:
+    return {found.relative_to(PACKAGE).as_posix() for found, _ in made_from(PACKAGE / path, name)}
 
+
+def test_what_a_kernel_is_made_from():
     law, switch, fields = "materials/superlinear.py", "materials/switch.py", "mechanics/model.py"
-    assert {law, switch, fields, "jit/compiled.py"} <= names("shells/kernels.py")
-    assert {law, switch, fields, "cases/waveforms.py"} <= names("dynamics/rk4.py")
+    shell = files_of("shells/kernels.py", "ShellModel")
+    assert {law, switch, fields, "jit/compiled.py"} <= shell
+    loop = files_of("dynamics/rk4.py", "advance")
+    assert {law, switch, fields, "cases/waveforms.py"} <= loop
     # and not from what only tells or draws, which would compile all anew with every change
-    others = {"cases/document.py", "dynamics/driver.py", "shells/kernels.py"}
-    assert not others & names("dynamics/rk4.py")
-    assert "dynamics/rk4.py" not in names("mechanics/force.py")
+    others = {"cases/document.py", "cases/case.py", "dynamics/driver.py", "shells/kernels.py"}
+    assert not others & loop
+    assert "dynamics/rk4.py" not in files_of("mechanics/force.py", "internal_force")
+
+
+@pytest.fixture
+def package(monkeypatch, tmp_path):
+    """A package with a kernel `total`; makes a digest of it after some files were written."""
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
+    files = {
+        "kernels.py": (
+            "from foldyn.jit.compiled import kernel, overload\n"
+            "from foldyn.values import SCALE, other\n\n\n"
+            "def told(x):\n    raise ValueError('a message')\n\n\n"
+            "def general(x):\n    raise NotImplementedError\n\n\n"
+            "@overload(general)\ndef _general(x):\n    return lambda x: 3.0 * x\n\n\n"
+            "@kernel\ndef total(x):\n    return SCALE * general(x) + A\n\n\n"
+            "@kernel\ndef alone(x):\n    return x\n\n\n"
+            "A, B = 1.0, 2.0\n"
+        ),
+        "values.py": "SCALE = FACTOR * 2.0\nFACTOR = 3.0\n\n\ndef other():\n    return 'said'\n",
+        "jit/compiled.py": "def kernel(function):\n    return function\n",
+    }
+
+    def digest_of(name, path="kernels.py", old="", new=""):
+        texts = dict(files)
+        assert old in texts[path]
+        texts[path] = texts[path].replace(old, new) if old else texts[path]
+        for file, text in texts.items():
+            (tmp_path / file).parent.mkdir(exist_ok=True)
+            (tmp_path / file).write_text(text, "utf-8")
+        for found in vars(sources).values():
+            if hasattr(found, "cache_clear"):
+                found.cache_clear()
+        return digest(tmp_path / "kernels.py", name)
+
+    yield digest_of
+    for found in vars(sources).values():
+        if hasattr(found, "cache_clear"):
+            found.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("path", "old", "new", "same"),
+    [
+        ("kernels.py", "SCALE *", "SCALE +", False),
+        ("kernels.py", "3.0 * x", "4.0 * x", False),  # what stands in for a function that it calls
+        ("kernels.py", "A, B = 1.0", "A, B = 5.0", False),
+        ("values.py", "FACTOR = 3.0", "FACTOR = 4.0", False),
+        ("jit/compiled.py", "return function", "return None", False),
+        ("kernels.py", "a message", "another\\n message", True),
+        ("kernels.py", "def told", "\n\ndef told", True),  # lines above do not matter
+        ("kernels.py", "return x\n", "return 2.0 * x\n", True),
+        ("values.py", "said", "told", True),
+    ],
+)
+def test_a_kernel_depends_on_what_it_names(package, path, old, new, same):
+    before = package("total")
+    assert (package("total", path, old, new) == before) == same
+    assert package("alone") != before
+
+
+def test_a_message_compiles_nothing_anew(tmp_path):
+    copy = copy_package(tmp_path)
+    where = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    ask(copy, **where)
+    for path, old in {
+        "cases/waveforms.py": '"""',
+        "cases/histories.py": 'f"',
+        "materials/superlinear.py": '"""',
+        "errors.py": '"""',
+    }.items():
+        text = (copy / path).read_text("utf-8")
+        edit(copy / path, old, old + " ") if old == 'f"' else edit(copy / path, text, "\n" + text)
+    assert ask(copy, **where)[2] == 1
 
 
 def test_kernels_for_a_model_are_made_from_the_file_of_its_class():
     pattern = fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=60)
     model = fd.shell(pattern, fd.Sheet(1e6, 0.25, 0.01), divisions=1).model
-    assert _spelled(typeof((model,))).count(digest(PACKAGE / "shells/kernels.py")) == 1
+    own = digest(PACKAGE / "shells/kernels.py", type(model).__name__)
+    assert _spelled(typeof((model,))).count(own) == 1
 
 
 def test_imports_are_read_as_python_reads_them():
@@ -80,7 +155,8 @@ def test_imports_are_read_as_python_reads_them():
                     wanted |= {(node.module, name.name) for name in node.names}
             elif isinstance(node, ast.Import):
                 wanted |= {(name.name, "") for name in node.names if name.name[:6] == "foldyn"}
-        assert wanted <= set(imports(path)), path
+        found = {(module, name) for module, name, _ in imports(path.read_text("utf-8"))}
+        assert wanted <= found, path
 
 
 def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_path):
@@ -97,27 +173,27 @@ def test_names_that_a_package_passes_on_lead_to_their_files(monkeypatch, tmp_pat
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, "utf-8")
     monkeypatch.setattr(sources, "PACKAGE", tmp_path)
-    for cached in (sources.imported, sources._home):
+    for cached in (sources.read, sources._imported, sources._home):
         monkeypatch.setattr(sources, cached.__name__, cached.__wrapped__)
-    found = {path.relative_to(tmp_path).as_posix() for path in made_from(tmp_path / "kernels.py")}
+    found = {path.relative_to(tmp_path).as_posix() for path in read(tmp_path / "kernels.py")}
     wanted = {"kernels.py", "laws/one.py", "values.py", "tools/__init__.py", "tools/deep/more.py"}
     assert found == wanted
 
 
 def test_tools_and_their_variables_count(monkeypatch):
-    source = KERNELS[0]
-    before = digest.__wrapped__(source)
+    source = PACKAGE / "mechanics/force.py", "internal_force"
+    before = digest.__wrapped__(*source)
     for module, version in ((sources.numba, "0.1"), (sources.np, "0.1"), (sources.llvmlite, "0.1")):
         with monkeypatch.context() as patch:
             patch.setattr(module, "__version__", version)
             patch.setattr(sources, "_tools", sources._tools.__wrapped__)
-            assert digest.__wrapped__(source) != before
+            assert digest.__wrapped__(*source) != before
     reader = sources.config._env_reloader
     for name, counts in (("NUMBA_OPT", True), ("NUMBA_CACHE_DIR", False)):
         with monkeypatch.context() as patch:
             patch.setattr(reader, "old_environ", reader.old_environ | {name: "other"})
             patch.setattr(sources, "_tools", sources._tools.__wrapped__)
-            assert (digest.__wrapped__(source) != before) == counts
+            assert (digest.__wrapped__(*source) != before) == counts
 
 
 def test_all_that_compiles_is_compiled_in_one_place():

@@ -25,7 +25,7 @@ import tempfile
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
 from foldyn.errors import FoldynWarning
-from foldyn.jit.sources import digest
+from foldyn.jit.sources import digest, read
 from foldyn.writing import remove_leftovers, write_bytes
 
 REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
@@ -51,11 +51,17 @@ class Kept(_Cache):
     def __init__(self, function: Callable[..., Any]) -> None:
         source = Path(inspect.getfile(function)).resolve()
         name = function.__qualname__.replace("<", "").replace(">", "")
-        self._code = function.__code__.co_code
+        read(source)
+        self._source = source, function.__qualname__.partition(".")[0]
+        code = function.__code__
+        self._code = code.co_code, code.co_names, [k for k in code.co_consts if _plain(k)]
         self._folder = folder_for(source.parent)
         self._stem = f"{source.stem}.{name}-"
-        self._version = f"{self._stem}{function.__code__.co_firstlineno}.{digest(source)}"
         self.enable()
+
+    @cached_property
+    def _version(self) -> str:
+        return f"{self._stem}{digest(*self._source)}"
 
     @property
     def cache_path(self) -> str | None:
@@ -112,7 +118,7 @@ class Kept(_Cache):
         assert self._folder is not None
         files: dict[str, list[Path]] = {}
         for path in self._folder.glob(f"{self._stem}*"):
-            made_from = path.name[len(self._stem) :].split(".")[1:2]
+            made_from = path.name[len(self._stem) :].split(".")[:1]
             files.setdefault("".join(made_from), []).append(path)
         with suppress(OSError):  # another process does the same
             by_age = sorted(files, key=lambda made: max(p.stat().st_mtime for p in files[made]))
@@ -130,8 +136,13 @@ def _spelled(kind: Any) -> str:
     owner = getattr(kind, "instance_class", type(kind))
     text = f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
     # kernels that stand for a general function are chosen by the class, and stand beside it
-    own = digest(Path(inspect.getfile(owner)).resolve()) if hasattr(kind, "fields") else ""
-    return text + own
+    if not hasattr(kind, "fields"):
+        return text
+    return text + digest(Path(inspect.getfile(owner)).resolve(), owner.__name__)
+
+
+def _plain(constant: Any) -> bool:
+    return isinstance(constant, int | float | complex | bool)
 
 
 def _read(path: Path) -> Any:

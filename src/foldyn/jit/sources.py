@@ -1,9 +1,13 @@
 """Which sources a kernel is made from, found in the sources themselves.
 
-A kernel holds the compiled functions and the numbers that it takes from other files, and knows the
-fields of named tuples that are defined in others still. So it is made from its own file and from
-all files of the package that this one imports, directly or through others. Their contents are
-looked at, never their times: a copy, a checkout or a clock may set these as it likes.
+A kernel holds the compiled functions and the numbers that it names, and knows the fields of the
+named tuples that it names. So it is made from its own text and from the statements that define
+these names, in its file or in those of the package that it imports them from, and so on; nothing
+else counts: neither functions that run in Python alone, nor messages, nor lines above. Contents
+are looked at, never times: a copy, a checkout or a clock may set these as it likes.
+
+Statements are told apart by their first column, and names are all words in their text. Words that
+are no names, as in comments, make a kernel depend on more than it is made from, never on less.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import llvmlite
 import numba
@@ -23,47 +28,113 @@ from numba.core import config
 PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(
     rf"^[ \t]*(?:from ({PACKAGE.name}[\w.]*) import (\([^)]*\)|[^\n#]*)"
-    rf"|import ({PACKAGE.name}[\w.]*))",
+    rf"|import ({PACKAGE.name}[\w.]*)(?: as (\w+))?)",
     re.MULTILINE,
 )
+_DOCSTRING = re.compile(r'^\s*[rb]?"""[\s\S]*?"""', re.MULTILINE)
+_STATEMENT = re.compile(r"^(?=[@\w])", re.MULTILINE)
+_DEFINES = re.compile(r"(?:def|class) +(\w+)|(\w+)(?: *:[^=\n]*)? *=(?!=)")
+_WORD = re.compile(r"[A-Za-z_]\w*")
+# a general function, by its name or by the class of an argument
+_STANDS_FOR = re.compile(r"^@overload\w*\(\s*(\w+)|\.instance_class is (?:not )?(\w+)", re.M)
 _NO_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")  # variables that leave the code as it is
+# where kernels are kept leaves their code as it is; the rest of `jit` may change Numba itself
+_KEEPING, _COMPILING = ("kept.py", "sources.py"), PACKAGE / "jit"
+REST = ""  # name of the statements that define no name, such as A, B = 1, 2
+
+Part = tuple[Path, str]  # the statements of a file that define a name
+
+
+class Module(NamedTuple):
+    """What kernels may take from a file."""
+
+    parts: dict[str, str]  # statements by the name that they define
+    names: dict[str, tuple[str, str]]  # module and name there, "" for all of it, by name here
+    stand_in: dict[str, set[str]]  # parts that stand in for the function or the class of a name
 
 
 @cache
-def digest(source: Path) -> str:
-    """Digest of all that the kernels of a file are made from, "1f0c6a2b9d3e4f58"."""
-    content = hashlib.sha256(_tools().encode())
-    for path in sorted(made_from(source)):
-        inside = path.is_relative_to(PACKAGE)
-        content.update((path.relative_to(PACKAGE).as_posix() if inside else path.name).encode())
-        content.update(_content(path))
-    return content.hexdigest()[:16]
+def digest(source: Path, name: str) -> str:
+    """Digest of all that a function or class of a file is made from, "1f0c6a2b9d3e4f58"."""
+    parts = sorted(_content(part) for part in made_from(source, name))
+    return hashlib.sha256(_tools().encode() + b"".join(parts)).hexdigest()[:16]
 
 
-def made_from(source: Path) -> set[Path]:
-    """Files that the kernels of a file are made from."""
-    files, ahead = {source}, [source]
+@cache
+def _content(part: Part) -> bytes:
+    """Digest of a part, with its place in the package."""
+    path, name = part
+    place = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else path.name
+    return hashlib.sha256(f"{place} {name}\n{_module(path).parts.get(name)}".encode()).digest()
+
+
+def made_from(source: Path, name: str) -> set[Part]:
+    """Parts of files that a function or class of a file is made from."""
+    found: set[Part] = set()
+    ahead = [(source, name)]
     while ahead:
-        new = imported(ahead.pop()) - files
-        files |= new
-        ahead += new
-    return files
+        part = ahead.pop()
+        if part not in found:
+            found.add(part)
+            ahead += _needed(*part)
+    return found
 
 
 @cache
-def imported(source: Path) -> frozenset[Path]:
-    """Files of the package that a file imports from."""
-    return frozenset(path for module, name in imports(source) for path in _home(module, name))
+def _needed(path: Path, name: str) -> frozenset[Part]:
+    """Parts that a part of a file names, and those that stand in for it."""
+    own = _module(path)
+    words = set(_WORD.findall(own.parts.get(name, "")))
+    needed = {(path, word) for word in words & own.parts.keys()} | {(path, REST)}
+    needed |= {(path, part) for part in own.stand_in.get(name, ())}
+    for word in words & own.names.keys():
+        module, original = own.names[word]
+        for home in _home(module, original):
+            parts = _module(home).parts
+            if home.parent == _COMPILING:
+                wanted = parts.keys() if home.name not in _KEEPING else set()
+            elif original in parts:
+                wanted = {original}
+            elif original and home.stem != original:
+                wanted = parts.keys()  # nobody knows which
+            else:  # the word is a module
+                wanted = words & parts.keys() | {REST}
+            needed |= {(home, part) for part in wanted}
+    return frozenset(needed)
 
 
-def imports(source: Path) -> Iterator[tuple[str, str]]:
-    """Imports of a file from the package, (module, name); no name where all of it is imported."""
-    for module, names, whole in _IMPORT.findall(_text(source)):
+@cache
+def _module(path: Path) -> Module:
+    """What kernels may take from a file."""
+    text = _DOCSTRING.sub("", _text(path))
+    names = {alias: (module, name) for module, name, alias in imports(text)}
+    parts, stand_in, decorators = {REST: ""}, {}, ""
+    for statement in _STATEMENT.split(text):
+        if statement.startswith("@"):
+            decorators += statement
+            continue
+        defined = _DEFINES.match(statement)
+        name = (defined.group(1) or defined.group(2)) if defined else REST
+        if not statement.startswith(("from ", "import ")):
+            parts[name] = parts.get(name, "") + decorators + statement
+        if "@overload" in decorators:
+            for target in _STANDS_FOR.findall(decorators + statement):
+                stand_in.setdefault("".join(target), set()).add(name)
+        decorators = ""
+    return Module(parts, names, stand_in)
+
+
+def imports(text: str) -> Iterator[tuple[str, str, str]]:
+    """Imports of a file from the package: module, name, and what it is called here.
+
+    No name where a module is imported as a whole.
+    """
+    for module, names, whole, alias in _IMPORT.findall(text):
         if whole:
-            yield whole, ""
+            yield whole, "", alias or PACKAGE.name
         for name in re.sub(r"#.*", "", names).strip("() \n").split(","):
             if name.strip():
-                yield module, name.split()[0]
+                yield module, name.split()[0], name.split()[-1]
 
 
 @cache
@@ -76,24 +147,36 @@ def _home(module: str, name: str) -> frozenset[Path]:
         return _home(f"{module}.{name}", "")
     if name and (place / f"{name}.py").is_file():
         return frozenset([place / f"{name}.py"])
-    start = place / "__init__.py"
-    there = [(origin, other) for origin, other in imports(start) if origin != module]
-    passed_on = [origin for origin, other in there if other == name]
-    passed_on = passed_on or [origin for origin, other in there if other == "*"]
+    there = [pair for pair in imports(_text(place / "__init__.py")) if pair[0] != module]
+    passed_on = [origin for origin, other, _ in there if other == name]
+    passed_on = passed_on or [origin for origin, other, _ in there if other == "*"]
     if name and passed_on:
         return frozenset(path for origin in passed_on for path in _home(origin, name))
     return frozenset(place.rglob("*.py"))  # the folder as a whole, or nobody knows which file
 
 
 @cache
-def _text(path: Path) -> str:
-    """Text of a file when this process first looked: before it is imported, or soon after."""
-    return path.read_text("utf-8")
+def read(source: Path) -> frozenset[Path]:
+    """Read a file and those that it needs while they are as they were imported; returns them."""
+    files, ahead = {source}, [source]
+    while ahead:
+        new = _imported(ahead.pop()) - files
+        files |= new
+        ahead += new
+    return frozenset(files)
 
 
 @cache
-def _content(path: Path) -> bytes:
-    return hashlib.sha256(_text(path).encode()).digest()
+def _imported(source: Path) -> frozenset[Path]:
+    """Files of the package that a file imports from."""
+    found = imports(_text(source))
+    return frozenset(path for module, name, _ in found for path in _home(module, name))
+
+
+@cache
+def _text(path: Path) -> str:
+    """Text of a file when this process first looked: before it is imported, or soon after."""
+    return path.read_text("utf-8")
 
 
 @cache
