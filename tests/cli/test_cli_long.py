@@ -113,6 +113,18 @@ def test_another_case_is_refused_or_replaces(place, monkeypatch, capsys):
     assert not list((place / "case-results").glob("*.unfinished"))
 
 
+def test_a_result_that_a_script_writes_is_refused_before_anything_runs(place, capsys):
+    results = place / "case-results"
+    results.mkdir()
+    with Keeping(results / FILES[1]).held():
+        assert ran() == 2
+        said = capsys.readouterr().err
+        assert f"{FILES[1]}: is being written by process {os.getpid()} on" in said
+        assert not list(results.glob("*.nc"))
+    assert ran() == 0
+    assert sorted(path.name for path in results.glob("*.nc*")) == FILES
+
+
 def test_what_has_no_checkpoints(place, capsys):
     assert ran("--resume", "--replace") == 2
     assert "leave out --replace" in capsys.readouterr().err

@@ -10,10 +10,10 @@ import pytest
 
 import foldyn as fd
 from foldyn.cli import stamp
-from foldyn.cli.lock import NAME as LOCK
-from foldyn.cli.lock import locked
+from foldyn.cli.folder import LOCK
 from foldyn.cli.main import main
 from foldyn.dynamics import Motion
+from foldyn.lock import locked
 
 RULES = '["panel", "centroid"]'
 OLD = ("case-results/result-panel.nc", "case-results/result-centroid.nc")
@@ -135,7 +135,7 @@ def test_results_without_a_stamp_that_would_stay_beside_new_ones(workplace, edit
 
 def test_a_folder_that_another_run_holds(workplace, miura) -> None:
     Path("case-results").mkdir()
-    with locked(Path("case-results")):
+    with locked(Path("case-results", LOCK)):
         bad = workplace.run(miura)
         assert (bad.status, bad.out, bad.new) == (2, "", [])
         assert "results folder case-results: another run writes to it (process " in bad.err

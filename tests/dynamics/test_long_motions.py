@@ -228,13 +228,34 @@ def test_what_is_damaged_is_refused(tmp_path):
     folder = tmp_path / "run.nc.unfinished"
     content = (folder / "velocity.f8").read_bytes()
     (folder / "velocity.f8").write_bytes(content[:-100])
-    with pytest.raises(InputError, match="is damaged: it lacks samples"):
+    with pytest.raises(
+        InputError, match=r"velocity\.f8: is damaged: samples .* are missing or have changed"
+    ):
+        simulated("sheet", **options, resume=True)
+    changed = np.frombuffer(content).copy()
+    changed[len(changed) // 3] += 0.4
+    (folder / "velocity.f8").write_bytes(changed.tobytes())
+    with pytest.raises(InputError, match=r"velocity\.f8: is damaged"):
         simulated("sheet", **options, resume=True)
     (folder / "velocity.f8").write_bytes(content)
     checkpoint = (folder / keeping.CHECKPOINT).read_bytes()
     (folder / keeping.CHECKPOINT).write_bytes(checkpoint[: len(checkpoint) // 2])
-    with pytest.raises(InputError, match="is damaged; remove that folder to begin anew"):
+    with pytest.raises(InputError, match=r"is damaged, or .*; remove that folder to begin anew"):
         simulated("sheet", **options, resume=True)
+
+
+def test_samples_that_change_while_it_runs_do_not_become_a_result(tmp_path):
+    file = tmp_path / "run.nc"
+
+    def harm(now):
+        if now.time > 0.9:
+            with (tmp_path / "run.nc.unfinished" / "displacement.f8").open("r+b") as samples:
+                samples.seek(5000)
+                samples.write(b"wrong")
+
+    with pytest.raises(ComputationError, match=r"displacement\.f8: was changed"):
+        simulated("sheet", duration=1.0, every=0.01, store=file, checkpoint=OFTEN, progress=harm)
+    assert not file.exists()
 
 
 # ------------------------------------------------------------------ processes
@@ -258,9 +279,15 @@ def started(options, limit=None):
     )  # fmt: skip
 
 
+def refused(other: int, options) -> None:
+    """Another process that writes there is named."""
+    with pytest.raises(InputError, match=rf"run\.nc: is being written by process {other} on"):
+        simulated(**options)
+
+
 @pytest.mark.filterwarnings("ignore::foldyn.errors.FoldynWarning")
 @pytest.mark.parametrize("kills", [3, pytest.param(10, marks=pytest.mark.slow)])
-def test_sigkill_at_random_moments(tmp_path, kills):
+def test_sigkill_at_random_moments_with_a_second_process(tmp_path, kills):
     file, chance = tmp_path / "run.nc", random.Random(kills)
     options = {**LONG, "store": str(file), "resume": True}
     checkpoint = tmp_path / "run.nc.unfinished" / keeping.CHECKPOINT
@@ -272,6 +299,11 @@ def test_sigkill_at_random_moments(tmp_path, kills):
             if checkpoint.exists():
                 made.add(checkpoint.stat().st_mtime_ns)
             if len(made) > 3:
+                if not killed:
+                    process.send_signal(signal.SIGSTOP)  # in the midst of it, as long as it takes
+                    for resume in (True, False):
+                        refused(process.pid, {**LONG, "store": file, "resume": resume})
+                    process.send_signal(signal.SIGCONT)
                 time.sleep(chance.uniform(0.0, 0.1))  # some more, and one may be being made
                 process.send_signal(signal.SIGKILL)
                 break

@@ -10,12 +10,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from foldyn.cli import stamp
-from foldyn.cli.lock import LockedError, locked
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.stamp import Owner
 from foldyn.errors import ComputationError, FoldynError, InputError
+from foldyn.lock import LockedError, locked
 from foldyn.writing import remove_leftovers
 
+LOCK = ".foldyn.lock"
 _RESULT = re.compile(r"result(-\w+)?\.nc")
 
 
@@ -207,7 +208,7 @@ def held(
     """
     places = [folder, *(folder / name for name in inside)]
     try:
-        with _made(folder, out, names), locked(folder):
+        with _made(folder, out, names), locked(folder / LOCK):
             old = _old(folder, _place(folder, out), names, owner, replace)
             results = Results(folder, owner, drawn, old)
             remove_leftovers(*places)

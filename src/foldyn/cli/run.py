@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -73,7 +74,10 @@ def run(given: Namespace) -> Path:
     introduction = _introduction(case_file, task, caught, say)
     owner = Owner.of(command, path, folder)
     pages = ["report.html"] if page else []
-    with held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept:
+    with (
+        held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept,
+        _held_results(task),
+    ):
         with noted_warnings() as noted:
             bar = not given.quiet and sys.stderr.isatty()
             done = _computed(task, kept, introduction, bar, say)
@@ -87,6 +91,16 @@ def run(given: Namespace) -> Path:
                 written = case_file.analysis.page(case_file, done, folder, call, given.figures)
             say(f"wrote {'figures and ' if drawn else ''}{written}")
     return folder
+
+
+@contextmanager
+def _held_results(task: list[Computation]) -> Iterator[None]:
+    """Let no other process keep motions in the files of these, as a script may that stores one."""
+    with ExitStack() as stack:
+        for one in task:
+            if isinstance(one.compute, Kept) and one.compute.kept:
+                stack.enter_context(one.compute.kept.held())
+        yield
 
 
 def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:

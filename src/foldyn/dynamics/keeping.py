@@ -1,19 +1,21 @@
 """A motion that is kept on the disk while it runs, so that it can go on after whatever ends it.
 
 Beside the file of its result stands a folder with its samples, which only grow, and a checkpoint:
-how many of them count, and all on which the next steps depend. The checkpoint is replaced whole,
-after its samples are on the disk.
+how many of them count, their checksums, and all on which the next steps depend. The checkpoint is
+sealed and replaced whole, after its samples are on the disk. One process at a time keeps a motion
+in a file: it holds the lock beside it.
 """
 
 from __future__ import annotations
 
-import io
+import errno
 import json
 import math
 import os
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -21,16 +23,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import ComputationError, InputError
+from foldyn.lock import LockedError, locked
 from foldyn.results.columns import Columns
 from foldyn.results.netcdf import check_target, load
+from foldyn.results.seal import seal, sound
 from foldyn.values import number, show
-from foldyn.writing import remove_leftovers, write_bytes
+from foldyn.writing import remove_leftovers, whole
 
 if TYPE_CHECKING:
     import xarray
 
 SECONDS = 60.0
 """Time between checkpoints where the user does not say."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk, or of what one may use of it, that is full."""
 CHECKPOINT = "checkpoint.npz"
 _ABOUT = "about"
 KEY = "motion"
@@ -87,6 +93,31 @@ class Keeping:
         except OSError:  # a folder that is gone: writing will tell
             return math.inf
 
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let no other process write to the file, or to what is kept beside it.
+
+        Raises
+        ------
+        InputError
+            Another process does, or nothing can be written there.
+        """
+        lock = self.file.with_name(f".{self.file.name}.lock")
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(locked(lock))
+            except LockedError as other:
+                raise InputError(
+                    f"{self.file}: is being written by {other}; wait until it ends, or name "
+                    "another file"
+                ) from None
+            except OSError as error:
+                why = error.strerror or error
+                raise InputError(
+                    f"{self.file}: cannot be written ({why}); choose another folder"
+                ) from None
+            yield
+
     def finished(self, key: str) -> xarray.Dataset | None:
         """The result, if it is there whole, is that of a motion, and is to be gone on with."""
         if not self.resume or self.folder.exists() or not self.file.is_file():
@@ -133,13 +164,12 @@ class Keeping:
         told = kept.pop(_ABOUT)
         self._compare(told["motion"])
         count = int(told["samples"])
-        self.columns = Columns(self.folder, rows)
-        if not self.columns.hold(count):
+        self.columns = Columns(self.folder, rows, count, told["sums"])
+        if damaged := self.columns.damaged():
             raise InputError(
-                f"{self.folder}: is damaged: it lacks samples that its checkpoint counts; "
-                f"{self.how[1]} to begin anew"
+                f"{damaged}: is damaged: samples that the checkpoint counts are missing or have "
+                f"changed; {self.how[1]} to begin anew"
             )
-        self.columns.cut(count)
         self.begun, self._reached = True, told["reached"]
         return kept
 
@@ -160,16 +190,27 @@ class Keeping:
 
     def checkpoint(self, standing: Mapping[str, NDArray], reached: float) -> None:
         """Make a checkpoint at the time (s) reached, after `append` of all samples until then."""
-        told = {"motion": self._about, "samples": self.columns.count, "reached": reached}
+        told = {
+            "motion": self._about, "samples": self.columns.count, "sums": self.columns.sums,
+            "reached": reached,
+        }  # fmt: skip
         text = np.frombuffer(json.dumps(told).encode(), np.uint8)
-        content = io.BytesIO()
-        np.savez(content, **{_ABOUT: text, **standing})  # type: ignore[arg-type]
         try:
             self.columns.settle()
-            write_bytes(self.folder / CHECKPOINT, content.getvalue())
+            with whole(self.folder / CHECKPOINT) as part:
+                np.savez(part, **{_ABOUT: text, **standing})  # type: ignore[arg-type]
+                seal(part)
         except OSError as error:
             self._fail(error)
         self._reached, self._last = reached, time.monotonic()
+
+    def check(self) -> None:
+        """Raise `ComputationError` where samples are not those that were written."""
+        if self.begun and (damaged := self.columns.damaged()):
+            raise ComputationError(
+                f"{damaged}: was changed by something else while the motion ran, so the result "
+                f"would be wrong and is not written{self.summary}"
+            )
 
     @property
     def summary(self) -> str:
@@ -189,12 +230,17 @@ class Keeping:
         if not path.exists():
             return None
         try:
+            if not sound(path):
+                raise ValueError
             with np.load(path, allow_pickle=False) as stored:
                 kept: dict[str, Any] = {name: stored[name] for name in stored.files}
             kept[_ABOUT] = json.loads(kept[_ABOUT].tobytes())
             float(kept[_ABOUT]["reached"])
         except Exception:  # what readers raise on damaged files is of any kind
-            raise InputError(f"{path}: is damaged; {self.how[1]} to begin anew") from None
+            raise InputError(
+                f"{path}: is damaged, or was made by another version of Foldyn; {self.how[1]} to "
+                "begin anew"
+            ) from None
         return kept
 
     def _compare(self, before: Mapping[str, Any]) -> None:
@@ -210,8 +256,13 @@ class Keeping:
 
     def _fail(self, error: OSError) -> NoReturn:
         kept = self.summary or "; nothing of the motion was kept before"
-        text = f"{self.folder}: cannot be written ({error.strerror or error}): make room{kept}"
-        raise ComputationError(text) from None
+        raise ComputationError(f"{self.folder}: {unwritable(error)}{kept}") from None
+
+
+def unwritable(error: OSError) -> str:
+    """Why something cannot be written, and what to do."""
+    remedy = "make room" if error.errno in FULL else "see that nothing else moves or changes it"
+    return f"cannot be written ({error.strerror or error}): {remedy}"
 
 
 def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:

@@ -190,6 +190,8 @@ class Output:
         columns = self._on_disk(stored)
         if columns is None:
             return result
+        assert self._keeping is not None
+        self._keeping.check()
         lazy = {}
         for name, variable in result.data_vars.items():
             if "time" not in variable.dims:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from foldyn.dynamics.keeping import Keeping
+from foldyn.dynamics.keeping import Keeping, unwritable
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import ComputationError
@@ -20,14 +20,15 @@ def stored(
     """Integrate a motion into the file of its result; see `simulate`."""
     if finished := motion.finished(keeping):
         return finished
-    try:
-        result = motion.run(progress, keeping)
-    except ComputationError as error:
-        if error.partial is not None:
-            error.partial.attrs["stopped_because"] = str(error)
-            error.partial = _saved(error.partial, keeping)
-        raise
-    return _saved(result, keeping)
+    with keeping.held():
+        try:
+            result = motion.run(progress, keeping)
+        except ComputationError as error:
+            if error.partial is not None:
+                error.partial.attrs["stopped_because"] = str(error)
+                error.partial = _saved(error.partial, keeping)
+            raise
+        return _saved(result, keeping)
 
 
 def _saved(result: xarray.Dataset, keeping: Keeping) -> xarray.Dataset:
@@ -35,7 +36,7 @@ def _saved(result: xarray.Dataset, keeping: Keeping) -> xarray.Dataset:
     try:
         save(result, keeping.file)
     except OSError as error:
-        text = f"{keeping.file}: cannot be written ({error.strerror or error}): make room"
-        raise ComputationError(f"{text}{keeping.summary}", result) from None
+        text = f"{keeping.file}: {unwritable(error)}{keeping.summary}"
+        raise ComputationError(text, result) from None
     keeping.remove()
     return load(keeping.file, whole=False)

@@ -1,8 +1,12 @@
-"""Columns of numbers that grow in files, one file each, and are read only where they are used."""
+"""Columns of numbers that grow in files, one file each, and are read only where they are used.
+
+A checksum of each column grows with it, over what is written and not over what the disk then holds.
+"""
 
 from __future__ import annotations
 
 import os
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +19,8 @@ from xarray.core import indexing
 
 PIECE = 2**23
 """Bytes that are held at a time of what may be larger than memory."""
+SUMMED = 2**18
+"""Bytes that are read at a time for a checksum: what the processor's cache holds."""
 NUMBER = np.dtype("<f8")
 
 
@@ -82,12 +88,28 @@ class Columns:
         It exists.
     rows : mapping of str to tuple of int
         Shape of a row of each column, by name.
+    count : int
+        Rows that are there already; the files may hold more.
+    sums : mapping of str to int, optional
+        Checksums of these rows, by name.
+
+    Attributes
+    ----------
+    names : tuple of str
+    count : int
+        Rows there are.
+    sums : dict of str to int
+        CRC-32 of the rows of each column.
     """
 
-    def __init__(self, folder: Path, rows: Mapping[str, tuple[int, ...]]) -> None:
+    def __init__(
+        self, folder: Path, rows: Mapping[str, tuple[int, ...]], count: int = 0,
+        sums: Mapping[str, int] | None = None,
+    ) -> None:  # fmt: skip
         self._folder, self._rows = folder, dict(rows)
         self.names = tuple(rows)
-        self.count = 0
+        self.count = count
+        self.sums = dict(sums) if sums is not None else dict.fromkeys(rows, 0)
         for name in rows:
             with self._path(name).open("ab"):
                 pass
@@ -101,14 +123,15 @@ class Columns:
             The disk is full, or fails; then there are as many rows as before.
         """
         (added,) = {len(array) for array in columns.values()}
+        sums = {}
         for name, array in columns.items():
+            new = np.ascontiguousarray(array, NUMBER).data.cast("B") if array.size else b""
             with self._path(name).open("r+b") as file:
                 file.seek(self._bytes(name) * self.count)
-                file.write(
-                    np.ascontiguousarray(array, NUMBER).data.cast("B") if array.size else b""
-                )
+                file.write(new)
                 file.truncate()
-        self.count += added
+            sums[name] = zlib.crc32(new, self.sums[name])
+        self.count, self.sums = self.count + added, sums
 
     def settle(self) -> None:
         """Wait until all rows are on the disk."""
@@ -117,15 +140,28 @@ class Columns:
                 os.fsync(file.fileno())
 
     def cut(self, count: int) -> None:
-        """Keep the first rows only; the files hold them."""
-        for name in self._rows:
-            os.truncate(self._path(name), self._bytes(name) * count)
-        self.count = count
+        """Keep the first rows only. The files lose the others when rows are added."""
+        self.count, self.sums = count, {name: self._sum(name, count) for name in self._rows}
 
-    def hold(self, count: int) -> bool:
-        """Whether the files hold so many rows."""
-        files = ((self._path(name), self._bytes(name) * count) for name in self._rows)
-        return all(path.is_file() and path.stat().st_size >= size for path, size in files)
+    def damaged(self) -> Path | None:
+        """A file that does not hold the rows that were written; None where all do."""
+        for name, wanted in self.sums.items():
+            try:
+                if self._sum(name, self.count) == wanted:
+                    continue
+            except OSError:  # it is gone, or cannot be read
+                pass
+            return self._path(name)
+        return None
+
+    def _sum(self, name: str, count: int) -> int:
+        """Checksum of the first rows of a file; -1 where it has fewer."""
+        left, found = self._bytes(name) * count, 0
+        with self._path(name).open("rb") as file:
+            while left > 0 and (piece := file.read(min(left, SUMMED))):
+                found = zlib.crc32(piece, found)
+                left -= len(piece)
+        return -1 if left else found
 
     def __getitem__(self, name: str) -> Column:
         return Column(self._path(name), self._rows[name], self.count)

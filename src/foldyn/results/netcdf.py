@@ -1,8 +1,8 @@
 """Results, and other datasets, in NetCDF files: written and read whole or not at all.
 
-A seal at the end of a file, the digest of all that comes before it, shows damage. HDF5 ignores what
-follows its own end, and cuts it off when another program changes the file: such a file has no seal,
-like those of older programs, and is read without this check.
+A seal at the end of a file shows damage. HDF5 ignores what follows its own end, and cuts it off
+when another program changes the file: such a file has no seal, like those of older programs, and is
+read without this check.
 
 NetCDF has no complex numbers: a complex variable of a result is stored as two, its real and its
 imaginary part, and put together again on loading.
@@ -10,7 +10,6 @@ imaginary part, and put together again on loading.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
 import warnings
@@ -29,6 +28,7 @@ from foldyn.input_files import check_file
 from foldyn.results.apart import apart
 from foldyn.results.attributes import FORMAT
 from foldyn.results.contents import check_result, whole_attribute
+from foldyn.results.seal import seal, sound
 from foldyn.results.streams import put
 from foldyn.writing import whole
 
@@ -47,10 +47,6 @@ LEAST_MEMORY = 2**29
 """Bytes that a file without a seal may take besides its content."""
 LEAST_SECONDS, PER_SECOND = 2, 50_000
 """Computing time that a file without a seal may take, and the bytes that take a second more."""
-
-_MARK = b"\nfoldyn sha256 "
-_SEAL = len(_MARK) + 64 + 1  # its length
-_PIECE = 1 << 20
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -131,7 +127,7 @@ def write(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     try:
         with whole(path) as part:
             fill(part, lambda sink: put(ds, sink, ENGINE))
-            _seal(part)
+            seal(part)
     except PermissionError:
         raise InputError(f"{path}: may not be written; choose another folder") from None
 
@@ -252,31 +248,6 @@ def _is_bare(item: h5py.Dataset) -> bool:
     """Whether this is only a dimension, without numbers."""
     name = item.attrs.get("NAME")
     return isinstance(name, bytes) and name.startswith(b"This is a netCDF dimension but not a")
-
-
-def _seal(path: Path) -> None:
-    """Put a seal at the end of a file."""
-    with path.open("rb+") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        file.write(_MARK + digest.encode() + b"\n")
-
-
-def sound(path: Path) -> bool | None:
-    """Whether the seal of a file matches what comes before it; None where it has none."""
-    left = path.stat().st_size - _SEAL
-    if left < 0:
-        return None
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        file.seek(left)
-        found = file.read()
-        if not found.startswith(_MARK):
-            return None
-        file.seek(0)
-        while left > 0 and (piece := file.read(min(left, _PIECE))):
-            digest.update(piece)
-            left -= len(piece)
-    return found == _MARK + digest.hexdigest().encode() + b"\n"
 
 
 class Sink(io.FileIO):

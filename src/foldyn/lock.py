@@ -1,4 +1,4 @@
-"""A lock on a folder, which the system lifts when its process ends, however that happens."""
+"""Locks of what one process at a time may write; the system lifts them when it ends, however."""
 
 from __future__ import annotations
 
@@ -13,23 +13,27 @@ from pathlib import Path
 
 from foldyn.errors import FoldynWarning
 
-NAME = ".foldyn.lock"
-
 
 class LockedError(Exception):
     """Another process has the lock; the message says which."""
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder.
+def locked(path: Path) -> Iterator[None]:
+    """Hold a lock.
+
+    Parameters
+    ----------
+    path : Path
+        Its file, which is there while the lock is held; the folder exists.
 
     Raises
     ------
     LockedError
         Another process holds it.
+    OSError
+        The file cannot be made.
     """
-    path = folder / NAME
     held = _take(path)
     try:
         with suppress(OSError):
@@ -57,8 +61,8 @@ def _take(path: Path) -> int:
             raise LockedError(said) from None
         except OSError as error:  # a file system without locks
             warnings.warn(
-                f"{path.parent}: cannot be locked ({error.strerror}): see that no other run "
-                "writes to it",
+                f"{path}: cannot be locked ({error.strerror}): see that no other process "
+                "writes there",
                 FoldynWarning,
                 stacklevel=4,
             )

@@ -1,0 +1,35 @@
+"""Seals: at the end of a file the digest of all that comes before it, which shows damage."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+_MARK = b"\nfoldyn sha256 "
+_LENGTH = len(_MARK) + 64 + 1
+_PIECE = 1 << 20
+
+
+def seal(path: Path) -> None:
+    """Put a seal at the end of a file."""
+    with path.open("rb+") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(_MARK + digest.encode() + b"\n")
+
+
+def sound(path: Path) -> bool | None:
+    """Whether the seal of a file matches what comes before it; None where it has none."""
+    left = path.stat().st_size - _LENGTH
+    if left < 0:
+        return None
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        file.seek(left)
+        found = file.read()
+        if not found.startswith(_MARK):
+            return None
+        file.seek(0)
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
+    return found == _MARK + digest.hexdigest().encode() + b"\n"
