@@ -13,7 +13,8 @@ import foldyn as fd
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.errors import InputError
-from foldyn.sweeps import Measure, job
+from foldyn.sweeps import Measure, evaluations, job
+from foldyn.sweeps.evaluations import Evaluation
 
 VARY = {"pattern.dihedral": "60:120:3", "sheet.length_scale_ratio": [1, 5]}
 
@@ -134,6 +135,47 @@ def test_a_users_function_that_fails_is_recorded_with_its_error(case):
     found = of(case, [fails_sometimes], {"sheet.thickness": [0.01, 0.02]})
     np.testing.assert_array_equal(found["fails_sometimes"], [1.0, np.nan])
     assert "fails_sometimes: ZeroDivisionError: too thick" in str(found["failure"].values[1])
+
+
+def test_a_measure_that_fails_leaves_the_others(case, tmp_path):
+    measures = ["peak_damping[8]", "peak_height[8]", fails_sometimes]
+    case.write_text(FRF)
+    vary = {"sheet.thickness": [0.01]}
+    whole = of(case, ["peak_frequency[8]", "peak_height[8]"], vary).isel(thickness=0)
+    last = float(whole["peak_frequency_8"]) + 0.012  # no half-power point above the peak
+    case.write_text(FRF.replace("first = 0.1, last = 3,", f"first = {last - 0.5}, last = {last},"))
+    for _ in range(2):  # computed, and kept
+        found = of(case, measures, {"sheet.thickness": [0.01, 0.02]}, folder=tmp_path / "points")
+        assert np.isnan(found["peak_damping_8"][0])
+        height = float(found["peak_height_8"][0])
+        assert height == pytest.approx(float(whole["peak_height_8"]), rel=0.02)
+        np.testing.assert_array_equal(found["fails_sometimes"], [1.0, np.nan])
+        why = found["failure"].values
+        assert why[0].startswith("peak_damping[8]: ") and "fails_sometimes" not in why[0]
+        assert "fails_sometimes: ZeroDivisionError: too thick" in why[1]
+
+
+def test_a_lack_of_memory_is_not_kept_as_a_failure(case, tmp_path):
+    def greedy(result, case):
+        raise MemoryError
+
+    found = of(case, [greedy], {"sheet.thickness": [0.01]}, folder=tmp_path / "points")
+    assert "MemoryError" in str(found["failure"].values[0])
+    assert not list((tmp_path / "points").iterdir())
+
+
+def test_every_changed_byte_of_what_is_kept_shows(tmp_path):
+    """As in a header, which numpy reads and whose checksum it does not look at."""
+    file, random = tmp_path / "a.npz", np.random.default_rng(1)
+    evaluations.KEPT.keep(file, "a", Evaluation({"b": random.random(9999)}, seconds=1.0))
+    sound = file.read_bytes()
+    assert evaluations.KEPT.find(file, "a") is not None
+    shape = sound.index(b"(9999,)") + 1  # of the array: a shorter one would be read
+    for place in [shape, *random.integers(0, len(sound), 200).tolist()]:
+        changed = bytearray(sound)
+        changed[place] = changed[place] - 5 if place == shape else changed[place] ^ 16
+        file.write_bytes(changed)
+        assert evaluations.KEPT.find(file, "a") is None, place
 
 
 def test_ones_own_measures(case):

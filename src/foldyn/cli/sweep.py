@@ -32,7 +32,7 @@ DRAWN = [
 OFTEN = 30.0
 """Seconds between lines that tell how far a sweep is, where nobody watches a bar."""
 MOST_NAMED = 5
-"""Points that failed of which the reasons are printed."""
+"""Reasons why points lack values that are printed."""
 
 
 def add_sweep(commands: Any) -> None:
@@ -92,9 +92,10 @@ def run_sweep(given: argparse.Namespace) -> Path:
     InputError
         Something cannot be used; nothing was written.
     ComputationError
-        All points failed; their reasons are kept.
+        No point has a value; the reasons are kept.
     """
     from foldyn.results import save
+    from foldyn.results.swept import has_values
     from foldyn.studies import find_case
 
     clock = Clock.now()
@@ -114,7 +115,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
         results.keep(RESULT, partial(save, found))
         _tell_failed(found, say)
         say(f"wrote {folder / RESULT}")
-        if found.attrs["failed"] == found.attrs["points"]:
+        if found.attrs["failed"] == found.attrs["points"] and not has_values(found):
             raise ComputationError(
                 f"all {found.attrs['points']} points failed, the first with: "
                 f"{found['failure'].values.flat[0]}"
@@ -215,11 +216,11 @@ def _left(seconds: float) -> str:
 
 
 def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say how many points failed, and why."""
+    """Say how many points lack values, and why."""
     failed = found.attrs["failed"]
     if not failed:
         return
-    say(f"{failed} of {found.attrs['points']} points failed:")
+    say(f"{failed} of {found.attrs['points']} points lack values:")
     reasons: dict[str, int] = {}
     for reason in filter(None, found["failure"].values.ravel().tolist()):
         reasons[reason] = reasons.get(reason, 0) + 1

@@ -75,6 +75,11 @@ def measures_of(ds: xr.Dataset) -> list[str]:
     return [str(name) for name, one in ds.data_vars.items() if "measure" in one.attrs]
 
 
+def has_values(ds: xr.Dataset) -> bool:
+    """Whether any measure has a value at any point."""
+    return any(np.isfinite(ds[name].values).any() for name in measures_of(ds))
+
+
 def is_grid(ds: xr.Dataset) -> bool:
     """Whether a sweep went over all combinations of values."""
     return POINT not in ds.dims

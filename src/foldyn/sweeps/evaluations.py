@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.results.seal import seal, sound
 from foldyn.store import Store, name_of
 from foldyn.sweeps.pool import Pool
 from foldyn.writing import remove_leftovers, whole
@@ -28,7 +29,7 @@ class Evaluation:
     ----------
     values : dict of str to ndarray
     failure : str
-        Why there are none, or "".
+        Why there are none, or fewer than were asked for, or "".
     warnings : str
         What was warned of, or "".
     seconds : float
@@ -124,6 +125,8 @@ class Evaluations(Generic[Point]):
 
 
 def _read(file: Path) -> tuple[str, Evaluation]:
+    if not sound(file):
+        raise ValueError
     with np.load(file) as kept:
         values = {
             name.removeprefix(_VALUE): kept[name] for name in kept.files if name.startswith(_VALUE)
@@ -143,7 +146,8 @@ def _write(file: Path, stamp: str, found: Evaluation) -> None:
     with whole(file) as part:
         facts |= {name: np.array(getattr(found, name)) for name in ("seconds", "side_by_side")}
         np.savez(part, **facts, **values)
+        seal(part)
 
 
 KEPT: Store[Evaluation] = Store(_read, _write, warns=False)
-"""Files hold checksums: what is damaged counts as not there."""
+"""Files have seals: what is damaged counts as not there."""

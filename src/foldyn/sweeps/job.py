@@ -113,7 +113,9 @@ class Job:
         for trial, one in group:
             with trial.watched():
                 result, case, shared = one.result(), one.case_file.case(), {}
-                trial.values = {each.name: each.of(result, case, shared) for each in self.measures}
+                for each in self.measures:
+                    with trial.noted():
+                        trial.values[each.name] = each.of(result, case, shared)
 
 
 class _Trial:
@@ -122,29 +124,35 @@ class _Trial:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.values: dict[str, Any] = {}
-        self.failure, self.lasting, self.seconds, self.side_by_side = "", True, 0.0, 1
+        self.lasting, self.seconds, self.side_by_side = True, 0.0, 1
+        self.failures: list[str] = []
         self.told: list[str] = []
 
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Note what goes wrong in the block, what is warned of, and how long it takes."""
         began = time.perf_counter()
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as told, self.noted():
             warnings.simplefilter("always")
-            try:
-                yield
-            except (InputError, ComputationError) as error:
-                self.failure = str(error).removeprefix(f"{self.path}: ")
-            except Exception as error:  # of one point; the others are computed all the same
-                self.failure, self.lasting = f"{type(error).__name__}: {error}", False
+            yield
         self.told += [str(one.message) for one in told if issubclass(one.category, FoldynWarning)]
         self.seconds += time.perf_counter() - began
 
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """Note what goes wrong in the block; what else is found is kept."""
+        try:
+            yield
+        except (InputError, ComputationError) as error:
+            self.failures.append(str(error).removeprefix(f"{self.path}: "))
+        except Exception as error:  # of one point; the others are computed all the same
+            self.failures.append(f"{type(error).__name__}: {error}")
+            self.lasting = False
+
     def evaluation(self) -> Evaluation:
         """What was found."""
-        said = "; ".join(dict.fromkeys(self.told))
-        values = {} if self.failure else self.values
-        return Evaluation(values, self.failure, said, self.seconds, self.lasting, self.side_by_side)
+        failure, said = ("; ".join(dict.fromkeys(texts)) for texts in (self.failures, self.told))
+        return Evaluation(self.values, failure, said, self.seconds, self.lasting, self.side_by_side)
 
 
 def this_program() -> str:

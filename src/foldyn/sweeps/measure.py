@@ -114,6 +114,8 @@ class Asked:
             found = self.measure.function(subject, case, **self.arguments)
         except FoldynError as error:
             raise type(error)(f"{self.text}: {error}") from None
+        except MemoryError:  # there may be more the next time
+            raise
         except Exception as error:  # of a user's function, of any kind
             raise InputError(f"{self.text}: {type(error).__name__}: {error}") from error
         try:

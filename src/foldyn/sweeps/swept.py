@@ -105,7 +105,7 @@ def sweep(
     xarray.Dataset
         A variable for each measure. Of a grid over dimensions that have the last words of the keys
         as names, of samples over ``point``; values of the keys are coordinates. `failure` says why
-        a point has no values (they are nan), `warnings` what was warned of, `seconds` how long it
+        a point lacks values (they are nan), `warnings` what was warned of, `seconds` how long it
         took, and `side_by_side` how many motions were computed at once.
 
     Raises
@@ -119,7 +119,8 @@ def sweep(
     Notes
     -----
     Values that a case file can hold may still not make a case, or not compute: such points fail one
-    by one, with their reasons, and the others are computed all the same.
+    by one, with their reasons, and the others are computed all the same. A measure that cannot be
+    taken of a result leaves the others of its point.
     """
     plan = plan_of(case, vary, measures, samples, method, seed, ties)
     return swept(plan, processes, scheduler, folder, progress)

@@ -26,7 +26,7 @@ DEGREES = ("dihedral", "panel_angle", "theta1", "theta2", "twist")
 """Words of keys that are angles."""
 UNITS_OF_KEYS: Mapping[str, str] = {**UNITS, **dict.fromkeys(DEGREES, "degrees")}
 ABOUT: Mapping[str, str] = {
-    "failure": "why the point has no values",
+    "failure": "why the point lacks values",
     "warnings": "what was warned of",
     "seconds": "computing time",
     "side_by_side": "motions computed side by side, this one included",
@@ -120,7 +120,7 @@ def _stacked(one: Asked, found: list[Evaluation]) -> tuple[NDArray[np.float64], 
             continue
         if value.ndim != depth:
             why = f"{one.text}: has {value.ndim} dimensions here, {depth} elsewhere"
-            checked[k] = replace(point, failure=point.failure or why)
+            checked[k] = replace(point, failure="; ".join(filter(None, (point.failure, why))))
             continue
         stacked[(k, *map(slice, value.shape))] = value
     return stacked, checked
