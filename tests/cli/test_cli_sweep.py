@@ -61,9 +61,10 @@ def test_failed_points_are_told(sweep, workplace):
     vary = ("--vary", "pattern.dihedral=90,500")
     done = sweep(*vary, "--measure", "frequencies", "--processes", "1")
     assert done.status == 0
-    assert "1 of 2 points lack values:\n  1 of them: pattern: miura: dihedral = 500" in done.out
+    said = "values are missing at 1 of 2 points:\n  1 of them: pattern: miura: dihedral = 500"
+    assert said in done.out
     page = (workplace.folder / "case-sweep" / "report.html").read_text("utf-8")
-    assert "Points that lack values" in page
+    assert "Values are missing at 1 of 2 points" in page
 
 
 def test_a_sweep_of_which_all_points_fail_fails(sweep):

@@ -107,7 +107,7 @@ def test_a_point_that_ends_its_process_does_not_stop_the_rest(tmp_path):
     one = start(tmp_path, *command, "--measure", "mine.py:deadly", "--processes", "2")
     out, err = one.communicate(timeout=240)
     assert one.returncode == 0, err
-    assert "1 of 6 points lack values" in out
+    assert "values are missing at 1 of 6 points" in out
     found = fd.load(tmp_path / "case-sweep" / "sweep.nc")
     np.testing.assert_array_equal(found["deadly"], [1.0, 1.0, 1.0, 1.0, 1.0, np.nan])
     assert "ended from outside" in str(found["failure"].values[-1])

@@ -32,7 +32,7 @@ DRAWN = [
 OFTEN = 30.0
 """Seconds between lines that tell how far a sweep is, where nobody watches a bar."""
 MOST_NAMED = 5
-"""Reasons why points lack values that are printed."""
+"""Reasons for missing values that are printed."""
 
 
 def add_sweep(commands: Any) -> None:
@@ -216,11 +216,11 @@ def _left(seconds: float) -> str:
 
 
 def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
-    """Say how many points lack values, and why."""
+    """Say at how many points values are missing, and why."""
     failed = found.attrs["failed"]
     if not failed:
         return
-    say(f"{failed} of {found.attrs['points']} points lack values:")
+    say(f"values are missing at {failed} of {found.attrs['points']} points:")
     reasons: dict[str, int] = {}
     for reason in filter(None, found["failure"].values.ravel().tolist()):
         reasons[reason] = reasons.get(reason, 0) + 1

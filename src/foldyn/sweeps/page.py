@@ -36,7 +36,7 @@ MOST_CURVES = 8
 MOST_ROWS = 1000
 """Points that a table lists."""
 MOST_REASONS = 50
-"""Points that lack values that a table lists."""
+"""Points with missing values that a table lists."""
 MOST_COLUMNS = 6
 """Values of one measure in a row."""
 
@@ -64,7 +64,7 @@ def write_sweep(
     for name in measures_of(sweep):
         sections += _of_measure(sweep, name, album)
     if sweep.attrs["failed"]:
-        sections += [Heading("Points that lack values"), _failures(sweep)]
+        sections += [Heading("Missing values"), _failures(sweep)]
     sections += [Heading("The points"), *_points(sweep)]
     sections += [Heading("How it was computed"), inputs_table(_rows(sweep, case_file, call))]
     sections.append(Listing("The case file, with its sweep", str(sweep["case_file"].values)))
@@ -219,7 +219,7 @@ def _failures(sweep: xr.Dataset) -> Table:
         for k in failed[:MOST_REASONS]
     ]
     more = f", the first {MOST_REASONS}" if len(failed) > MOST_REASONS else ""
-    caption = f"{len(failed)} of {sweep.attrs['points']} points lack values{more}."
+    caption = f"Values are missing at {len(failed)} of {sweep.attrs['points']} points{more}."
     return Table([*(label(sweep[name]) for name in names), "why"], rows, caption)
 
 
@@ -239,7 +239,7 @@ def _rows(
     how = "all combinations of values"
     if not is_grid(sweep):
         how = f"{facts['method']}, {facts['samples']} samples, seed {facts['seed']}"
-    yield "points", f"{facts['points']}, {facts['failed']} of them lack values; {how}"
+    yield "points", f"{facts['points']}, values missing at {facts['failed']} of them; {how}"
     yield "processes", str(facts["processes"])
     seconds = float(np.nansum(sweep["seconds"].values))
     yield from cost_rows(str(facts["foldyn_version"]), call or Call(), seconds)
