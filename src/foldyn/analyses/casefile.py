@@ -251,6 +251,12 @@ class CaseFile:
         """Its table [sweep], None where it has none."""
         return self._schema.sweep
 
+    @property
+    def start_keys(self) -> dict[str, Any]:
+        """What its table [initial] says; nothing where it has none."""
+        section = getattr(self._schema, "initial", None)
+        return {} if section is None else section.model_dump(exclude_unset=True)
+
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""
         rule = self._rule(mass)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foldyn.cases import History
+from foldyn.cases import Contact, History
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
@@ -90,6 +90,8 @@ def inputs(case_file: CaseFile, case: Case, results: ByRule) -> list[tuple[str, 
         ("loads", _parts(case.loads)),
         ("damping", damping_text(case)),
         ("point masses", _point_masses(case) if case.masses else ""),
+        ("contact", _contact(case.contact) if case.contact else ""),
+        ("initial state", _listed(case_file.start_keys)),
         ("analysis", f"{analysis.kind}; {_listed(analysis.arguments)}"),
     ]
 
@@ -140,6 +142,14 @@ def _point_masses(case: Case) -> str:
     count = int((masses > 0.0).sum())
     nodes = f"{count} node{'s' if count > 1 else ''}"
     return f"{masses.sum():.6g} kg on {nodes}, of {case.total_mass:.6g} kg in all"
+
+
+def _contact(contact: Contact) -> str:
+    """What may touch, with how much friction, in words."""
+    given = _given(contact)
+    planes, panels = given.pop("planes"), given.pop("panels")
+    touching = "between panels" if panels else "on planes alone"
+    return ". ".join([f"{touching}; {_listed(given)}", *filter(None, [_parts(planes)])])
 
 
 def mesh_error(result: xarray.Dataset) -> str:
