@@ -44,7 +44,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "reaction",
             f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
             f"{moved[1]}, over their displacement.",
-            lambda: plots.plot_reaction({"": path}, *moved),
+            lambda: plots.plot_reaction(path, *moved),
             _reaction(path, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
@@ -52,7 +52,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "curve",
             f"Load factor over the displacement of {listed('node', nodes)}{some} along "
             f"{direction}.",
-            lambda: plots.plot_load_displacement({"": path}, nodes, direction),
+            lambda: plots.plot_load_displacement(path, nodes, direction),
         )
     if path.sizes["step"] > 1:
         over: tuple[list[int], str] | tuple[None, None] = None, None
