@@ -16,7 +16,7 @@ from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.structures import PanelSheet
-from foldyn.values import plain
+from foldyn.values import plain, unit_of
 
 if TYPE_CHECKING:
     import xarray
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from foldyn.analyses.casefile import CaseFile
     from foldyn.cases import Case
 
-UNITS: Mapping[str, str] = {
-    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
-    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
-}  # fmt: skip
 MOST_LISTED = 24
 """Numbers of a list that are written one by one, at most."""
 MOST = 200  # characters of a value
@@ -171,7 +167,7 @@ def _given(choices: Any) -> dict[str, Any]:
 def _listed(values: Mapping[str, Any]) -> str:
     """Names and values with their units; what was not given is left out."""
     return "; ".join(
-        f"{name.replace('_', ' ')} {_written(value)} {UNITS.get(name, '')}".rstrip()
+        f"{name.replace('_', ' ')} {_written(value)} {unit_of(name, value)}".rstrip()
         for name, value in values.items()
         if value is not None and not (isinstance(value, tuple) and not value)
     )
