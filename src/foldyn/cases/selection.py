@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
-from foldyn.patterns.selection import check_expression, select
+from foldyn.patterns.selection import check_expression, given_as, select
 from foldyn.values import indices, show
 
 _WORDS = 'one of "all", "mountain", "valley", or a family of the pattern'
@@ -37,7 +37,7 @@ def resolve_nodes(
     """
     if isinstance(nodes, str):
         pattern = structure.pattern  # None for a structure made by hand: all nodes are vertices
-        with within(f"{field} = "):
+        with given_as(field):
             return select(structure.nodes if pattern is None else pattern, nodes)
     check_nodes(nodes, field)
     return in_range(field, nodes, len(structure.nodes), "node")
@@ -59,7 +59,7 @@ def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]
 def check_nodes(nodes: Any, field: str = "nodes") -> str | tuple[int, ...]:
     """Return a node selection as text or as a tuple of numbers, checked but for its range."""
     if isinstance(nodes, str):
-        with within(f"{field} = "):
+        with given_as(field):
             return check_expression(nodes)
     return indices(field, nodes, "node", 'or a selection such as "xmin"')
 

@@ -14,7 +14,8 @@ the pattern (at rest), never panel centers. They are read by a small parser, nev
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,15 @@ def select(points: Any, expression: str) -> NDArray[np.int64]:
             f'"{shortened(expression)}": selects no vertex; the pattern spans {ranges} (m)'
         )
     return chosen
+
+
+@contextmanager
+def given_as(field: str) -> Iterator[None]:
+    """Name the field of an expression that cannot be used."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f" = {error}", field) from None
 
 
 def check_expression(expression: str) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from foldyn.errors import InputError, within
-from foldyn.patterns.selection import select
+from foldyn.errors import InputError
+from foldyn.patterns.selection import given_as, select
 from foldyn.values import show, whole
 
 
@@ -42,7 +42,7 @@ def _numbers(result: xr.Dataset, nodes: int | str | Sequence[int], name: str) ->
     if isinstance(nodes, str):
         if "vertices" not in result:
             raise InputError(f" = {show(nodes)}: {name} has no pattern; give numbers", "nodes")
-        with within("nodes = "):
+        with given_as("nodes"):
             return select(result["vertices"].values, nodes).tolist()
     given = np.atleast_1d(np.asarray(nodes, dtype=object))
     if given.ndim > 1 or not given.size:

@@ -20,10 +20,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError, within
+from foldyn.errors import InputError
 from foldyn.mechanics.attached import Clamps
 from foldyn.patterns import Pattern
-from foldyn.patterns.selection import select
+from foldyn.patterns.selection import given_as, select
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import show
 
@@ -42,7 +42,7 @@ def boundary_edges(
         of no such edge.
     """
     if isinstance(given, str):
-        with within(f"{field} = "):
+        with given_as(field):
             chosen = np.isin(pattern.boundary, select(pattern, given)).all(axis=1)
         if not chosen.any():
             why = f" = {show(given)}: selects no boundary edge, which needs both of its ends"
