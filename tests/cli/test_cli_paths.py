@@ -284,7 +284,7 @@ def test_figures_of_moved_supports(workplace, edited) -> None:
     workplace.write(text)
     done = workplace.call("run", "case.toml", "--out", "r", "--figures", "png")
     assert (done.status, done.err) == (0, "")
-    pictures = {*PICTURES, "reaction.png"}
+    pictures = {*PICTURES, "reaction.png", "landscape.png"}  # the force falls
     assert set(done.new) == {"r", *(f"r/{n}" for n in (*pictures, "result.nc", "report.html"))}
     assert pictures <= set(DRAWN)
     page = Path("r/report.html").read_text(encoding="utf-8")

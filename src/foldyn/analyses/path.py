@@ -151,7 +151,7 @@ class PathAnalysis(Analysis):
     moving = True
     schema = PathSchema
     files = (
-        "reaction", "curve", "energies", "shapes", "path.gif", "path.mp4",
+        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4",
     )  # fmt: skip
     needs_density = ""
     takes = arguments_of(trace)
