@@ -377,7 +377,6 @@ def test_the_bar_tells_points_and_load_factor(monkeypatch, workplace, slow) -> N
     workplace.write(slow())
     assert main(["run", "case.toml", "--no-figures"]) == 0
     told = screen.getvalue()
-    assert "first use compiles kernels" in told
     assert "points: 1, load factor 0 [00:00]" in told
     # and where something is refused nothing of it remains but the message
     screen.truncate(0)

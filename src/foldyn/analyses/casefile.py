@@ -170,10 +170,6 @@ class Analysis(ABC):
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse computations of several mass rules that cannot run, or be drawn, together."""
 
-    def compiles(self, computations: Sequence[Compute]) -> bool:
-        """Whether kernels have to be compiled first without a bar that says so."""
-        return False
-
     def shown(self, case: Case) -> NDArray[np.int64]:
         """Nodes to show where the file names none: those with a force, else all that can move."""
         return case.loaded_nodes if case.loaded_nodes.size else movable(case)
