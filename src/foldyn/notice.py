@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import parent_process
 
-PER_KERNEL = 0.3
-"""Seconds at least: the 79 kernels of modes took 22 s of an idle processor."""
+PER_KERNEL = 0.5
+"""Seconds at least: 79 kernels of modes took 22 s of a processor, 142 of a motion with RK4 60 s."""
 SHORTEST = 3.0
 """Seconds below which nothing is told."""
 

@@ -37,10 +37,10 @@ def test_each_part_of_the_work_is_told_once_with_what_is_missing():
     slow.compile(range(30, 50))  # ten more
     slow.compile(range(50, 51))
     assert slow.told == [
-        "compiling 40 kernels for their first use, about 10 s; they are kept for later runs",
+        "compiling 40 kernels for their first use, about 20 s; they are kept for later runs",
         "compiling 10 more kernels, about 20 s",  # at the pace of those before
     ]
-    assert pytest.approx(12.0) == 40 * PER_KERNEL
+    assert pytest.approx(20.0) == 40 * PER_KERNEL
 
 
 def test_short_waits_are_not_worth_a_word():
