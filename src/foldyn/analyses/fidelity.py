@@ -157,12 +157,13 @@ def _models(found: Fidelity) -> Table:
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
         rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
+    words = [line for line in legend(found) if not line.startswith("*")]  # here are no modes
     return Table(
         [*header, "time (ms)", "of the shell's"],
         rows,
         f"Errors against the shell of the {int(below.sum())} modes below 0.6 of the plate "
         f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest. "
-        f"{'; '.join(legend(found))}.",
+        f"{'; '.join(words)}.",
         digits=3,
     )
 
