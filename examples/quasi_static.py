@@ -144,12 +144,12 @@ def draw(case, results: dict, folder: Path) -> None:
     shapes = fd.plots.draw_shapes(case, results["specimen"], [0, -1])
     shapes.savefig(folder / "specimen-shapes.png", dpi=80)
     tower, path = shipped("gallery/kresling")
-    fd.plots.plot_load_displacement({"": path}, [6], "-z").savefig(
-        folder / "kresling-curve.png", dpi=90
-    )
+    fd.plots.plot_load_displacement(path, [6], "-z").savefig(folder / "kresling-curve.png", dpi=90)
     fd.plots.draw_shapes(tower, path, 3).savefig(folder / "kresling-shapes.png", dpi=80)
+    landscape = fd.plots.plot_landscape(fd.landscape(path))
+    landscape.savefig(folder / "kresling-landscape.png", dpi=90)
     sheet, path = shipped("gallery/miura-popthrough")
-    fd.plots.plot_load_displacement({"": path}, [24], "-z").savefig(
+    fd.plots.plot_load_displacement(path, [24], "-z").savefig(
         folder / "popthrough-curve.png", dpi=90
     )
     state = int(np.abs(path.load_factor.values[60:]).argmin()) + 60

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
+
 import numpy as np
 import pytest
 
 import foldyn as fd
 from foldyn import signals
+from foldyn.cases import SUPPORTS
+from foldyn.cases.histories import HISTORIES
+from foldyn.cases.loads import LOADS
 from foldyn.linear import linearize
+from foldyn.values import unit_of
 
 SHEET = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 MANY = list(range(50))
@@ -68,3 +74,34 @@ def test_a_landscape_says_its_states_heights_and_barriers(snapping):
         assert f"{word} at {state.stroke:.4g} m ({state.energy:.3g} J)" in text
     assert f"barriers {there:.3g} J there and {back:.3g} J back" in text
     assert len(repr(found.states[0])) < 200
+
+
+KINDS = [*SUPPORTS, *LOADS, *HISTORIES.values()]
+KINDS += [fd.Sheet, fd.PanelSheet, fd.Rayleigh, fd.ModalDamping, fd.CreaseDamping, fd.PointMass]
+KINDS += [fd.Contact, fd.Plane, fd.State]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_every_part_of_a_case_has_a_table_for_notebooks(kind):
+    assert callable(getattr(kind, "_repr_html_", None))
+
+
+def test_the_table_has_what_the_line_has_and_units():
+    rows = ElementTree.fromstring(SHEET._repr_html_()).findall("tr")
+    assert ["".join(row.itertext()) for row in rows] == [
+        "youngs modulus1000000.0 Pa", "poissons ratio0.25", "thickness0.01 m", "density1.0 kg/m3",
+        "length scale ratio1.0", "panels()",
+    ]  # fmt: skip
+    force = fd.Force("x > 0.5", (0, 0, -1), fd.HalfSine(0.5))
+    text = force._repr_html_()
+    table = ElementTree.fromstring(text)  # well formed: the selection is escaped
+    assert table.findtext("caption/code") == "Force"
+    assert [cell.text for cell in table.iter("td")] == [
+        "'x > 0.5'", "(0.0, 0.0, -1.0) N", "HalfSine(duration=0.5)",
+    ]  # fmt: skip
+    assert "<svg" in fd.Case(fd.shell(fd.patterns.simple_fold(), SHEET, 2))._repr_html_()
+
+
+def test_a_unit_is_for_numbers():
+    assert unit_of("thickness", 0.1) == "m" and unit_of("crease_stiffness", [0.1, 0.2])
+    assert unit_of("thickness", "xmin") == unit_of("mass", "panel") == ""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import difflib
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
+from html import escape
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -27,6 +28,18 @@ MOST = 2**63 - 1
 """Largest whole number: what arrays of them hold."""
 SHOWN = 60
 """Characters of a value in a message."""
+UNITS: Mapping[str, str] = {
+    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
+    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
+    "vector": "N", "total": "N", "force_per_length": "N/m", "pressure": "Pa", "moment": "N m",
+    "acceleration": "m/s2", "change": "K", "expansion": "1/K", "curvature": "1/(m K)",
+    "angle": "degrees", "fold_angle": "degrees", "value": "m", "stiffness": "N/m",
+    "rest_length": "m", "point": "m", "motion": "m", "displacement": "m", "velocity": "m/s",
+    "duration": "s", "time": "s", "times": "s", "frequency": "Hz",
+    "theta1": "degrees", "theta2": "degrees", "dihedral": "degrees", "panel_angle": "degrees",
+    "twist": "degrees",
+}  # fmt: skip
+"""Units of arguments that mean the same wherever they occur."""
 SOME = 6
 """Items of a list, and of an array, that a repr shows."""
 T = TypeVar("T")
@@ -74,21 +87,44 @@ def shortened(text: str) -> str:
 
 
 def brief(cls: type[T]) -> type[T]:
-    """Give a data class a repr of one short line: arrays by their shape, lists by their ends.
+    """Give a data class a repr of one short line, and a table for notebooks unless it has another.
 
-    Arguments that are None unless given are left out.
+    Arrays are shown by their shape, lists by their ends; arguments that are None unless given are
+    left out.
     """
 
     def shown(self: Any) -> str:
-        given = (
-            f"{item.name}={_brief(getattr(self, item.name))}"
-            for item in fields(self)
-            if item.repr and not (item.default is None and getattr(self, item.name) is None)
-        )
+        given = (f"{name}={_brief(value)}" for name, value in _given(self))
         return f"{type(self).__name__}({', '.join(given)})"
 
     cls.__repr__ = shown  # type: ignore[method-assign]
+    if not hasattr(cls, "_repr_html_"):
+        cls._repr_html_ = _table  # type: ignore[attr-defined]
     return cls
+
+
+def _given(self: Any) -> Iterator[tuple[str, Any]]:
+    """Fields of a data class that its repr shows."""
+    for item in fields(self):
+        value = getattr(self, item.name)
+        if item.repr and not (item.default is None and value is None):
+            yield item.name, value
+
+
+def _table(self: Any) -> str:
+    """A data class as a table in HTML, with units."""
+    left = 'style="text-align: left"'
+    rows = "".join(
+        f'<tr><th scope="row" {left}>{escape(name.replace("_", " "))}</th>'
+        f"<td {left}>{escape(f'{_brief(value)} {unit_of(name, value)}'.rstrip())}</td></tr>"
+        for name, value in _given(self)
+    )
+    return f"<table><caption><code>{type(self).__name__}</code></caption>{rows}</table>"
+
+
+def unit_of(name: str, value: Any) -> str:
+    """Unit of an argument, "" where it has none or its value is a word."""
+    return "" if isinstance(value, str) else UNITS.get(name, "")
 
 
 def _brief(value: Any) -> str:

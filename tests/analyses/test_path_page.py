@@ -8,7 +8,10 @@ import pytest
 import foldyn as fd
 from case_texts import HELD_FOLD_TEXT as FOLD
 from foldyn.analyses import read_case
+from foldyn.analyses.path_page import path_sections
 from foldyn.plots import moved_supports
+from foldyn.report.album import Album
+from foldyn.report.charts import Charts
 
 
 @pytest.fixture
@@ -62,3 +65,25 @@ def test_there_and_back(tmp_path):
     force = fd.plots.total_reaction(path, [0, 1], "-x")
     np.testing.assert_allclose(force[3:], force[1::-1], atol=1e-9 * force.max())
     assert "moved along -x (m)" in page
+    assert not (tmp_path / "landscape.png").exists()  # the force falls on the way back alone
+
+
+def test_a_path_through_two_states_shows_its_landscape(tmp_path):
+    case_file = read_case(fd.studies.find_case("gallery/kresling"))
+    path = case_file.run()
+    found, results = fd.landscape(path), {case_file.masses[0]: path}
+    drawn = list(path_sections(case_file, results, Album(tmp_path, "svg")))
+    assert (tmp_path / "landscape.svg").exists()
+    (table,) = [one for one in drawn if getattr(one, "caption", "").startswith("States without")]
+    assert [row[:3] for row in table.rows] == [
+        [one.stroke, pytest.approx(one.energy), "stable" if one.stable else "unstable"]
+        for one in found.states
+    ]
+    assert [row[3:] for row in table.rows] == [
+        [found.barrier(0, 1), None], [None, None], [None, found.barrier(1, 0)],
+    ]  # fmt: skip
+    (chart,) = [
+        one.charts[0] for one in path_sections(case_file, results, Album(tmp_path, None))
+        if isinstance(one, Charts) and one.charts[0].xlabel == "stroke (m)"
+    ]  # fmt: skip
+    assert chart.curves[1].x.tolist() == [one.stroke for one in found.states]

@@ -238,3 +238,43 @@ def test_clamps_survive_storage(model, tmp_path):
 def test_bad_edges(model, clamped, message):
     with pytest.raises(InputError, match=message):
         structure(model, FOLD, clamped=clamped)
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_selection_means_the_edges_of_which_it_has_both_ends(kind):
+    """Of the boundary alone: the ridge from 2 to 3 is a crease."""
+    assert structure(kind, FOLD, clamped="x > 0.5").options.clamped == ((2, 4), (3, 5), (4, 5))
+    for given, message in (
+        ("x > 99", r'clamped = "x > 99": selects no vertex'),
+        ("xmin and ymin", "selects no boundary edge, which needs both of its ends"),
+        ("xmim", "xmim is not known"),
+        (3, "or a selection"),
+    ):
+        with pytest.raises(InputError, match=message):
+            structure(kind, FOLD, clamped=given)
+
+
+def test_a_case_file_selects_edges(tmp_path):
+    text = """[pattern]
+kind = "miura"
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+[model]
+scheme = "n5b8e"
+straight = "xmin"
+clamped = {clamped}
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "statics"
+"""
+    path = tmp_path / "case.toml"
+    path.write_text(text.format(clamped="[]").replace("clamped = []\n", ""))
+    assert fd.read_case(path).case().structure.options.straight == ((0, 1), (1, 2))
+    path.write_text(text.format(clamped='"xmax"').replace('scheme = "n5b8e"\nstraight', "#"))
+    assert fd.read_case(path).case().structure.options.clamped == ((6, 7), (7, 8))
+    path.write_text(text.format(clamped='"xmim"').replace('scheme = "n5b8e"\nstraight', "#"))
+    with pytest.raises(InputError, match='clamped = "xmim": xmim is not known'):
+        fd.read_case(path)

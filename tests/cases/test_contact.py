@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import foldyn as fd
 from case_texts import FOLD_TEXT, LIFTED_TEXT
+from foldyn.analyses.provenance import inputs
 from foldyn.cases.contact import contact_from
 from foldyn.cases.document import from_document, to_document
 from foldyn.errors import InputError
@@ -120,3 +122,28 @@ def test_what_may_touch_follows_the_sheet():
     np.testing.assert_allclose(made.thickness, [0.01, 0.02])
     assert made.stiffness == pytest.approx(0.03 * 1e6 * 0.01)
     assert fd.Contact(thickness=0.05).sheets(s, held).thickness.tolist() == [0.05, 0.05]
+
+
+def test_the_page_says_what_touches_and_where_it_began(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(
+        f"""{FOLD_TEXT}[contact]
+friction = 0.2
+[[contact.planes]]
+point = [0, 0, -0.1]
+normal = [0, 0, 1]
+friction = 0.45
+[initial]
+velocity = [0, 0, -1.5]
+[analysis]
+kind = "dynamics"
+duration = 1.0
+"""
+    )
+    case_file = fd.read_case(path)
+    rows = dict(inputs(case_file, case_file.case(), {"mixed_voronoi": xr.Dataset()}))
+    assert rows["contact"] == (
+        "between panels; friction 0.2. "
+        "Plane: point [0.0, 0.0, -0.1] m; normal [0.0, 0.0, 1.0]; friction 0.45"
+    )
+    assert rows["initial state"] == "velocity [0.0, 0.0, -1.5] m/s"

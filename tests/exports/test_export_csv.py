@@ -85,6 +85,14 @@ def test_some_nodes_and_samples(tmp_path):
     )
 
 
+def test_nodes_by_place(tmp_path):
+    where = fd.case_of(motion()).structure.pattern
+    chosen = fd.cases.select(where, "xmax")
+    frame = table(motion(), tmp_path, nodes="xmax", fields=["velocity"])
+    assert frame.node.unique().tolist() == chosen.tolist()
+    assert table(motion(), tmp_path, nodes="4 1").node.tolist()[:2] == [4, 1]
+
+
 def test_the_file_is_plain(tmp_path):
     (file,) = fd.export(motion(), tmp_path / "a.csv", rows="time", fields="work")
     with file.open(encoding="utf-8", newline="") as lines:
@@ -102,7 +110,8 @@ def test_the_file_is_plain(tmp_path):
         ({"fields": "displacment"}, "did you mean 'displacement'"),
         ({"fields": ["kinetic"]}, "fields = .kinetic.: .*choose one of displacement, velocity"),
         ({"nodes": [99]}, "node 99 is out of range; there are 0 to 7"),
-        ({"nodes": "1,x"}, "give numbers, as in 0,7,12"),
+        ({"nodes": "1,x"}, 'nodes = "1,x": .* is not a condition'),
+        ({"nodes": "x > 99"}, "selects no vertex"),
         ({"nodes": [0], "rows": "time"}, "nodes: rows of this table are not for nodes but time"),
         ({"every": 0}, "every"),
         ({"step": 1}, "not an option of the format csv"),

@@ -40,6 +40,8 @@ def test_a_file_is_exported_as_the_result_in_it(motion, tmp_path):
     ("name", "options", "message"),
     [
         ("a.xyz", {}, r"a\.xyz: has the unknown extension '\.xyz'; results go to \.\w+, "),
+        ("a.vtu", {}, r"'\.vtu'; write a\.vtkhdf: all samples and fields, for ParaView; results"),
+        ("a.VTK", {}, r"write a\.vtkhdf: "),
         ("a", {}, r"a: has no extension; results go to"),
         ("a.glb", {"format": "gltf"}, r"format = \"gltf\": .*choose one of"),
         ("a.glb", {"frame": 1}, r"frame: not an option of the format glb; did you mean 'frames'"),

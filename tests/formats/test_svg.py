@@ -86,7 +86,7 @@ def test_opacity_is_the_fold_angle():
     np.testing.assert_allclose(
         drawing.fold_angles, [-90, 45, 45, -36, -180, np.nan], atol=1e-12, rtol=0
     )
-    assert "fold angle" in drawing.assumptions[0]
+    assert drawing.assumptions == ("opacities are fold angles over 180 degrees",)
 
 
 def test_opaque_lines_have_no_angle_unless_it_is_stated():
@@ -96,6 +96,9 @@ def test_opaque_lines_have_no_angle_unless_it_is_stated():
         document('<line x2="1" stroke="red" opacity="1"/><line x2="2" stroke="blue"/>')
     )
     assert drawing.fold_angles[0] == -180 and np.isnan(drawing.fold_angles[1])
+    assert drawing.assumptions == (  # no claim that somebody drew angles
+        "all lines have opacity 1: creases fold to 180 degrees unless --to says otherwise",
+    )
 
 
 # ------------------------------------------------------------------------ what is drawn

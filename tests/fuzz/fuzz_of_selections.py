@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fuzz_target import Target
 
-from foldyn.cases.selection import select
 from foldyn.patterns import miura
+from foldyn.patterns.selection import select
 
 PATTERN = miura((2, 1))
 WORDS = ("x", "y", "z", "xmin", "ymax", "zmin", "and", "or", "not", "<", "<=", ">", "==", "!=",

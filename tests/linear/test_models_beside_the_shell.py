@@ -13,6 +13,7 @@ import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear import fidelity as compare_models
 from foldyn.linear.advice import SCOPE, percent, reach
+from foldyn.linear.compared import legend
 from foldyn.linear.fidelity import MODELS, comparison
 from foldyn.linear.shell_of import meshes, shell_of, triangle_count
 from foldyn.linear.small_loads import forces_alone, rest_forces, small_loads
@@ -146,6 +147,7 @@ def test_superlinear_bends_have_no_stiffness(quick):
     assert "8 of its hinges are superlinear and have no stiffness at rest" in found.advice
     assert "no stiffness at all (own)" in found.advice
     assert "soft" in str(found)
+    assert "\nsoft: the model at rest has no stiffness against these loads\n" in str(found)
     swung = fd.fidelity(case, 3, (2, 4), ["plate"], secant=5.0)
     assert np.isfinite(swung.result["deflection_error"]).all()
     assert "no stiffness" not in swung.advice
@@ -161,6 +163,21 @@ def test_a_kresling_cell_vibrates_as_plates():
     assert "Take the shell." in found.advice
     assert str(found).count(" * ") == 3
     assert "\n* above 0.6 of the plate frequency, 1.365 Hz" in str(found)
+
+
+def test_a_legend_says_what_words_of_the_table_mean(quick):
+    """Those that occur in it: where nothing is lost, nothing is said of it."""
+    result = quick[1].result.copy(deep=True)
+    result["error"][:] = 0.01
+    result["deflection_error"][:] = 0.01
+    result.attrs["limit"] = 1e9
+    words = legend(fd.Fidelity(result))
+    assert words == ["own: the model of the case"]
+    result["error"][0, 1] = np.inf
+    assert legend(fd.Fidelity(result))[1:] == [
+        "lost: no mode of the model has this shape (MAC below 0.5)"
+    ]
+    assert set(words) < set(str(fd.Fidelity(result)).splitlines())
 
 
 def test_it_is_read_as_it_was_saved(quick, tmp_path):

@@ -123,3 +123,14 @@ def test_uneven_times_are_refused(trajectory):
     uneven = trajectory.isel(time=[0, 1, 2, 3, 5, 8])
     with pytest.raises(InputError, match="not evenly spaced"):
         plot_history({"run": uneven}, [6])
+
+
+def test_a_motion_alone_has_no_label(trajectory):
+    figures = [plot_history(given, [6, 7]) for given in (trajectory, {"run": trajectory})]
+    for one, other in zip(*(figure.axes for figure in figures), strict=True):
+        np.testing.assert_array_equal(*(a.get_lines()[0].get_xydata() for a in (one, other)))
+    assert not figures[0].legends and len(figures[1].legends) == 1
+    assert len(plot_history(trajectory, 6).axes) == 2  # one number
+    assert len(plot_history(trajectory, [6, 6], ["x", "z"]).axes) == 4  # one node, two directions
+    named = plot_history(trajectory, "xmax").axes[::2]
+    assert [axes.get_title() for axes in named] == [f"node {k}" for k in (6, 7, 8)]

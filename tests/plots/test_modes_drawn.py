@@ -226,7 +226,7 @@ def test_a_large_mac_matrix_has_no_numbers():
         (lambda case, modes: draw_modes(case, modes.drop_vars("shape")), "has no shape"),
         (lambda case, modes: plot_mac([1.0]), "shape .1,.; give a matrix"),
         (lambda case, modes: plot_mac([[1.5]]), "not between 0 and 1"),
-        (lambda case, modes: plot_mac([[np.nan]]), "not between 0 and 1"),
+        (lambda case, modes: plot_mac([[np.nan]]), "must be a finite number"),
         (lambda case, modes: plot_mac([[1.0]], rows=["a", "b"]), "rows: 2 labels for 1 modes"),
     ],
 )
@@ -241,3 +241,23 @@ def test_bad_films(case, modes, tmp_path):
     with pytest.raises(InputError, match="frames = 1"):
         animate_modes(case, modes, tmp_path / "modes.gif", frames=1)
     assert not list(tmp_path.iterdir())
+
+
+def test_modes_bring_their_case(case, modes, tmp_path):
+    """By its place or its name, with the other arguments behind it as they are."""
+    expected = draw_modes(case, modes, [5, 1], 0.1)
+    for figure in (
+        draw_modes(modes, [5, 1], 0.1),
+        draw_modes(modes=modes, which=[5, 1], amplitude=0.1),
+        draw_modes(modes=modes, case_or_structure=case, which=[5, 1], amplitude=0.1),
+    ):
+        assert texts(figure) == texts(expected)
+        for axes, own in zip(figure.axes, expected.axes, strict=True):
+            assert drawn(axes) == drawn(own)
+    film = animate_modes(modes, tmp_path / "m.gif", [5], frames=2)
+    assert (
+        film.read_bytes()
+        == animate_modes(case, modes, tmp_path / "n.gif", [5], frames=2).read_bytes()
+    )
+    with pytest.raises(InputError, match="case_or_structure = 3: give a case, a structure"):
+        draw_modes(3, modes)

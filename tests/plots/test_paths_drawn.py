@@ -349,9 +349,10 @@ def test_pictures_of_a_path_are_spread_over_its_way(case, path):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda case, path: plot_load_displacement({}, [7]), "paths: give a mapping"),
-        (lambda case, path: plot_load_displacement(path, [7]), "paths: give a mapping"),
-        (lambda case, path: plot_load_displacement({"a": path}, []), "nodes: empty"),
+        (lambda case, path: plot_load_displacement({}, [7]), "paths: give a result"),
+        (lambda case, path: plot_load_displacement({"a": case}, [7]), "paths.'a'. = .*: give a"),
+        (lambda case, path: plot_load_displacement({"a": path}, []), "nodes = ..: give nodes"),
+        (lambda case, path: plot_load_displacement(path, "x > 99"), "selects no vertex"),
         (lambda case, path: plot_load_displacement({"a": path}, [13]), "13 is not in 'a'"),
         (lambda case, path: plot_load_displacement({"a": path}, [7], "w"), 'direction = "w"'),
         (
@@ -374,3 +375,24 @@ def test_bad_input(case, path, call, words):
 def test_motions_are_no_paths(case, trajectory):
     with pytest.raises(InputError, match="is not a path"):
         plot_load_displacement({"a": trajectory}, [7])
+
+
+def test_a_path_alone_needs_no_label_and_brings_its_case(held):
+    path = made(held)
+    nodes = np.flatnonzero(np.isclose(held.structure.nodes[:, 0], held.structure.nodes[:, 0].max()))
+    for draw in (plot_load_displacement, plot_reaction):
+        chosen = [7, 6] if draw is plot_load_displacement else [6, 8]
+        lines = [
+            [line.get_xydata() for line in curves(draw(given, chosen))]
+            for given in (path, {"one": path})
+        ]
+        for one, other in zip(*lines, strict=True):
+            np.testing.assert_array_equal(one, other)
+    by_place = plot_load_displacement(path, "xmax", "-z")
+    by_number = plot_load_displacement(path, nodes[nodes < 9].tolist(), "-z")
+    assert keys(by_place) == keys(by_number) and keys(by_place)[0] == f"node {nodes[0]}"
+    figures = draw_shapes(path, [0, 7]), draw_shapes(held, path, [0, 7])
+    for one, other in zip(*(figure.axes for figure in figures), strict=True):
+        for a, b in zip(one.collections, other.collections, strict=True):
+            if hasattr(a, "_segments3d"):
+                np.testing.assert_allclose(a._segments3d, b._segments3d, atol=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 
 import foldyn as fd
 from foldyn import plots
+from foldyn.errors import InputError
 
 
 def test_matplotlib_is_imported_on_first_use():
@@ -78,3 +80,29 @@ def _pixels(figure):
     assert figure.dpi == 150
     figure.canvas.draw()
     return bytes(figure.canvas.buffer_rgba())
+
+
+REST = {"path": "x.gif", "nodes": [0], "node": 0, "measure": "m", "duration": 1.0}
+NEEDED = inspect.Parameter.empty
+
+
+WRONG = [3, "x", {}, [], None, object()]
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=lambda one: type(one).__name__)
+def test_what_a_figure_cannot_show_is_refused(wrong, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in plots.__all__:
+        if name.startswith(("plot_", "draw_", "animate")):
+            draw = getattr(plots, name)
+            others = [*inspect.signature(draw).parameters.values()][1:]
+            more = [REST.get(one.name, wrong) for one in others if one.default is NEEDED]
+            with pytest.raises(InputError):
+                draw(wrong, *more)
+
+
+def test_a_result_stands_for_its_case(case, trajectory):
+    for draw in (
+        plots.draw_structure, plots.plot_laws, lambda given: plots.plot_load_history(given, 1.0),
+    ):  # fmt: skip
+        assert _pixels(draw(trajectory)) == _pixels(draw(case))

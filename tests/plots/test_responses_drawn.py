@@ -267,9 +267,9 @@ def test_without_a_circle_the_whole_curve_is_drawn(case):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda r: plot_frf({}, [7]), "responses: give a mapping"),
-        (lambda r: plot_frf(r, [7]), "response"),
-        (lambda r: plot_frf({"a": r}, []), "nodes: empty"),
+        (lambda r: plot_frf({}, [7]), "responses: give a result, or a mapping"),
+        (lambda r: plot_frf({"a": r}, []), "nodes = ..: give nodes"),
+        (lambda r: plot_frf(r, [7.5]), "nodes = 7.5: must be a whole number"),
         (lambda r: plot_frf({"a": r}, [13]), "13 is not in 'a', whose nodes are 0..12"),
         (lambda r: plot_frf({"a": r}, [7], "w"), 'axes = "w"'),
         (lambda r: plot_frf({"a": r}, [7, 6], ["x", "y", "z"]), "3 directions for 2 nodes"),
@@ -294,3 +294,10 @@ def test_what_a_moving_base_cannot_be(case, response, trajectory):
         plot_nyquist(moved, 7)
     with pytest.raises(InputError, match=r"give a result of fd\.frf"):
         plot_frf({"a": trajectory}, [7])
+
+
+def test_a_response_alone_needs_no_label(response):
+    figures = [plot_frf(given, [7, 6]) for given in (response, {"one": response})]
+    assert keys(figures[0]) == keys(figures[1])
+    for one, other in zip(*(figure.axes for figure in figures), strict=True):
+        np.testing.assert_array_equal(*(a.get_lines()[0].get_xydata() for a in (one, other)))

@@ -68,7 +68,7 @@ def test_histories_have_gaps_and_say_how_much_was_measured():
 
 @pytest.mark.parametrize(
     ("arguments", "match"),
-    [(([],), "name at least one"), (([7],), "7 is not in"), (([0], "w"), "choose one of x, y, z")],
+    [(([],), "give nodes to show"), (([7],), "7 is not in"), (([0], "w"), "choose one of x, y, z")],
 )
 def test_histories_of_what_is_not_there(arguments, match):
     with pytest.raises(InputError, match=match):

@@ -170,10 +170,6 @@ class Analysis(ABC):
     def check(self, computations: Sequence[Compute], figures: bool) -> None:  # noqa: B027
         """Refuse computations of several mass rules that cannot run, or be drawn, together."""
 
-    def compiles(self, computations: Sequence[Compute]) -> bool:
-        """Whether kernels have to be compiled first without a bar that says so."""
-        return False
-
     def shown(self, case: Case) -> NDArray[np.int64]:
         """Nodes to show where the file names none: those with a force, else all that can move."""
         return case.loaded_nodes if case.loaded_nodes.size else movable(case)
@@ -250,6 +246,12 @@ class CaseFile:
     def sweep(self) -> SweepSection | None:
         """Its table [sweep], None where it has none."""
         return self._schema.sweep
+
+    @property
+    def start_keys(self) -> dict[str, Any]:
+        """What its table [initial] says; nothing where it has none."""
+        section = getattr(self._schema, "initial", None)
+        return {} if section is None else section.model_dump(exclude_unset=True)
 
     def case(self, mass: str | None = None) -> Case:
         """Case with one of the mass rules, by default the first that the file names."""

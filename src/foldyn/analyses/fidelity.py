@@ -19,6 +19,7 @@ from foldyn.cases.models import SHELL
 from foldyn.errors import InputError
 from foldyn.linear import Fidelity, fidelity
 from foldyn.linear.advice import percent
+from foldyn.linear.compared import legend
 from foldyn.linear.fidelity import MODELS, comparison, named
 from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
@@ -156,11 +157,13 @@ def _models(found: Fidelity) -> Table:
         if forces:
             row.append(_told(float(one["deflection_error"]), "soft"))
         rows.append([*row, 1e3 * float(one["model_seconds"]), f"1/{float(one['cost_ratio']):.0f}"])
+    words = [line for line in legend(found) if not line.startswith("*")]  # here are no modes
     return Table(
         [*header, "time (ms)", "of the shell's"],
         rows,
         f"Errors against the shell of the {int(below.sum())} modes below 0.6 of the plate "
-        f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest.",
+        f"frequency, {found.limit:.4g} Hz; lost modes do not count in median and largest. "
+        f"{'; '.join(words)}.",
         digits=3,
     )
 
@@ -177,8 +180,8 @@ def _modes(found: Fidelity) -> Table:
         ["mode", "shell (Hz)", "mesh (%)", *found.models],
         rows,
         "Elastic modes of the shell: frequency extrapolated in the size of its mesh, and how far "
-        "the finer mesh is off; errors of the models in % and, in parentheses, their MAC. * above "
-        "0.6 of the plate frequency.",
+        "the finer mesh is off; errors of the models in % and, in parentheses, their MAC. "
+        f"{'; '.join(legend(found))}.",
     )
 
 

@@ -248,5 +248,4 @@ class FrfAnalysis(Analysis):
 def _bar(shown: bool) -> Any:
     """Bar of a response: what it counts depends on the method."""
     layout = "{desc}: {percentage:3.0f} %|{bar}| [{elapsed}<{remaining}]"
-    text = "response (first use compiles kernels)"
-    return bar(shown, total=1.0, desc=text, bar_format=layout)
+    return bar(shown, total=1.0, desc="response", bar_format=layout)

@@ -75,7 +75,7 @@ class ModesAnalysis(Analysis):
         check_internal(case.structure, given.get("internal", 0))
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            text = f"modes with mass rule {mass} (first use compiles kernels)"
+            text = f"modes with mass rule {mass}"
             with bar_closed(bar(progress, bar_format=text)):
                 result = modes(case, **given)
             begun()

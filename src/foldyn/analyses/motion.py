@@ -15,7 +15,7 @@ from foldyn.analyses.sections import Animation, CaseSchema, Positive, Section, S
 from foldyn.analyses.start import MotionStart
 from foldyn.cases import Case
 from foldyn.cases.models import SHELL
-from foldyn.dynamics import METHODS, Keeping, compiled, prepare
+from foldyn.dynamics import METHODS, Keeping, prepare
 from foldyn.dynamics.beside import METHOD as BESIDE
 from foldyn.dynamics.beside import groups, integrate
 from foldyn.dynamics.method_choice import AUTO
@@ -153,11 +153,6 @@ class MotionAnalysis(Analysis):
             check_room(*size, kept[0].room)
         if len(kept) < len(motions) or any(one.shown for one in prepared):
             check_samples(*size, len(motions))
-
-    def compiles(self, computations: Sequence[Compute]) -> bool:
-        """Whether the integrator is used for the first time."""
-        motions = [one.motion for one in computations if isinstance(one, _Prepared)]
-        return not all(compiled(motion.method.name) for motion in motions)
 
     def line(self, name: str, result: xarray.Dataset) -> str:
         """Method and its reason if it was chosen, steps, speed and accuracy."""

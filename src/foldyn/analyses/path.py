@@ -151,7 +151,7 @@ class PathAnalysis(Analysis):
     moving = True
     schema = PathSchema
     files = (
-        "reaction", "curve", "energies", "shapes", "path.gif", "path.mp4",
+        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4",
     )  # fmt: skip
     needs_density = ""
     takes = arguments_of(trace)
@@ -217,6 +217,4 @@ class PathAnalysis(Analysis):
 
 def _bar(shown: bool) -> Any:
     """Bar of points, whose number is not known."""
-    made = bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)
-    made.set_postfix_str("first use compiles kernels, up to half a minute")
-    return made
+    return bar(shown, bar_format="points: {n_fmt}{postfix} [{elapsed}]", mininterval=0.0)

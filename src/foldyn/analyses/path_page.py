@@ -9,6 +9,8 @@ import xarray
 
 from foldyn import plots
 from foldyn.analyses.casefile import CaseFile
+from foldyn.cases import Case
+from foldyn.errors import ComputationError, InputError
 from foldyn.plots.along import CRITICAL, along, evenly, main_direction
 from foldyn.report.album import (
     Album,
@@ -20,6 +22,7 @@ from foldyn.report.album import (
 )
 from foldyn.report.charts import Chart, Charts, Curve
 from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
+from foldyn.statics import Landscape, landscape
 
 FRAMES, FPS = 60, 15
 MOST_CURVES = 8
@@ -44,7 +47,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "reaction",
             f"Total force of the supports at {listed('node', moved[0])}, which are moved along "
             f"{moved[1]}, over their displacement.",
-            lambda: plots.plot_reaction({"": path}, *moved),
+            lambda: plots.plot_reaction(path, *moved),
             _reaction(path, *moved),
         )
     if moved is None or not set(nodes) <= set(moved[0]):
@@ -52,7 +55,7 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             "curve",
             f"Load factor over the displacement of {listed('node', nodes)}{some} along "
             f"{direction}.",
-            lambda: plots.plot_load_displacement({"": path}, nodes, direction),
+            lambda: plots.plot_load_displacement(path, nodes, direction),
         )
     if path.sizes["step"] > 1:
         over: tuple[list[int], str] | tuple[None, None] = None, None
@@ -63,6 +66,15 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
             f"Strain energies of {', '.join(plots.energy_shares(path))}, stacked, with the work "
             "done on the structure; below, their shares.",
             lambda: plots.plot_path_energies(path, *over),
+        )
+    found = _landscape(case, path, moved)
+    if found is not None:
+        yield from album.figure(
+            "landscape",
+            "Energy and force over the stroke, with the states that stay without force (dots: "
+            "stable; rings: unstable) and shaded where the force falls.",
+            lambda: plots.plot_landscape(found),
+            _energy(found),
         )
     scale, enlarged = visible_scale(case, path)
     yield from album.figure(
@@ -76,6 +88,8 @@ def path_sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterato
         yield Picture(film, f"Along the path{enlarged}; at rest in gray.")
     yield Heading("The numbers")
     yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
+    if found is not None:
+        yield _states(found)
     yield from crossing_panels(results)
     yield _run(case_file, path)
     yield Text(
@@ -95,6 +109,45 @@ def _reaction(path: xarray.Dataset, nodes: list[int], direction: str) -> Charts:
     )  # fmt: skip
     chart = Chart(f"displacement along {direction} (m)", "force (N)", [curve])
     return Charts([chart], f"Total force of the supports that are moved along {direction}.")
+
+
+def _landscape(
+    case: Case, path: xarray.Dataset, moved: tuple[list[int], str] | None
+) -> Landscape | None:
+    """The energy landscape of a path along which what drives it falls; None of others."""
+    driven = path["load_factor"].values if moved is None else plots.total_reaction(path, *moved)
+    if not (np.diff(driven) < 0.0).any():
+        return None
+    try:
+        found = landscape(path, case)
+    except (InputError, ComputationError):  # driven by both or by folds, or too coarse
+        return None
+    return found if found.negative_stiffness else None
+
+
+def _energy(found: Landscape) -> Charts:
+    """Energy over the stroke, for a page without figures."""
+    stroke, _, energy = plots.with_states(found)
+    states = np.array([[state.stroke, state.energy] for state in found.states]).reshape(-1, 2)
+    curves = [Curve("energy", stroke, energy), Curve("states", *states.T, dots=True)]
+    chart = Chart("stroke (m)", "energy (J)", curves, note=plots.barriers(found))
+    return Charts([chart], "Energy over the stroke, with the states that stay without force.")
+
+
+def _states(found: Landscape) -> Table:
+    """States without force, and the barriers between the stable ones."""
+    rows, passed = [], 0
+    for state in found.states:
+        ahead = back = None
+        if state.stable:
+            ahead = found.barrier(passed, passed + 1) if passed + 1 < len(found.stable) else None
+            back = found.barrier(passed, passed - 1) if passed else None
+            passed += 1
+        word = "stable" if state.stable else "unstable"
+        rows.append([state.stroke, cell(state.energy), word, ahead, back])
+    header = ["stroke (m)", "energy (J)", "stability", "barrier ahead (J)", "barrier back (J)"]
+    ranges = "; ".join(f"{start:.4g} to {end:.4g} m" for start, end in found.negative_stiffness)
+    return Table(header, rows, f"States without force. The force falls from {ranges}.")
 
 
 def _multiplied(path: xarray.Dataset) -> str:

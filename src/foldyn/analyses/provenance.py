@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foldyn.cases import History
+from foldyn.cases import Contact, History
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.structures import PanelSheet
-from foldyn.values import plain
+from foldyn.values import plain, unit_of
 
 if TYPE_CHECKING:
     import xarray
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from foldyn.analyses.casefile import CaseFile
     from foldyn.cases import Case
 
-UNITS: Mapping[str, str] = {
-    "youngs_modulus": "Pa", "thickness": "m", "density": "kg/m3", "alpha": "1/s", "beta": "s",
-    "crease_stiffness": "N m/rad per m", "crease_rest": "degrees",
-}  # fmt: skip
 MOST_LISTED = 24
 """Numbers of a list that are written one by one, at most."""
 MOST = 200  # characters of a value
@@ -90,6 +86,8 @@ def inputs(case_file: CaseFile, case: Case, results: ByRule) -> list[tuple[str, 
         ("loads", _parts(case.loads)),
         ("damping", damping_text(case)),
         ("point masses", _point_masses(case) if case.masses else ""),
+        ("contact", _contact(case.contact) if case.contact else ""),
+        ("initial state", _listed(case_file.start_keys)),
         ("analysis", f"{analysis.kind}; {_listed(analysis.arguments)}"),
     ]
 
@@ -142,6 +140,14 @@ def _point_masses(case: Case) -> str:
     return f"{masses.sum():.6g} kg on {nodes}, of {case.total_mass:.6g} kg in all"
 
 
+def _contact(contact: Contact) -> str:
+    """What may touch, with how much friction, in words."""
+    given = _given(contact)
+    planes, panels = given.pop("planes"), given.pop("panels")
+    touching = "between panels" if panels else "on planes alone"
+    return ". ".join([f"{touching}; {_listed(given)}", *filter(None, [_parts(planes)])])
+
+
 def mesh_error(result: xarray.Dataset) -> str:
     """What a result says of its mesh, in words; empty where there is nothing to say."""
     if "mesh_error" not in result.attrs:
@@ -161,7 +167,7 @@ def _given(choices: Any) -> dict[str, Any]:
 def _listed(values: Mapping[str, Any]) -> str:
     """Names and values with their units; what was not given is left out."""
     return "; ".join(
-        f"{name.replace('_', ' ')} {_written(value)} {UNITS.get(name, '')}".rstrip()
+        f"{name.replace('_', ' ')} {_written(value)} {unit_of(name, value)}".rstrip()
         for name, value in values.items()
         if value is not None and not (isinstance(value, tuple) and not value)
     )

@@ -154,9 +154,13 @@ Vector = Annotated[Any, PlainValidator(lambda value: vector("", value))]
 BarLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, BAR_LAWS))]
 HingeLawSpec = Annotated[Any, PlainValidator(lambda value: law_from(value, HINGE_LAWS))]
 PerCrease = Annotated[Any, PlainValidator(_per_crease)]
-Pairs = Annotated[Any, PlainValidator(lambda value: check_pairs("", value))]
+Edges = Annotated[Any, PlainValidator(lambda value: _edges(value))]
 Rigid = Annotated[Any, PlainValidator(lambda value: checked_panels(value, MOST, ""))]
 Animation = Annotated[str, one_of(ANIMATIONS)]
+
+
+def _edges(value: Any) -> Any:
+    return check_nodes(value, "") if isinstance(value, str) else check_pairs("", value)
 
 
 Ratio = Annotated[float, Field(gt=-1, lt=0.5)]
@@ -197,9 +201,9 @@ class ModelSection(Section):
     calibration: Annotated[Any, one_of(CALIBRATIONS)] = None
     crease_stiffness: PerCrease = None
     crease_rest: PerCrease = None
-    clamped: Pairs = None
+    clamped: Edges = None
     rigid: Rigid = None
-    straight: Pairs = None
+    straight: Edges = None
 
     @model_validator(mode="after")
     def _fits_the_kind(self) -> Self:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from foldyn.analyses.keys import parts
-from foldyn.cases.expressions import parse, written
 from foldyn.errors import InputError, within
+from foldyn.patterns.expressions import parse, written
 from foldyn.values import shortened, show, suggest
 
 _OPERATIONS = {

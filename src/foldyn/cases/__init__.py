@@ -9,9 +9,10 @@ from foldyn.cases.histories import *  # noqa: F403 - what it lists
 from foldyn.cases.history import Function, as_history
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
-from foldyn.cases.selection import resolve_nodes, select
+from foldyn.cases.selection import resolve_nodes
 from foldyn.cases.state import Continuation, State
 from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
+from foldyn.patterns.selection import select
 
 __all__ = [
     "SUPPORTS",

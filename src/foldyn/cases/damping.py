@@ -21,6 +21,7 @@ from foldyn.values import brief, choice, number, number_or_list, show, whole
 STATES = ("rest", "start")
 
 
+@brief
 @dataclass(frozen=True)
 class Rayleigh:
     """Damping matrix C = alpha M + beta K0, K0 the tangent stiffness at a stated state.

@@ -48,6 +48,7 @@ class _Lasting(Formula):
         return 0.0, self.duration
 
 
+@brief
 @dataclass(frozen=True)
 class Pulse(_Lasting):
     """Factor 1 for 0 <= t < duration, else 0.
@@ -71,6 +72,7 @@ class Pulse(_Lasting):
         return 0.0, self.duration
 
 
+@brief
 @dataclass(frozen=True)
 class HalfSine(_Lasting):
     """Factor sin(pi t / duration) for 0 <= t < duration, else 0.
@@ -85,6 +87,7 @@ class HalfSine(_Lasting):
     code: ClassVar[int] = waveforms.HALF_SINE
 
 
+@brief
 @dataclass(frozen=True)
 class Ramp(_Lasting):
     """Factor t / duration, held at 0 before t = 0 and at 1 from t = duration on.
@@ -119,6 +122,7 @@ class Ramp(_Lasting):
         return waveforms.SMOOTH_RAMP if self.smooth else waveforms.RAMP
 
 
+@brief
 @dataclass(frozen=True)
 class Step(Formula):
     """Factor 0 before `time`, 1 from then on.
@@ -146,6 +150,7 @@ class Step(Formula):
         return (self.time,)
 
 
+@brief
 @dataclass(frozen=True)
 class Harmonic(Formula):
     """Factor sin(2 pi frequency t + phase).
@@ -173,6 +178,7 @@ class Harmonic(Formula):
         return self.frequency, math.radians(self.phase)
 
 
+@brief
 @dataclass(frozen=True)
 class Chirp(Formula):
     """Factor sin(2 pi (start t + (end - start) t^2 / (2 duration)) + phase), 0 <= t < duration.

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import waveforms
 from foldyn.errors import InputError
-from foldyn.values import numbers, show
+from foldyn.values import brief, numbers, show
 
 
 class History(ABC):
@@ -71,6 +71,7 @@ class Formula(History):
         return waveforms.waveform_table(packed, 0, flat).reshape((3, *times.shape))
 
 
+@brief
 @dataclass(frozen=True)
 class Constant(Formula):
     """Factor 1 at all times."""

@@ -90,6 +90,7 @@ class Force(Load):
         check_held(f"the force {show(self.vector)}", nodes, acts, fixed, place)
 
 
+@brief
 @dataclass(frozen=True)
 class Gravity(Load):
     """Gravity on the whole structure, times a history.

@@ -106,6 +106,7 @@ class Impose(Part):
         object.__setattr__(self, "history", as_history(self.history))
 
 
+@brief
 @dataclass(frozen=True)
 class BaseMotion(Part):
     """The base moves along one axis: all that `Fix` holds along it moves together.

@@ -48,7 +48,7 @@ def add_convert(commands: Any) -> None:
     command.add_argument("--seconds", type=float, help="how long an animation (.glb) takes")
     command.add_argument("--rows", help="of tables, what a row is for: time,node (default), time")
     command.add_argument("--fields", help="of a result, these variables: displacement,velocity")
-    command.add_argument("--nodes", help="of a result, these nodes: 0,7,12")
+    command.add_argument("--nodes", help="of a result, these nodes: 0,7,12, or a selection: xmax")
     command.add_argument("--divisions", type=int, help="of input decks, pieces of every edge (16)")
     command.add_argument("--modes", type=int, help="of input decks, how many frequencies (6)")
     command.add_argument("--element", help="of Abaqus, kind of the triangles: STRI3 (default), S3")

@@ -111,7 +111,6 @@ def _fit(plan: FitFile, results: Results, quiet: bool) -> Fit:
     kept = results.folder / KEPT
     layout = "evaluations: {n_fmt}{postfix} [{elapsed}]"
     with progress_bar(quiet, bar_format=layout, mininterval=0.0) as bar:
-        bar.set_postfix_str("first use compiles kernels, up to half a minute")
 
         def tell(course: Course) -> None:
             if not results.kept:

@@ -22,7 +22,7 @@ from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.lasting import lasting
 from foldyn.cli.options import add_figures, add_film, add_results, flag
 from foldyn.cli.signals import ENDINGS
-from foldyn.cli.streams import Outlet, steady_streams
+from foldyn.cli.streams import Outlet, noticed, steady_streams
 from foldyn.cli.study import add_study, study
 from foldyn.cli.sweep import add_sweep, run_sweep
 from foldyn.cli.track import add_track, track
@@ -205,7 +205,8 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", FoldynWarning)
             warnings.showwarning = _Warnings()
-            with at_most(1.0 if given.command == "info" or given.force else HALF):
+            most = 1.0 if given.command == "info" or given.force else HALF
+            with at_most(most), noticed(getattr(given, "quiet", False)):
                 _call(given)
     except InputError as error:
         return _say(str(error), BAD_INPUT)

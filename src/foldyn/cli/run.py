@@ -216,10 +216,5 @@ def _introduction(
         parts = PARTS[case_file.model]
         counted = ", ".join(f"{len(getattr(structure, part))} {part}" for part in parts)
         say(f"{case_file.title or case_file.path.name}: {counted}")
-        if case_file.analysis.compiles([one.compute for one in task]):
-            say(
-                "compiling the kernels: first use, a minute or two; they are kept for later runs "
-                "(foldyn warm-up compiles those of other methods and models too)"
-            )
 
     return introduce

@@ -6,7 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from typing import Any, TextIO
 
@@ -81,6 +81,19 @@ def _fill_closed() -> None:
 def speech(quiet: bool) -> Callable[[str], None]:
     """Return what prints a line at once, or nothing if the command is to be quiet."""
     return (lambda text: None) if quiet else partial(print, flush=True)
+
+
+def noticed(quiet: bool) -> AbstractContextManager[None]:
+    """Print what is told while kernels are compiled, unless the command is to be quiet."""
+    from foldyn.notice import NOTICE
+
+    def tell(text: str) -> None:
+        from tqdm import tqdm
+
+        tqdm.write(text)  # above a bar, if there is one
+        sys.stdout.flush()
+
+    return NOTICE.telling(speech(True) if quiet else tell)
 
 
 def progress_bar(quiet: bool, **options: Any) -> Any:

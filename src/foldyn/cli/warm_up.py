@@ -15,8 +15,8 @@ def add_warm_up(commands: Any) -> None:
     command = commands.add_parser(
         "warm-up",
         help="compile the usual kernels now, so that first runs need not",
-        description="Compile the kernels of motions that are not kept on disk yet: a minute or two "
-        "for each method and model, seconds where all is there.",
+        description="Compile the kernels of motions that are not kept on disk yet, and say how "
+        "many and for how long; seconds where all is there.",
     )
     command.add_argument(
         "--methods", nargs="+", metavar="NAME",

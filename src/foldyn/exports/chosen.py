@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.results.dataset import DOCUMENT
+from foldyn.results.node_choice import nodes_of
 from foldyn.values import choice, indices, show
 
 ALONG = {
@@ -56,15 +57,15 @@ def chosen_nodes(result: xr.Dataset, nodes: int | str | Sequence[int] | None) ->
     Raises
     ------
     InputError
-        No numbers of nodes of the result.
+        No nodes of the result.
     """
     count = result.sizes["node"]
     if nodes is None:
         return np.arange(count)
     if isinstance(nodes, str):
         words = nodes.replace(",", " ").split()
-        if not words or not all(word.isdecimal() for word in words):
-            raise InputError(f" = {show(nodes)}: give numbers, as in 0,7,12", "nodes")
+        if not all(word.isdecimal() for word in words):
+            return np.array(nodes_of(result, nodes), np.int64)
         nodes = [int(word) for word in words]
     asked = np.array(indices("nodes", nodes, "node", "or leave it out for all"), np.int64)
     beyond = asked[(asked < 0) | (asked >= count)]

@@ -42,6 +42,8 @@ class Export:
         cannot be run again from themselves are exported too.
     of_cases : bool
         Whether `write` needs nothing but the case, which may then stand in place of a result.
+    in_place_of : tuple of str
+        Suffixes of formats that are not written, whose readers read this one.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Export:
     doc: str
     needs_case: bool = True
     of_cases: bool = False
+    in_place_of: tuple[str, ...] = ()
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -74,7 +77,14 @@ _EXPORTS = (
         "states as patterns: frames of a FOLD file, a series of OBJ or STL files",
         needs_case=False,
     ),
-    Export("vtkhdf", (".vtkhdf",), SHAPES, vtkhdf.write, "all samples and fields, for ParaView"),
+    Export(
+        "vtkhdf",
+        (".vtkhdf",),
+        SHAPES,
+        vtkhdf.write,
+        "all samples and fields, for ParaView",
+        in_place_of=(".vtk", ".vtu", ".vtp", ".pvd", ".xdmf"),
+    ),
     Export("csv", (".csv",), tuple(ALONG), csv_tables.write, "tidy tables", needs_case=False),
     Export("mat", (".mat",), tuple(ALONG), mat.write, "MATLAB, Octave", needs_case=False),
     Export(
@@ -201,5 +211,8 @@ def _format_of(file: Path, name: str | None) -> Export:
     found = BY_SUFFIX.get(file.suffix.lower())
     if found is None:
         has = f"has the unknown extension {file.suffix!r}" if file.suffix else "has no extension"
-        raise InputError(f"{file}: {has}; results go to {', '.join(sorted(BY_SUFFIX))}")
+        near = [one for one in _EXPORTS if file.suffix.lower() in one.in_place_of]
+        instead = [f"write {file.stem}{one.suffixes[0]}: {one.doc}; " for one in near]
+        known = ", ".join(sorted(BY_SUFFIX))
+        raise InputError(f"{file}: {has}; {''.join(instead)}results go to {known}")
     return found

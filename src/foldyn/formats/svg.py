@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
 _STATED = ("mm", "cm", "in", "pt", "pc")
+FAINT = "opacities are fold angles over 180 degrees"
+# what programs write that write an opacity everywhere, such as Inkscape
+OPAQUE = "all lines have opacity 1: creases fold to 180 degrees unless --to says otherwise"
 
 
 @dataclass(frozen=True)
@@ -247,12 +250,11 @@ def _fold_angles(letters: NDArray, opacities: NDArray) -> tuple[NDArray, tuple[s
     stated = folds & np.isfinite(opacities)
     if not stated.any():
         return np.full(len(letters), np.nan), ()
-    if (opacities[stated] < 1.0).any():
+    faint = bool((opacities[stated] < 1.0).any())
+    if faint:
         opacities = np.where(folds & ~stated, 1.0, opacities)
     angles = np.where(folds, 180.0 * opacities, np.nan)
-    return np.where(letters == "M", -angles, angles), (
-        "opacities are fold angles over 180 degrees",
-    )
+    return np.where(letters == "M", -angles, angles), (FAINT if faint else OPAQUE,)
 
 
 def _skipped(counts: Counter[str]) -> list[str]:

@@ -37,12 +37,14 @@ from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
 from foldyn.errors import FoldynWarning
-from foldyn.jit.sources import digest, read
+from foldyn.jit.sources import Part, digest, made_from, read
+from foldyn.notice import NOTICE
 from foldyn.writing import remove_leftovers, write_bytes
 
 REMEDY = "set NUMBA_CACHE_DIR to a folder that can be written"
 OTHERS = 3  # versions of a function that are kept beside the present one
 _SEAL = hashlib.sha256().digest_size
+_IMPORTED: dict[Part, list[Kept]] = {}  # by the statements that define them
 
 
 class Kept(_Cache):
@@ -57,6 +59,7 @@ class Kept(_Cache):
         self._code = code.co_code, code.co_names, [k for k in code.co_consts if _plain(k)]
         self._folder = folder_for(source.parent)
         self._stem = f"{source.stem}.{name}-"
+        _IMPORTED.setdefault(self._source, []).append(self)
         self.enable()
 
     @cached_property
@@ -80,6 +83,11 @@ class Kept(_Cache):
         """Whether a version for some arguments is on disk."""
         return self._folder is not None and any(self._folder.glob(f"{self._version}.*.nbc"))
 
+    def missing(self) -> list[Kept]:
+        """Compiled functions that it is made from, and itself, as far as they are not on disk."""
+        made = (one for part in made_from(*self._source) for one in _IMPORTED.get(part, ()))
+        return [one for one in made if not one.ready()]
+
     def flush(self) -> None:
         """Remove the present versions."""
         for path in self._folder.glob(f"{self._version}.*.nbc") if self._folder else ():
@@ -90,10 +98,14 @@ class Kept(_Cache):
         target_context.refresh()
         path = self._file(sig, target_context.codegen())
         data = None if path is None else _read(path)
-        return None if data is None else CompileResult._rebuild(target_context, *data)
+        if data is None:  # Numba compiles it now
+            NOTICE.begin(self, self.missing)
+            return None
+        return CompileResult._rebuild(target_context, *data)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled function; where that fails, it is compiled again next time."""
+        NOTICE.end()
         path = self._file(sig, data.codegen)
         if path is None or data.library.has_dynamic_globals:
             return

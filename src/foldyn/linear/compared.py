@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import NamedTuple
 
+import numpy as np
 import xarray
 
 from foldyn.errors import InputError
 from foldyn.linear.advice import OWN, advice, percent
+from foldyn.linear.matched import LEAST
 from foldyn.values import choice
 
 ABREAST, WIDE = 4, 79  # models beside each other in plain text, and letters of a line
@@ -124,9 +126,21 @@ def _text(found: Fidelity) -> str:
     parts = [
         _columns(found, found.models[k : k + ABREAST]) for k in range(0, len(found.models), ABREAST)
     ]
-    if any(not mode.below for mode in found.table()):
-        parts.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
+    parts.append("\n".join(legend(found)))
     return "\n\n".join(parts)
+
+
+def legend(found: Fidelity) -> list[str]:
+    """What the words and signs of the table mean, those that it has."""
+    deflection = found.result.get("deflection_error")
+    lines = [f"{OWN}: the model of the case"]
+    if not np.isfinite(found.result["error"].values).all():
+        lines.append(f"lost: no mode of the model has this shape (MAC below {LEAST:g})")
+    if deflection is not None and not np.isfinite(deflection.values).all():
+        lines.append("soft: the model at rest has no stiffness against these loads")
+    if any(not mode.below for mode in found.table()):
+        lines.append(f"* above 0.6 of the plate frequency, {found.limit:.4g} Hz")
+    return lines
 
 
 def _columns(found: Fidelity, models: tuple[str, ...]) -> str:

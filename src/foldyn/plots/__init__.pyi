@@ -10,6 +10,11 @@ from foldyn.plots.fidelity import plot_fidelity as plot_fidelity
 from foldyn.plots.folding import animate_folding as animate_folding, draw_folding as draw_folding
 from foldyn.plots.frf import plot_frf as plot_frf
 from foldyn.plots.history import plot_history as plot_history
+from foldyn.plots.landscape import (
+    barriers as barriers,
+    plot_landscape as plot_landscape,
+    with_states as with_states,
+)
 from foldyn.plots.laws import plot_laws as plot_laws
 from foldyn.plots.loads import plot_load_history as plot_load_history
 from foldyn.plots.modes import draw_modes as draw_modes, plot_mac as plot_mac

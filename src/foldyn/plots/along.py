@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from foldyn.cases.directions import signed
 from foldyn.errors import InputError
+from foldyn.plots.given import alone
+from foldyn.results.node_choice import nodes_of
 from foldyn.values import choice
 
 AXES = ("x", "y", "z")
@@ -19,20 +21,13 @@ CRITICAL = {"limit": "limit point", "bifurcation": "bifurcation"}
 """Kinds of points that figures mark, and their names."""
 
 
-def check_nodes_of(results: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> list[int]:
-    """The nodes as a list, refused where a result does not have one."""
-    numbers = [int(node) for node in nodes]
-    if not numbers:
-        raise InputError("nodes: empty; name at least one node to show")
+def check_nodes_of(
+    results: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int]
+) -> list[int]:
+    """The nodes as a list, a selection by the first pattern, refused where a result lacks one."""
     for label, result in results.items():
-        stored = result["node"].values
-        for node in numbers:
-            if node not in stored:
-                raise InputError(
-                    f"nodes: {node} is not in {label!r}, whose nodes are "
-                    f"{stored.min()}..{stored.max()}"
-                )
-    return numbers
+        nodes = nodes_of(result, nodes, repr(label) if label else "the result")
+    return list(nodes)  # pyright: ignore[reportArgumentType]
 
 
 def directions(
@@ -69,19 +64,12 @@ def directions(
 
 def check_path(path: xr.Dataset, name: str) -> None:
     """Refuse what is not a path, or one with NaN."""
+    alone(name, path)
     missing = [key for key in ("displacement", "load_factor", "point") if key not in path]
     if missing or "step" not in path.sizes:
         raise InputError(f"{name}: is not a path of fd.trace; it has no {missing or ['step']}")
     if not np.isfinite(path["displacement"].values).all():
         raise InputError(f"{name}: its displacement contains NaN or infinity")
-
-
-def check_paths(paths: Mapping[str, xr.Dataset]) -> None:
-    """Refuse what is not a mapping of label to path."""
-    if not isinstance(paths, Mapping) or not paths or "displacement" in paths:  # a path is one
-        raise InputError("paths: give a mapping of label to path, as {'specimen': path}")
-    for label, path in paths.items():
-        check_path(path, f"paths[{label!r}]")
 
 
 def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.float64]:
@@ -149,15 +137,16 @@ def main_direction(paths: Mapping[str, xr.Dataset], nodes: Sequence[int]) -> str
 
 
 def asked(
-    paths: Mapping[str, xr.Dataset], nodes: Sequence[int], direction: str | None
+    paths: Mapping[str, xr.Dataset], nodes: int | str | Sequence[int], direction: str | None
 ) -> tuple[list[int], str]:
     """Nodes that all paths have, and the direction, by default that in which they move farthest.
 
     Raises
     ------
     InputError
-        Not a mapping of label to path, no node, or one that a path does not have.
+        Not paths, no node, or one that a path does not have.
     """
-    check_paths(paths)
+    for label, path in paths.items():
+        check_path(path, f"paths[{label!r}]" if label else "path")
     numbers = check_nodes_of(paths, nodes)
     return numbers, main_direction(paths, numbers) if direction is None else direction

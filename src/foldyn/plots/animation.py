@@ -16,6 +16,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import scene, style
 from foldyn.plots.along import check_path, displacements, stretches, way
+from foldyn.plots.given import case_from_result
 from foldyn.plots.modes import ShownModes
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import DrawnSheet, add_undeformed, edge_keys, side_by_side
@@ -27,6 +28,7 @@ _WIDTH, _COLUMNS = 6.0, 2  # inches; narrow, as films cannot be scrolled on a ph
 _PATH: dict[str, Any] = {"color": style.GREEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
 
+@case_from_result
 def animate(
     case_or_structure: Case | Structure,
     result: xr.Dataset,
@@ -47,7 +49,7 @@ def animate(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves.
+        What moves; left out, it is the case of the result: ``animate(result, "motion.gif")``.
     result : xarray.Dataset
         Its motion, ``displacement`` (time, node, axis) in m over ``time`` (s), or its equilibrium
         path, ``displacement`` (step, node, axis) with its ``load_factor``.
@@ -188,6 +190,7 @@ def frame_displacements(
     return places, (1.0 - part) * motion[after - 1] + part * motion[after]
 
 
+@case_from_result
 def animate_modes(
     case_or_structure: Case | Structure,
     modes: xr.Dataset,
@@ -208,7 +211,7 @@ def animate_modes(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates.
+        What vibrates; left out, it is the case of the modes: ``animate_modes(modes, "x.gif")``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     path : path-like

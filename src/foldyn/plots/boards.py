@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
@@ -20,7 +21,7 @@ from foldyn.structures import Structure
 
 
 def draw_boards(
-    case_or_structure: Case | Structure | Pattern,
+    case_or_structure: Case | Structure | Pattern | xr.Dataset,
     displacement: ArrayLike | None = None,
     captions: Sequence[str] = (),
     view: tuple[float, float] = (28.0, -60.0),
@@ -32,7 +33,7 @@ def draw_boards(
 
     Parameters
     ----------
-    case_or_structure : Case, Structure or Pattern
+    case_or_structure : Case, Structure or Pattern, or a result with its case
         Of a pattern made by `thicken`.
     displacement : array_like, shape (n, 3) or (k, n, 3), optional
         Node displacements (m) of one state, or of several side by side; at rest by default.

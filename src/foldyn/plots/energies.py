@@ -16,6 +16,7 @@ from foldyn.mechanics.attached_body import GROUP
 from foldyn.mechanics.contact.body import GROUP as CONTACT
 from foldyn.plots import style
 from foldyn.plots.along import along, asked, check_path, way
+from foldyn.plots.given import alone
 from foldyn.plots.readings import STRAIN, energy_shares, parts_of, stacked
 
 COLORS: Mapping[str, str] = {
@@ -67,7 +68,7 @@ def plot_energies(trajectory: xr.Dataset, title: str = "") -> Figure:
     InputError
         Where an energy is missing from the trajectory.
     """
-    strain = {part: f"strain, {STRAIN[part]}" for part in parts_of(trajectory)}
+    strain = {part: f"strain, {STRAIN[part]}" for part in parts_of(alone("trajectory", trajectory))}
     others = {"dissipated": "dissipated", "work": "work of the loads"}
     names = {"kinetic": "kinetic", **strain, **others}
     missing = [name for name in names if name not in trajectory]
@@ -103,7 +104,7 @@ def _table(trajectory: xr.Dataset) -> NDArray[np.float64]:
 
 def plot_path_energies(
     path: xr.Dataset,
-    nodes: Sequence[int] | None = None,
+    nodes: int | str | Sequence[int] | None = None,
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
@@ -113,10 +114,10 @@ def plot_path_energies(
     ----------
     path : xarray.Dataset
         A path of `foldyn.trace`.
-    nodes : sequence of int, optional
-        Nodes whose mean displacement is the horizontal axis, if it only grows along the path.
-        Without them it is the load factor or, where this turns, the mean distance that the nodes
-        have traveled.
+    nodes : int, sequence of int, or str, optional
+        Nodes, or a selection ("xmax"), whose mean displacement is the horizontal axis, if it only
+        grows along the path. Without them it is the load factor or, where this turns, the mean
+        distance that the nodes have traveled.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Direction of that displacement; by default that in which the nodes move farthest.
     title : str
@@ -156,7 +157,7 @@ def plot_path_energies(
 
 
 def _abscissa(
-    path: xr.Dataset, nodes: Sequence[int] | None, direction: str | None
+    path: xr.Dataset, nodes: int | str | Sequence[int] | None, direction: str | None
 ) -> tuple[NDArray[np.float64], str]:
     """Return a quantity that only grows along the path, and its name."""
     if nodes is not None:

@@ -17,6 +17,7 @@ from foldyn.plots.sheet import DrawnSheet, edge_keys, rest_keys, side_by_side
 from foldyn.plots.writers import checked_file, filmed
 from foldyn.statics.folding import Folding
 from foldyn.structures.mesh import n4b5
+from foldyn.values import show
 
 _WIDTH = 6.0  # inches
 
@@ -50,7 +51,7 @@ def draw_folding(
     InputError
         No such state.
     """
-    positions = folding.path["position"].values
+    positions = _checked(folding).path["position"].values
     last = len(positions) - 1
     if isinstance(states, int | np.integer):
         if states < 1:
@@ -106,7 +107,7 @@ def animate_folding(
         ffmpeg could not write the file.
     """
     path = checked_file(path, frames, fps)
-    positions = folding.path["position"].values
+    positions = _checked(folding).path["position"].values
     sheet, sight = _sheet(folding, positions[0]), View(*view)
     keys = edge_keys(sheet)
     figure, axes = scene.view_figure(
@@ -121,6 +122,12 @@ def animate_folding(
             drawn.move((1.0 - part) * positions[before] + part * positions[before + 1])
             writer.grab_frame()
     return path
+
+
+def _checked(folding: Folding) -> Folding:
+    if not isinstance(folding, Folding):
+        raise InputError(f" = {show(folding)}: give what fd.fold returns", "folding")
+    return folding
 
 
 def _sheet(folding: Folding, nodes: NDArray) -> Sheet3D:

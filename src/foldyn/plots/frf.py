@@ -19,6 +19,7 @@ from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.linear.peaks_of import resonances
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of, directions
+from foldyn.plots.given import by_label
 from foldyn.plots.modes import hertz
 from foldyn.plots.readings import along_drive, unit_of
 from foldyn.values import number
@@ -29,8 +30,8 @@ _DECADES = 5.0  # below the highest value that the magnitude shows at least
 
 
 def plot_frf(
-    responses: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
+    responses: xr.Dataset | Mapping[str, xr.Dataset],
+    nodes: int | str | Sequence[int],
     axes: str | Sequence[str] | None = None,
     quantity: str | None = None,
     prominence: float | None = None,
@@ -40,10 +41,11 @@ def plot_frf(
 
     Parameters
     ----------
-    responses : mapping of str to xarray.Dataset
-        Label and response of `foldyn.frf`, for example one per mass rule or amplitude.
-    nodes : sequence of int
-        Nodes to show, a curve each.
+    responses : xarray.Dataset, or mapping of str to xarray.Dataset
+        A response of `foldyn.frf`, or several by their labels, for example one per mass rule or
+        amplitude.
+    nodes : int, sequence of int, or str
+        Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
     axes : str, sequence of str, or None
         Direction shown: one of "x", "y", "z", "-x", "-y", "-z" for all nodes, or one for each
         node. None: the axis along which each node responds most, in the direction of the drive.
@@ -66,6 +68,7 @@ def plot_frf(
     InputError
         No response or node, a node, direction or quantity that a response does not have.
     """
+    responses = by_label("responses", responses)
     curves, shown = curves_of(responses, nodes, axes, quantity)
     if prominence is not None:
         number("prominence", prominence, least=0.0, below=1.0)
@@ -109,7 +112,7 @@ class Curve(NamedTuple):
 
 def curves_of(
     responses: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
+    nodes: int | str | Sequence[int],
     axes: str | Sequence[str] | None,
     quantity: str | None,
 ) -> tuple[list[Curve], str]:
@@ -120,8 +123,6 @@ def curves_of(
     InputError
         No response or node, a node, direction or quantity that a response does not have.
     """
-    if not isinstance(responses, Mapping) or not responses:
-        raise InputError("responses: give a mapping {label: response}, with at least one of them")
     held = {quantity_of(response) for response in responses.values()}
     if len(held) > 1:
         raise InputError("responses: forces drive some of them, a base others; draw them apart")

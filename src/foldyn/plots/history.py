@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of, directions
+from foldyn.plots.given import by_label
 from foldyn.signals import sampling_interval, spectrum
 from foldyn.values import number
 
@@ -21,8 +21,8 @@ ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 def plot_history(
-    trajectories: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
+    trajectories: xr.Dataset | Mapping[str, xr.Dataset],
+    nodes: int | str | Sequence[int],
     axes: str | Sequence[str] | None = None,
     max_frequency: float | None = None,
     title: str = "",
@@ -35,11 +35,12 @@ def plot_history(
 
     Parameters
     ----------
-    trajectories : mapping of str to xarray.Dataset
-        Label and trajectory, for example one per mass rule; each with ``displacement`` (time,
-        node, axis) in m at evenly spaced times. Intervals and lengths may differ between them.
-    nodes : sequence of int
-        Nodes to show, one row each.
+    trajectories : xarray.Dataset, or mapping of str to xarray.Dataset
+        A trajectory, or several by their labels, for example one per mass rule; each with
+        ``displacement`` (time, node, axis) in m at evenly spaced times. Intervals and lengths may
+        differ between them.
+    nodes : int, sequence of int, or str
+        Nodes to show, one row each; a selection ("xmax") means vertices of the pattern.
     axes : str, sequence of str, or None
         Direction shown: one of "x", "y", "z" for all nodes, or one for each node (a sequence of
         length one serves all). None: the direction in which each node moves most.
@@ -63,8 +64,7 @@ def plot_history(
         No trajectory or node, a node or direction that a trajectory does not have, uneven times,
         or NaN in a displacement.
     """
-    if not trajectories:
-        raise InputError("trajectories: empty; give at least one {label: dataset}")
+    trajectories = by_label("trajectories", trajectories)
     numbers = check_nodes_of(trajectories, nodes)
     moved = {
         label: one["displacement"].transpose("time", ...).sel(node=numbers, axis=list(AXES)).values
@@ -108,7 +108,7 @@ def plot_history(
             look = style.line_style(index) | {"label": label}
             lines = left.plot(time, motion, **look)
             right.plot(frequencies[shown], amplitude[shown], **look)
-            handles += lines if row == 0 else []
+            handles += lines if row == 0 and label else []
         left.margins(x=0.0)
         right.set_xlim(0.0, highest)
         right.set_ylim(bottom=0.0)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.law_curves import LawFrame, law_frames
+from foldyn.plots.scene import Sheet3D
 from foldyn.shells import Shell
 from foldyn.structures import Structure
 
 
 def plot_laws(
-    structure: Structure | Shell, stretch: tuple[float, float] = (0.8, 1.2), title: str = ""
+    structure: Structure | Shell | Case | xr.Dataset,
+    stretch: tuple[float, float] = (0.8, 1.2),
+    title: str = "",
 ) -> Figure:
     """Draw moment against dihedral of folds and bends, and stress against stretch of bars.
 
@@ -24,7 +29,7 @@ def plot_laws(
 
     Parameters
     ----------
-    structure : Structure or Shell
+    structure : Structure or Shell, or a Case or result with one
         Its laws, stiffnesses and rest angles are drawn as they are used, those of whole creases.
     stretch : tuple of float
         Range of the bars' stretch.
@@ -39,12 +44,15 @@ def plot_laws(
     Raises
     ------
     InputError
-        Where the stretches are not positive and increasing, or a shell has no folds.
+        Where the stretches are not positive and increasing, or there is nothing with laws.
     """
     low, high = stretch
     if not (0.0 < low < high < np.inf):
         raise InputError(f"stretch: {stretch!r}; give two positive, increasing stretches")
-    frames = law_frames(structure, stretch)
+    own = Sheet3D.of(structure).structure
+    if own is None:
+        raise InputError(": is a pattern, which has no laws; give a structure", "structure")
+    frames = law_frames(own, stretch)
     if not frames:
         raise InputError("structure: is a shell without folds, which has no laws to draw")
     figure = style.new_figure(3.5 * len(frames), 3.9, title)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from foldyn.cases import Case
+from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.load_curves import load_curves
+from foldyn.plots.scene import Sheet3D
 from foldyn.values import number
 
 _SAMPLES = 2001
 
 
-def plot_load_history(case: Case, duration: float, title: str = "", start: float = 0.0) -> Figure:
+def plot_load_history(
+    case: Case | xr.Dataset, duration: float, title: str = "", start: float = 0.0
+) -> Figure:
     """Draw the loads of a case and the motions it imposes over time.
 
     Each kind has axes of its own:
@@ -30,7 +35,7 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
 
     Parameters
     ----------
-    case : Case
+    case : Case, or a result with one
         The curves are its ``force_terms``, ``following_terms``, ``gravity_terms``,
         ``imposed_terms``, ``base_terms`` and ``actuation_terms``.
     duration : float
@@ -47,10 +52,13 @@ def plot_load_history(case: Case, duration: float, title: str = "", start: float
     Raises
     ------
     InputError
-        Where the duration is not positive.
+        Where the duration is not positive, or there is no case.
     """
+    own = Sheet3D.of(case).case
+    if own is None:
+        raise InputError(": has no loads; give a case", "case")
     number("duration", duration, above=0.0, unit="s")
-    panels = load_curves(case) or [("force at a node (N)", [])]
+    panels = load_curves(own) or [("force at a node (N)", [])]
     entries = sum(len(curves) for _, curves in panels)
     height = 2.9 + 1.7 * (len(panels) - 1) + 0.17 * max(entries - len(panels), 0)
     ylabels = [ylabel for ylabel, _ in panels]

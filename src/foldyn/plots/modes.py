@@ -16,11 +16,12 @@ from numpy.typing import ArrayLike
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.given import case_from_result
 from foldyn.plots.readings import chosen_modes
 from foldyn.plots.scene import Points, Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
 from foldyn.structures import Structure
-from foldyn.values import length
+from foldyn.values import length, numbers
 
 """Modes that one figure shows at most."""
 _AMPLITUDE = 0.12  # largest displacement, as a part of the sheet's size
@@ -30,6 +31,7 @@ _MOST_NUMBERS = 16  # rows or columns with which the numbers can be read
 _CELL, _MARGIN, _BAR = 0.42, 1.1, 0.9  # inches
 
 
+@case_from_result
 def draw_modes(
     case_or_structure: Case | Structure,
     modes: xr.Dataset,
@@ -47,7 +49,7 @@ def draw_modes(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What vibrates.
+        What vibrates; left out, it is the case of the modes: ``draw_modes(modes)``.
     modes : xarray.Dataset
         Modes of `foldyn.modes`.
     which : sequence of int, optional
@@ -213,10 +215,10 @@ def plot_mac(
     InputError
         No matrix, values out of range, or labels that do not fit it.
     """
-    values = np.asarray(mac, dtype=np.float64)
+    values = numbers("mac", mac)
     if values.ndim != 2 or not values.size:
         raise InputError(f"mac: shape {values.shape}; give a matrix, one row per mode")
-    if not (np.isfinite(values).all() and values.min() >= -1e-9 and values.max() <= 1.0 + 1e-9):
+    if not (values.min() >= -1e-9 and values.max() <= 1.0 + 1e-9):
         raise InputError("mac: has values that are not between 0 and 1")
     labels = []
     for name, given, count in (("rows", rows, len(values)), ("columns", columns, values.shape[1])):

@@ -21,6 +21,7 @@ from foldyn.plots.along import (
     displacements,
     stretches,
 )
+from foldyn.plots.given import by_label, case_from_result
 from foldyn.plots.readings import chosen_points, total_reaction
 from foldyn.plots.scene import Sheet3D, View
 from foldyn.plots.sheet import rest_keys, side_by_side
@@ -34,8 +35,8 @@ _MARKS: Mapping[str, dict[str, Any]] = {
 
 
 def plot_load_displacement(
-    paths: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
+    paths: xr.Dataset | Mapping[str, xr.Dataset],
+    nodes: int | str | Sequence[int],
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
@@ -46,10 +47,10 @@ def plot_load_displacement(
 
     Parameters
     ----------
-    paths : mapping of str to xarray.Dataset
-        Label and path of `foldyn.trace`.
-    nodes : sequence of int
-        Nodes to show, a curve each.
+    paths : xarray.Dataset, or mapping of str to xarray.Dataset
+        A path of `foldyn.trace`, or several by their labels.
+    nodes : int, sequence of int, or str
+        Nodes to show, a curve each; a selection ("xmax") means vertices of the pattern.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Direction of the displacement; by default that in which the nodes move farthest.
     title : str
@@ -66,6 +67,7 @@ def plot_load_displacement(
     InputError
         No path or node, a node that a path does not have, another direction.
     """
+    paths = by_label("paths", paths)
     numbers, direction = asked(paths, nodes, direction)
     curves = []
     for label, path in paths.items():
@@ -79,8 +81,8 @@ def plot_load_displacement(
 
 
 def plot_reaction(
-    paths: Mapping[str, xr.Dataset],
-    nodes: Sequence[int],
+    paths: xr.Dataset | Mapping[str, xr.Dataset],
+    nodes: int | str | Sequence[int],
     direction: str | None = None,
     title: str = "",
 ) -> Figure:
@@ -91,10 +93,11 @@ def plot_reaction(
 
     Parameters
     ----------
-    paths : mapping of str to xarray.Dataset
-        Label and path of `foldyn.trace`, a curve each.
-    nodes : sequence of int
-        Supported nodes: their reactions are added up, their mean displacement is shown.
+    paths : xarray.Dataset, or mapping of str to xarray.Dataset
+        A path of `foldyn.trace`, or several by their labels, a curve each.
+    nodes : int, sequence of int, or str
+        Supported nodes, or a selection ("xmax"): their reactions are added up, their mean
+        displacement is shown.
     direction : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Direction of force and displacement; by default that in which the nodes move farthest.
     title : str
@@ -112,6 +115,7 @@ def plot_reaction(
         No path or node, a node that a path does not have or does not support along the direction,
         another direction.
     """
+    paths = by_label("paths", paths)
     numbers, direction = asked(paths, nodes, direction)
     curves = [
         _Curve(
@@ -180,6 +184,7 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
             axes.plot(x[at], y[at], label=f"_{kind}", **look)
 
 
+@case_from_result
 def draw_shapes(
     case_or_structure: Case | Structure,
     path: xr.Dataset,
@@ -195,7 +200,7 @@ def draw_shapes(
     Parameters
     ----------
     case_or_structure : Case or Structure
-        What moves.
+        What moves; left out, it is the case of the path: ``draw_shapes(path)``.
     path : xarray.Dataset
         A path of `foldyn.trace`.
     points : int or sequence of int

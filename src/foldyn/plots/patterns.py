@@ -19,7 +19,7 @@ _MARGIN, _CAPTION, _LEGEND = 0.15, 0.3, 0.35  # inches
 
 
 def draw_patterns(
-    patterns: Sequence[Pattern],
+    patterns: Pattern | Sequence[Pattern],
     captions: Sequence[str] = (),
     views: Sequence[tuple[float, float] | None] = (),
     tallest: float = 2.6,
@@ -30,7 +30,7 @@ def draw_patterns(
 
     Parameters
     ----------
-    patterns : sequence of Pattern
+    patterns : Pattern or sequence of Pattern
     captions : sequence of str
         What stands below each.
     views : sequence of tuple of float, or None
@@ -59,7 +59,8 @@ def draw_patterns(
     >>> states = [fd.patterns.miura((3, 2), dihedral=angle) for angle in (180, 90)]
     >>> figure = fd.plots.draw_patterns(states, ["flat", "folded"])
     """
-    sheets = [Sheet3D.of(pattern) for pattern in patterns]
+    several = patterns if isinstance(patterns, Sequence) else [patterns]
+    sheets = [Sheet3D.of(pattern) for pattern in several]
     if not sheets:
         raise InputError(" is empty: give at least one pattern", "patterns")
     given = [*views, *[None] * (len(sheets) - len(views))]

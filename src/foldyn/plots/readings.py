@@ -66,6 +66,7 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
     InputError
         A node is not supported along the direction.
     """
+    check_path(path, "path")
     _, sign = signed("direction", direction)
     axis = direction[-1]
     chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
@@ -78,6 +79,7 @@ def total_reaction(path: xr.Dataset, nodes: Sequence[int], direction: str) -> ND
 
 def chosen_points(path: xr.Dataset, points: int | Sequence[int]) -> list[int]:
     """Numbers of points from 0 on, of a wanted count or of numbers, negative ones from the end."""
+    check_path(path, "path")
     count = path.sizes["step"]
     if isinstance(points, int | np.integer):
         if points < 1:

@@ -8,6 +8,7 @@ from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
@@ -17,8 +18,11 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.patterns import Pattern
 from foldyn.patterns.palette import PAPER
 from foldyn.plots import style
+from foldyn.results import case_of
+from foldyn.values import show
 
 Points = NDArray[np.float64]
 """Points or vectors, shape (..., 3), or (..., 2) as seen on the screen."""
@@ -59,11 +63,18 @@ class Sheet3D:
 
     @classmethod
     def of(cls, thing: Any) -> Sheet3D:
-        """Take a case, a structure or a pattern apart."""
+        """Take a case, a structure or a pattern apart, or a result with its case."""
+        if isinstance(thing, xr.Dataset):
+            thing = case_of(thing)
         case = thing if hasattr(thing, "structure") else None
         structure = thing if case is None else case.structure
         if hasattr(structure, "pattern"):
             pattern, nodes, triangles = structure.pattern, structure.nodes, structure.triangles
+        elif not isinstance(thing, Pattern):
+            raise InputError(
+                f" = {show(thing)}: give a case, a structure, a pattern or a result with its case",
+                "case_or_structure",
+            )
         else:
             pattern, structure, nodes = structure, None, structure.vertices
             triangles = [(face[0], *side) for face in pattern.faces for side in pairwise(face[1:])]

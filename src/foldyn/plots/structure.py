@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -27,7 +28,7 @@ _LEGEND_COLUMNS = 3
 
 
 def draw_structure(
-    case_or_structure: Case | Structure | Pattern,
+    case_or_structure: Case | Structure | Pattern | xr.Dataset,
     displacement: ArrayLike | None = None,
     numbers: bool | Literal["all"] = True,
     supports: bool = True,
@@ -41,7 +42,7 @@ def draw_structure(
 
     Parameters
     ----------
-    case_or_structure : Case, Structure or Pattern
+    case_or_structure : Case, Structure or Pattern, or a result with its case
         Supports and loads are those of a case.
     displacement : array_like, shape (n, 3), or None
         Node displacements (m): the deformed sheet is drawn over the undeformed one in gray.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.errors import InputError
 from foldyn.plots import style
 from foldyn.plots.along import AXES, check_nodes_of
+from foldyn.plots.given import alone
 from foldyn.values import choice
 
 _MARGIN = 0.08  # of the model's size, around it in an overlay
@@ -22,7 +23,7 @@ _LABELS = {"time": "time (s)", "photo": "photo", "load": "load (N)"}
 
 def plot_tracks(
     tracks: xr.Dataset,
-    nodes: Sequence[int],
+    nodes: int | Sequence[int],
     axis: str | None = None,
     truth: Mapping[int, ArrayLike] | None = None,
     title: str = "",
@@ -33,7 +34,7 @@ def plot_tracks(
     ----------
     tracks : xarray.Dataset
         Of `foldyn.experiment`, with a model.
-    nodes : sequence of int
+    nodes : int or sequence of int
     axis : str or None
         "x", "y" or "z"; None: the one in which most is measured to move.
     truth : mapping of int to array_like, optional
@@ -49,7 +50,7 @@ def plot_tracks(
     InputError
         Tracks without a model, a node or an axis that they do not have, or one never measured.
     """
-    if "displacement" not in tracks:
+    if "displacement" not in alone("tracks", tracks):
         raise InputError("tracks: without a model there are pixels only; track with a model")
     nodes = check_nodes_of({"tracks": tracks}, nodes)
     moved = tracks["displacement"]
@@ -113,8 +114,8 @@ def plot_steps(
     InputError
         There is none, or times and values differ in number.
     """
-    if not steps:
-        raise InputError("steps: empty; give at least the record as measured")
+    if not isinstance(steps, Mapping) or not steps:
+        raise InputError(": give a mapping with at least {'as measured': (time, values)}", "steps")
     size = 7.5, 0.8 + 1.35 * len(steps)
     figure, rows = style.rows(size, title, "time (s)", [f"({unit})"] * len(steps), list(steps))
     for axes, (name, (time, values)) in zip(rows, steps.items(), strict=True):
@@ -152,7 +153,7 @@ def draw_overlay(
     InputError
         There is no such frame.
     """
-    along = _dimension(tracks)
+    along = _dimension(alone("tracks", tracks))
     index = int(tracks.attrs.get("match_frame", 0)) if at is None else int(at)
     if not 0 <= index < tracks.sizes[along]:
         raise InputError(f"at: {index}; there are {tracks.sizes[along]} along {along}")

@@ -52,7 +52,7 @@ td.number { white-space: nowrap; }
 summary { cursor: pointer; color: var(--link); }
 pre { overflow-x: auto; padding: 0.8rem 1rem; background: var(--code); font-size: 0.85rem;
   line-height: 1.4; }
-.unseen { visibility: hidden; user-select: none; }
+td.number::after { content: attr(data-lacks); visibility: hidden; }
 .stacked table, .stacked caption, .stacked thead, .stacked tbody { display: block; }
 .stacked thead tr { display: flex; flex-wrap: wrap; gap: 0.3rem; font-size: 0.85rem; }
 .stacked thead tr::before { content: "Sort by"; }
@@ -62,7 +62,7 @@ pre { overflow-x: auto; padding: 0.8rem 1rem; background: var(--code); font-size
 .stacked tbody tr { display: block; padding: 0.4rem 0; border-bottom: 1px solid var(--rule); }
 .stacked td { display: flex; justify-content: space-between; gap: 1rem; border: 0;
   padding: 0.1rem 0.2rem; text-align: right; }
-.stacked td:empty, .stacked .unseen { display: none; }
+.stacked td:empty, .stacked td.number::after { display: none; }
 .stacked td::before { content: attr(data-title); color: var(--quiet); text-align: left; }
 .plots { display: grid; gap: 0.5rem 1.5rem;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 18rem), 1fr)); }

@@ -106,18 +106,13 @@ class Table:
         kind = [' class="number"' if right else "" for right in numeric]
         columns = []
         for k, right in enumerate(numeric):
-            cells = [escape(self._cell(row[k])) for row in self.rows]
-            columns.append(_aligned(cells) if right else cells)
+            cells = [self._cell(row[k]) for row in self.rows]
+            columns.append(_aligned(cells) if right else [f"<td>{escape(c)}</td>" for c in cells])
         titles = "".join(
             f'<th scope="col"{k}>{escape(title)}</th>'
             for title, k in zip(self.header, kind, strict=True)
         )
-        body = "\n".join(
-            "<tr>"
-            + "".join(f"<td{k}>{cell}</td>" for cell, k in zip(cells, kind, strict=True))
-            + "</tr>"
-            for cells in zip(*columns, strict=True)
-        )
+        body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in zip(*columns, strict=True))
         return (
             f'<div class="table{"" if self.sorts else " kept"}"><table>{caption}\n'
             f"<thead><tr>{titles}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
@@ -231,18 +226,19 @@ def rounded(value: float, digits: int) -> str:
 
 
 def _aligned(cells: Sequence[str]) -> list[str]:
-    """Numbers as HTML with unseen digits behind, so that their points stand below each other.
+    """Cells of a column of numbers, whose points the page's style puts below each other.
 
-    An exponent counts as what follows the point.
+    It needs to know what each lacks behind the point of what the longest has there: that is as wide
+    as the room that it leaves free. An exponent counts as what follows the point.
     """
     tails = [re.search(r"[.e].*", text) for text in cells]
     found = ["" if tail is None else tail[0] for tail in tails]
     longest = max(found, key=len, default="")
+    lacks = [longest[len(tail) :] if text else "" for text, tail in zip(cells, found, strict=True)]
+    fills = [f' data-lacks="{lack}"' if lack else "" for lack in lacks]
     return [
-        f'{text}<span class="unseen" aria-hidden="true">{longest[len(tail) :]}</span>'
-        if text and len(tail) < len(longest)
-        else text
-        for text, tail in zip(cells, found, strict=True)
+        f'<td class="number"{fill}>{escape(text)}</td>'
+        for text, fill in zip(cells, fills, strict=True)
     ]
 
 

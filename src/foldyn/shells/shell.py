@@ -315,7 +315,7 @@ def shell(
     fold_law: str | HingeLaw = EnhancedLinear(),
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
-    clamped: Sequence[Sequence[int]] = (),
+    clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
 ) -> Shell:
     """Discretize a pattern as a thin shell of triangles with exact creases.
@@ -335,9 +335,10 @@ def shell(
         A third of each triangle to its corners, or rho A t / 12 [2 1 1; 1 2 1; 1 1 2].
     fold_law, crease_stiffness, crease_rest
         As in `discretize`.
-    clamped : sequence of (vertex, vertex)
+    clamped : sequence of (vertex, vertex), or str
         Boundary edges along which the sheet keeps its rest tangent in space, wherever they are
-        moved; their nodes need a support of their own.
+        moved; their nodes need a support of their own. A selection ("xmin") means those of which it
+        has both ends.
     rigid : "all" or sequence of int, optional
         As in `discretize`: panels that cannot bend, exactly. Their mesh has no rotations.
 

@@ -23,26 +23,37 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.mechanics.attached import Clamps
 from foldyn.patterns import Pattern
+from foldyn.patterns.selection import given_as, select
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import show
 
 
 def boundary_edges(
-    given: Sequence[Sequence[int]], pattern: Pattern, field: str
+    given: str | Sequence[Sequence[int]], pattern: Pattern, field: str
 ) -> tuple[Edge, ...]:
-    """Boundary edges (low, high) from pairs of vertices, given as `field`.
+    """Boundary edges (low, high) from pairs of vertices or a selection, given as `field`.
+
+    A selection ("xmin") means the boundary edges of which it has both ends.
 
     Raises
     ------
     InputError
-        No pairs of vertices, an edge that is none of the boundary, or one listed twice.
+        No pairs of vertices, an edge that is none of the boundary, or one listed twice; a selection
+        of no such edge.
     """
+    if isinstance(given, str):
+        with given_as(field):
+            chosen = np.isin(pattern.boundary, select(pattern, given)).all(axis=1)
+        if not chosen.any():
+            why = f" = {show(given)}: selects no boundary edge, which needs both of its ends"
+            raise InputError(why, field)
+        return tuple((min(pair), max(pair)) for pair in pattern.boundary[chosen].tolist())
     boundary = edge_lookup(pattern.boundary)
     try:
         pairs = [tuple(sorted(operator.index(k) for k in edge)) for edge in given]
     except TypeError:
-        why = f" = {show(given)}: give pairs of vertices, as in {field}=[(0, 1), (1, 2)]"
-        raise InputError(why, field) from None
+        pairs = f'pairs of vertices, as in {field}=[(0, 1), (1, 2)], or a selection such as "xmin"'
+        raise InputError(f" = {show(given)}: give {pairs}", field) from None
     if inner := [pair for pair in pairs if pair not in boundary]:
         raise InputError(f": {inner[0]} is not a boundary edge of the pattern", field)
     if len(set(pairs)) < len(pairs):

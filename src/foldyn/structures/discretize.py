@@ -42,9 +42,9 @@ def discretize(
     crease_stiffness: PerCrease = None,
     crease_rest: PerCrease = None,
     centers: Mapping[int, ArrayLike] | None = None,
-    clamped: Sequence[Sequence[int]] = (),
+    clamped: str | Sequence[Sequence[int]] = (),
     rigid: str | Sequence[int] | None = None,
-    straight: Sequence[Sequence[int]] = (),
+    straight: str | Sequence[Sequence[int]] = (),
     preset: Literal["plate", "n5b8e", "herkal", "merlin2"] | None = None,
 ) -> Structure:
     """Discretize a pattern as bars and hinges.
@@ -79,15 +79,16 @@ def discretize(
         Rest dihedral (degrees, between 0 and 360), given likewise, instead of the pattern's own.
     centers : mapping, optional
         Center points (3,) by panel number, instead of the computed ones (N5B8).
-    clamped : sequence of (vertex, vertex)
+    clamped : sequence of (vertex, vertex), or str
         Boundary edges along which panels keep their rest tangent in space, wherever they are moved;
-        their nodes need a support of their own. See `foldyn.structures.clamps`.
+        their nodes need a support of their own. A selection ("xmin") means those of which it has
+        both ends. See `foldyn.structures.clamps`.
     rigid : "all" or sequence of int, optional
         Panels that cannot bend, exactly: all their nodes ride on three of their corners. They must
         be flat. Their bars still stretch.
-    straight : sequence of (vertex, vertex)
-        Boundary edges that stay straight, as along a support or a stiff rim (n5b8e); others may
-        bow between their ends.
+    straight : sequence of (vertex, vertex), or str
+        Boundary edges, given likewise, that stay straight, as along a support or a stiff rim
+        (n5b8e); others may bow between their ends.
     preset : {"plate", "n5b8e", "herkal", "merlin2"}, optional
         Model that gives what is left out, one of `foldyn.structures.PRESETS`. Without it "plate",
         but "n5b8e" where its scheme is given or the pattern has welds, and "herkal", the paper's,

@@ -14,17 +14,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
-from foldyn.analyses.provenance import UNITS
 from foldyn.results.dataset import DOCUMENT
 from foldyn.results.swept import POINT, sweep_dataset
 from foldyn.sweeps.evaluations import Evaluation
 from foldyn.sweeps.measure import Asked
 from foldyn.sweeps.plan import Plan
 from foldyn.sweeps.points import GRID
+from foldyn.values import unit_of
 
-DEGREES = ("dihedral", "panel_angle", "theta1", "theta2", "twist")
-"""Words of keys that are angles."""
-UNITS_OF_KEYS: Mapping[str, str] = {**UNITS, **dict.fromkeys(DEGREES, "degrees")}
 ABOUT: Mapping[str, str] = {
     "failure": "why the point lacks values",
     "warnings": "what was warned of",
@@ -73,7 +70,8 @@ def dataset(plan: Plan, found: Sequence[Evaluation], facts: Mapping[str, Any]) -
         values = one.values if on_grid else [point[k] for point in plan.points]
         word = one.key.rpartition(".")[2]
         about = {"key": one.key, "long_name": name.replace("_", " ")}
-        about |= {"units": UNITS_OF_KEYS[word]} if word in UNITS_OF_KEYS else {}
+        unit = unit_of(word, values[0])
+        about |= {"units": unit} if unit else {}
         coordinates[name] = (name if on_grid else POINT, np.array(values), about)
     data: dict[str, Any] = {}
     checked = list(found)

@@ -5,8 +5,7 @@ const LEAST_ROWS = 3;
 
 // What a cell is sorted by: its number, its text, or nothing where it is empty.
 function sortedBy(cell) {
-  const text = [...cell.childNodes].filter((node) => node.className !== "unseen")
-    .map((node) => node.textContent).join("").trim();
+  const text = cell.textContent.trim();
   return text && cell.classList.contains("number") ? Number(text) : text;
 }
 

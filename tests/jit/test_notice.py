@@ -1,0 +1,91 @@
+"""What is told while kernels are compiled."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from jit_lab import ASK, copy_package, python
+
+from foldyn.cli.streams import noticed
+from foldyn.notice import NOTICE, PER_KERNEL, Notice, on_terminal
+
+
+class Compiler:
+    """Kernels that each take some seconds to compile, on a clock of their own."""
+
+    def __init__(self, seconds):
+        self.told, self.now, self.seconds = [], 0.0, seconds
+        self.notice = Notice(self.told.append, lambda: self.now)
+
+    def compile(self, kernels):
+        """Compile the last of some kernels, which needs all others of them."""
+        *others, whole = kernels
+        self.notice.begin(whole, lambda: kernels)
+        for one in others:
+            self.notice.begin(one, lambda: [])
+            self.now += self.seconds
+            self.notice.end()
+        self.now += self.seconds
+        self.notice.end()
+        self.now += 1000.0  # something else meanwhile
+
+
+def test_each_part_of_the_work_is_told_once_with_what_is_missing():
+    slow = Compiler(2.0)
+    slow.compile(range(40))
+    slow.compile(range(30, 50))  # ten more
+    slow.compile(range(50, 51))
+    assert slow.told == [
+        "compiling 40 kernels for their first use, about 20 s; they are kept for later runs",
+        "compiling 10 more kernels, about 20 s",  # at the pace of those before
+    ]
+    assert pytest.approx(20.0) == 40 * PER_KERNEL
+
+
+def test_short_waits_are_not_worth_a_word():
+    quick = Compiler(0.01)
+    for k in range(30):
+        quick.compile([k])
+    assert quick.told == []
+
+
+def test_long_ones_are_told_in_minutes():
+    slow = Compiler(6.0)
+    slow.compile(range(10))
+    slow.compile(range(10, 20))
+    slow.compile(range(20, 45))
+    assert [text.partition("about")[2] for text in slow.told[1:]] == [" a minute", " 2.5 minutes"]
+
+
+TOLD = f"""
+import foldyn.notice
+foldyn.notice.NOTICE.tell = print
+foldyn.notice.PER_KERNEL = 1.0
+{ASK}
+"""
+
+
+def test_a_kernel_that_is_compiled_tells_how_many_are_missing(tmp_path):
+    """The probe, the history and the law that it calls, and what these call; later nothing."""
+    package = copy_package(tmp_path)
+    first, again = (
+        python(package, TOLD, NUMBA_CACHE_DIR=str(tmp_path / "kernels")).stdout for _ in range(2)
+    )
+    message, numbers = first.splitlines()
+    assert message.startswith("compiling ") and " kernels for their first use, about " in message
+    assert 5 <= int(message.split()[1]) <= 40
+    assert again.split()[:2] == numbers.split()[:2] and "compiling" not in again
+
+
+def test_a_command_prints_it_and_a_script_tells_a_terminal_alone(capsys, monkeypatch):
+    with noticed(quiet=False):
+        NOTICE.tell("compiling")
+    assert capsys.readouterr() == ("compiling\n", "")
+    with noticed(quiet=True):
+        NOTICE.tell("compiling")
+    on_terminal("compiling")  # nobody watches standard error here
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    on_terminal("compiling")
+    assert capsys.readouterr() == ("", "compiling\n")
