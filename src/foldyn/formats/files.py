@@ -25,12 +25,13 @@ from foldyn.formats import (
 )
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.facets import with_facets
+from foldyn.formats.facets import with_convex_panels, with_facets
 from foldyn.formats.kept import with_families, without_repetition
 from foldyn.formats.units import METERS
 from foldyn.formats.writers import warn_of_boards
 from foldyn.input_files import read_text
 from foldyn.patterns import Pattern
+from foldyn.patterns.facets import LINE
 from foldyn.patterns.frames import Frame
 from foldyn.values import choice, number
 from foldyn.writing import write_bytes
@@ -113,6 +114,7 @@ def read_pattern(
         joined, as `welded` does. "line": facets, which stay as the `welds` of the pattern. "hinge":
         creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
         with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
+        Unless it is "line", panels that are not convex are cut along welds, as `convex` does.
 
     Returns
     -------
@@ -174,7 +176,8 @@ def diagnose(
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
         made = built(drawing, meters=meters, scale=factor)
         made = with_families(without_repetition(made), drawing)
-        return with_facets(made, drawing, facets)
+        made = with_facets(made, drawing, facets)
+        return made if facets == LINE else with_convex_panels(made)
 
 
 def write_pattern(
