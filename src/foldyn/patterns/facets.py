@@ -173,7 +173,7 @@ def _convex(vertices: NDArray, face: Sequence[int], normal: NDArray) -> bool:
 
 
 def corner_turns(x: NDArray, normal: NDArray) -> NDArray[np.float64]:
-    """Angles (rad) by which an outline x (k, 3) turns to the left at its corners, about a normal."""
+    """Angles (rad) by which an outline x (k, 3) turns to the left at its corners."""
     along = np.roll(x, -1, axis=0) - x
     before = np.roll(along, 1, axis=0)
     left = np.einsum("ij,j->i", np.cross(before, along), normal)
