@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
+from foldyn.values import show
 
 DEEPEST = 50
 """Levels of nested tables and lists that a TOML or JSON text may have."""
@@ -57,6 +58,14 @@ def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> 
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 
 
+def path_of(path: Any, name: str = "path") -> Path:
+    """Path of a file or folder, from what names one."""
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError(f" = {show(path)}: give the path of a file", name) from None
+
+
 def check_file(path: str | os.PathLike[str], what: str) -> Path:
     """Path of a file that is one; links are followed.
 
@@ -65,7 +74,7 @@ def check_file(path: str | os.PathLike[str], what: str) -> Path:
     InputError
         There is no such file, or it is none: a folder, a pipe, a device.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:

@@ -21,7 +21,7 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
-from foldyn.input_files import from_toml, read_text
+from foldyn.input_files import from_toml, path_of, read_text
 from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
 from foldyn.patterns.convex import what_was_cut
 from foldyn.patterns.facets import HINGE, LINE, WELD
@@ -58,7 +58,7 @@ def read_case(
         The file cannot be read or anything in it cannot be used; the message names the file, the
         key, the value and what to do.
     """
-    path = Path(path)
+    path = path_of(path)
     text = _text(path)
     document = _parsed(path, text)
     if model is not None or divisions is not None:

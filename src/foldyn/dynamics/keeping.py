@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from foldyn.errors import ComputationError, InputError
 from foldyn.results.columns import Columns
 from foldyn.results.netcdf import check_target, load
-from foldyn.values import number, show
+from foldyn.values import flag, number, show
 from foldyn.writing import remove_leftovers, write_bytes
 
 if TYPE_CHECKING:
@@ -220,6 +220,4 @@ def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
         raise InputError(f" = {show(store)}: give the file of the result", "store")
     file = check_target(store)
     seconds = number("checkpoint", checkpoint, above=0.0)
-    if not isinstance(resume, bool):
-        raise InputError(f" = {show(resume)}: give True or False", "resume")
-    return Keeping(file, seconds, resume)
+    return Keeping(file, seconds, flag("resume", resume))

@@ -20,7 +20,7 @@ from foldyn.formats.notes import count
 from foldyn.formats.units import METERS
 from foldyn.input_files import from_json
 from foldyn.patterns.transforms import FACE_ORDERS
-from foldyn.values import choice, show
+from foldyn.values import choice, show, whole
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
@@ -145,13 +145,14 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
         raise InputError(
             f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
         )
-    if isinstance(chosen, bool) or not isinstance(chosen, int) or not 0 <= chosen < len(frames):
+    number = whole("frame", chosen, what="or a title")
+    if not 0 <= number < len(frames):
         raise InputError(
-            f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
+            f" = {number}: the file has the frames 0 to {len(frames) - 1}; give one of these "
             "numbers or a title",
             "frame",
         )
-    return chosen
+    return number
 
 
 def _with_field(document: dict[str, Any], field: str, what: str) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.facets import COPLANAR, corner_turns, joined, longest_first
-from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_of
 
 Face = tuple[int, ...]
@@ -46,8 +46,7 @@ def convex(pattern: Pattern) -> Pattern:
     >>> len(pattern.faces), len(pattern.creases), pattern.welds.tolist()
     (2, 0, [[0, 3]])
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    pattern = pattern_of(pattern)
     faces, more = list(pattern.faces), []
     for panel, face in enumerate(pattern.faces):
         corners = pattern.vertices[list(face)]

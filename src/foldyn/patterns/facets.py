@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
-from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
+from foldyn.values import flag, listed
 
 WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
 """What facets become: nothing, where panels can be joined, or welds; welds; creases."""
@@ -61,8 +62,7 @@ def welded(
     >>> fd.welded(square).faces
     ((0, 1, 2, 3),)
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    pattern, join = pattern_of(pattern), flag("join", join)
     rows = _rows(pattern, facets)
     edges = np.concatenate([pattern.creases[rows], pattern.welds])
     if pattern.boards is not None and len(edges):
@@ -106,7 +106,7 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     if isinstance(facets, str):
         facets = pattern.creases[crease_rows("facets", facets, pattern)]
     row, rows = edge_lookup(pattern.creases), set()
-    for facet in facets:
+    for facet in listed("facets", facets, "pairs of vertices, as [(0, 1)]"):
         pair = vertex_pair("facets", facet)
         if pair not in row:
             raise InputError(f": {pair} is not a crease; name its two vertices", "facets")
