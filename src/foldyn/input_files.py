@@ -12,6 +12,8 @@ import os
 import re
 import stat
 import tomllib
+from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -115,8 +117,13 @@ def from_toml(text: str) -> dict[str, Any]:
         raise InputError(f"is not valid TOML: {_why(error)}") from None
 
 
-def from_json(text: str) -> Any:
+def from_json(text: str, repeated: list[str] | None = None) -> Any:
     """Value of a JSON text.
+
+    Parameters
+    ----------
+    repeated : list of str, optional
+        Gets the keys that an object has several times, of which the last counts.
 
     Raises
     ------
@@ -124,9 +131,16 @@ def from_json(text: str) -> Any:
         The text is not JSON, or nested deeper than any of ours; the message begins "is not".
     """
     try:
-        return _shallow(json.loads(text))
+        return _shallow(json.loads(text, object_pairs_hook=partial(_object, repeated)))
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not valid JSON: {_why(error)}") from None
+
+
+def _object(repeated: list[str] | None, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if repeated is not None and len(found) < len(pairs):
+        repeated += [key for key, times in Counter(key for key, _ in pairs).items() if times > 1]
+    return found
 
 
 def _why(error: Exception) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -30,6 +30,7 @@ SHOWN = 60
 SOME = 6
 """Items of a list, and of an array, that a repr shows."""
 T = TypeVar("T")
+N = TypeVar("N", int, float)
 
 
 def show(value: Any) -> str:
@@ -132,6 +133,19 @@ def choice(name: str, value: Any, known: Iterable[str]) -> str:
     raise InputError(f" = {show(value)}: {hint}choose one of {', '.join(known)}", name)
 
 
+def parsed(text: str, kind: Callable[[str], N] = float) -> N:
+    """Number that a text in a file or a command line is.
+
+    Raises
+    ------
+    ValueError
+        It is none, or one to Python alone: 1_0, or in digits of other scripts.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return kind(text)
+
+
 def of_kind(name: str, value: Any, *kinds: type[T]) -> T:
     """Return `value` when it is an object of one of some classes."""
     if isinstance(value, kinds):
@@ -167,7 +181,7 @@ def flag(name: str, value: Any) -> bool:
     """Return a choice between two."""
     value = single(value)
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f" = {show(value)}: give True or False (true or false in TOML)", name)
+        raise InputError(f" = {show(value)}: must be True or False (true or false in TOML)", name)
     return bool(value)
 
 

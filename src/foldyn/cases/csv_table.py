@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError, within
 from foldyn.input_files import path_of, read_text
-from foldyn.values import shortened, show, suggest
+from foldyn.values import parsed, shortened, show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),
@@ -271,10 +271,10 @@ def _article(quantity: str) -> str:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        parsed(cell)
     except ValueError:
         return False
-    return "_" not in cell  # 1_000 is a number to Python only
+    return True
 
 
 def _number(

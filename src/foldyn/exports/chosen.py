@@ -63,7 +63,7 @@ def chosen_nodes(result: xr.Dataset, nodes: int | str | Sequence[int] | None) ->
         return np.arange(count)
     if isinstance(nodes, str):
         words = nodes.replace(",", " ").split()
-        if not words or not all(word.isdecimal() for word in words):
+        if not words or not all(word.isascii() and word.isdecimal() for word in words):
             raise InputError(f" = {show(nodes)}: give numbers, as in 0,7,12", "nodes")
         nodes = [int(word) for word in words]
     asked = np.array(indices("nodes", nodes, "node", "or leave it out for all"), np.int64)

@@ -83,17 +83,19 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
 
 def _document(text: str) -> tuple[dict[str, Any], list[str]]:
     """Top level of the file, and what had to be repaired to read it."""
-    repairs = []
+    repairs: list[str] = []
+    repeated: list[str] = []
     try:
-        document = from_json(text)
+        document = from_json(text, repeated)
     except InputError as error:
         mended = _COMMA.sub(lambda found: found[1] or "", text)
         commas = len(text) - len(mended)
         try:
-            document = from_json(mended if commas else text)
+            document = from_json(mended if commas else text, repeated)
         except InputError:
             raise InputError(f"{error}, as a FOLD file must be.") from None
         repairs.append(f"{count(commas, 'comma')} before a closing bracket removed")
+    repairs += [f"{show(key)} is there twice, of which the last counts" for key in repeated]
     if not isinstance(document, dict):
         raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
     return document, repairs

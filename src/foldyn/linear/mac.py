@@ -128,15 +128,15 @@ def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArr
 
 def _at(shapes: NDArray, nodes: Any) -> NDArray:
     try:
-        numbers = np.asarray(nodes)
+        chosen: NDArray = np.asarray(nodes)
     except ValueError:  # lists of different lengths
-        numbers = np.zeros(0)
-    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
+        chosen = np.zeros(0)
+    if chosen.ndim != 1 or not chosen.size or chosen.dtype.kind not in "iu":
         raise InputError(f"nodes = {nodes!r}: give numbers of nodes, or a pair of such lists")
-    beyond = numbers[(numbers < 0) | (numbers >= shapes.shape[1])]
+    beyond = chosen[(chosen < 0) | (chosen >= shapes.shape[1])]
     if beyond.size:
         raise InputError(f"nodes: there is no node {beyond[0]}; there are {shapes.shape[1]}")
-    return shapes[:, numbers]
+    return shapes[:, chosen]
 
 
 def _weighted(shapes: NDArray, mass: Any) -> NDArray:

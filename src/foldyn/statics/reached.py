@@ -44,7 +44,7 @@ class Reached:
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
         """Whether it is so for displacements (n, 3), m."""
-        moved = displacement[self.node, AXES[self.axis]]
+        moved = displacement[self.node, AXES.index(self.axis)]
         return bool(moved / self.displacement >= 1.0)
 
     @classmethod
@@ -64,9 +64,9 @@ def until_of(given: Any, structure: Any) -> Callable[[NDArray, float], bool] | N
     """What ends a path of a structure: a function as it is, a table as `Reached`."""
     if given is None:
         return None
-    if not callable(given):
-        with within("until"):
-            given = Reached.of(given)
-    if isinstance(given, Reached):
-        resolve_nodes(structure, (given.node,), "until.node")
-    return given
+    if callable(given) and not isinstance(given, Reached):
+        return given  # type: ignore[return-value]
+    with within("until"):
+        end = given if isinstance(given, Reached) else Reached.of(given)
+    resolve_nodes(structure, (end.node,), "until.node")
+    return end
