@@ -81,7 +81,7 @@ def test_bad_settings(values, message):
 
 
 def test_unknown_solver(case):
-    with pytest.raises(InputError, match="choose 'auto' or one of superlu, pardiso"):
+    with pytest.raises(InputError, match="choose one of auto, superlu, pardiso"):
         trace(case, settings=Settings(solver="umfpack"))
 
 
