@@ -90,7 +90,12 @@ from foldyn.materials import (
     PlateSuperlinear as PlateSuperlinear,
     Prony as Prony,
 )
-from foldyn.patterns import Pattern as Pattern, thicken as thicken, welded as welded
+from foldyn.patterns import (
+    Pattern as Pattern,
+    convex as convex,
+    thicken as thicken,
+    welded as welded,
+)
 from foldyn.results import (
     Quantity as Quantity,
     case_of as case_of,

@@ -12,10 +12,13 @@ import os
 import re
 import stat
 import tomllib
+from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
+from foldyn.values import show
 
 DEEPEST = 50
 """Levels of nested tables and lists that a TOML or JSON text may have."""
@@ -57,6 +60,14 @@ def read_text(path: str | os.PathLike[str], what: str, most: int, thin: str) -> 
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 
 
+def path_of(path: Any, name: str = "path") -> Path:
+    """Path of a file or folder, from what names one."""
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError(f" = {show(path)}: give the path of a file", name) from None
+
+
 def check_file(path: str | os.PathLike[str], what: str) -> Path:
     """Path of a file that is one; links are followed.
 
@@ -65,7 +76,7 @@ def check_file(path: str | os.PathLike[str], what: str) -> Path:
     InputError
         There is no such file, or it is none: a folder, a pipe, a device.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
@@ -106,8 +117,13 @@ def from_toml(text: str) -> dict[str, Any]:
         raise InputError(f"is not valid TOML: {_why(error)}") from None
 
 
-def from_json(text: str) -> Any:
+def from_json(text: str, repeated: list[str] | None = None) -> Any:
     """Value of a JSON text.
+
+    Parameters
+    ----------
+    repeated : list of str, optional
+        Gets the keys that an object has several times, of which the last counts.
 
     Raises
     ------
@@ -115,9 +131,16 @@ def from_json(text: str) -> Any:
         The text is not JSON, or nested deeper than any of ours; the message begins "is not".
     """
     try:
-        return _shallow(json.loads(text))
+        return _shallow(json.loads(text, object_pairs_hook=partial(_object, repeated)))
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not valid JSON: {_why(error)}") from None
+
+
+def _object(repeated: list[str] | None, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if repeated is not None and len(found) < len(pairs):
+        repeated += [key for key, times in Counter(key for key, _ in pairs).items() if times > 1]
+    return found
 
 
 def _why(error: Exception) -> str:

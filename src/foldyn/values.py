@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from html import escape
 from numbers import Integral, Real
@@ -43,6 +43,7 @@ UNITS: Mapping[str, str] = {
 SOME = 6
 """Items of a list, and of an array, that a repr shows."""
 T = TypeVar("T")
+N = TypeVar("N", int, float)
 
 
 def show(value: Any) -> str:
@@ -78,6 +79,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def single(value: Any) -> Any:
+    """Return the number of an array without dimensions, as optimizers and xarray give them."""
+    return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
 
 def shortened(text: str) -> str:
@@ -158,9 +164,61 @@ def choice(name: str, value: Any, known: Iterable[str]) -> str:
     """Return `value` when it is one of the `known` words."""
     known = list(known)
     if isinstance(value, str) and value in known:
-        return value
+        return str(value)
     hint = suggest(value, known) if isinstance(value, str) else ""
     raise InputError(f" = {show(value)}: {hint}choose one of {', '.join(known)}", name)
+
+
+def parsed(text: str, kind: Callable[[str], N] = float) -> N:
+    """Number that a text in a file or a command line is.
+
+    Raises
+    ------
+    ValueError
+        It is none, or one to Python alone: 1_0, or in digits of other scripts.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return kind(text)
+
+
+def of_kind(name: str, value: Any, *kinds: type[T]) -> T:
+    """Return `value` when it is an object of one of some classes."""
+    if isinstance(value, kinds):
+        return value
+    known = " or ".join(kind.__name__ for kind in kinds)
+    raise InputError(f": got {type(value).__name__}, give a {known}", name)
+
+
+def function(name: str, value: Any) -> Any:
+    """Return `value` when it is a function, or None."""
+    if value is None or callable(value):
+        return value
+    raise InputError(f" = {show(value)}: give a function, or leave it out", name)
+
+
+def listed(name: str, value: Any, what: str) -> list[Any]:
+    """Return the items of a list, tuple, array or other collection.
+
+    Parameters
+    ----------
+    what : str
+        What to give, for messages: "pairs of vertices".
+    """
+    try:
+        if isinstance(value, str | bytes):
+            raise TypeError
+        return list(value)
+    except TypeError:
+        raise InputError(f" = {show(value)}: give a list of {what}", name) from None
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return a choice between two."""
+    value = single(value)
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f" = {show(value)}: must be True or False (true or false in TOML)", name)
+    return bool(value)
 
 
 def number(
@@ -188,6 +246,7 @@ def number(
     smallest, largest : float
         Sizes of numbers but 0.
     """
+    value = single(value)
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         kind = f" ({unit})" if unit else ""
         raise InputError(f" = {show(value)}: must be a number{kind}", name)
@@ -229,7 +288,7 @@ def whole(
     what : str
         For messages: what it counts, or its unit.
     """
-    what = f" ({what})" if what else ""
+    value, what = single(value), f" ({what})" if what else ""
     counts = not isinstance(value, bool | np.bool_) and isinstance(value, Integral)
     result = int(value) if counts else 0
     if not counts or (least is not None and result < least):
@@ -290,11 +349,10 @@ def number_or_list(name: str, value: Any, what: str) -> float | tuple[float, ...
     what : str
         What the list has one number for, for messages: "node".
     """
+    value = single(value)
     if not isinstance(value, list | tuple | np.ndarray):
         return number(name, value)
     array = numbers(name, value)
-    if array.ndim == 0:
-        return float(array)
     if array.ndim > 1 or not array.size:
         raise InputError(f" = {show(value)}: must be a number, or a list of one per {what}", name)
     return tuple(array.tolist())
@@ -315,12 +373,13 @@ def indices(name: str, value: Any, what: str, alternative: str) -> tuple[int, ..
         raise InputError(
             f" = {show(value)}: must be {what} numbers, as in [0, 1], {alternative}", name
         )
-    for item in array:
+    items = [single(item) for item in array]
+    for item in items:
         if isinstance(item, bool | np.bool_) or not isinstance(item, int | np.integer):
             raise InputError(f" = {show(value)}: {show(item)} is not a {what} number", name)
         if abs(int(item)) > MOST:
             raise InputError(f": {show(item)}: is too large for a {what} number", name)
-    chosen = tuple(int(item) for item in array)
+    chosen = tuple(int(item) for item in items)
     if len(set(chosen)) < len(chosen):
         twice = next(item for item, times in Counter(chosen).items() if times > 1)
         raise InputError(f" = {show(value)}: {what} {twice} is listed twice", name)

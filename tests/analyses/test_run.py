@@ -28,6 +28,8 @@ def test_settings_of_a_path_count(read) -> None:
     text += "load_factors = [0, 1]\n"
     counts = [read(f"{text}largest_turn = {turn}\n").run().sizes["step"] for turn in (0.02, 5.0)]
     assert counts[0] > counts[1]
+    finer = read(text).run(largest_turn=0.02, until={"node": 0, "axis": "x", "displacement": -1.0})
+    assert finer.sizes["step"] == counts[0]
 
 
 def test_each_mass_rule_and_other_arguments(read) -> None:

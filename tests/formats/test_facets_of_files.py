@@ -140,3 +140,29 @@ def test_wrong_word_in_a_case_file(tmp_path):
     (tmp_path / "case.toml").write_text(CASE.format(pattern=INLINE + 'facets = "glue"'))
     with pytest.raises(InputError, match=r'pattern.facets = "glue"'):
         fd.read_case(tmp_path / "case.toml")
+
+
+DART = {
+    "vertices_coords": [[0, 0], [2, 0], [0.6, 0.6], [0, 2], [0.6, -0.6], [0, -2]],
+    "faces_vertices": [[0, 1, 2, 3], [0, 5, 4, 1]],
+    "edges_vertices": [[0, 1]],
+    "edges_assignment": ["V"],
+}
+
+
+@pytest.mark.parametrize("facets", [None, "weld", "hinge"])
+def test_panels_that_are_not_convex_are_cut_and_it_is_said(facets, tmp_path):
+    with pytest.warns(FoldynWarning, match=r"cut 2 panels not convex.*panels 2 to 3 are new"):
+        pattern = fd.read_pattern(file_of(tmp_path, **DART), facets=facets)
+    assert (pattern.creases.tolist(), pattern.welds.tolist()) == ([[0, 1]], [[0, 2], [0, 4]])
+    fd.write_pattern(tmp_path / "y.fold", pattern)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FoldynWarning)
+        again = fd.read_pattern(tmp_path / "y.fold")
+    assert again.faces == pattern.faces
+    np.testing.assert_array_equal(again.welds, pattern.welds)
+
+
+def test_panels_stay_as_they_are_drawn_with_lines(tmp_path):
+    pattern = fd.read_pattern(file_of(tmp_path, **DART), facets="line")
+    assert pattern.faces == ((0, 1, 2, 3), (0, 5, 4, 1))

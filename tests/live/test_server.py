@@ -5,10 +5,11 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+import time
 
 import pytest
 
-from foldyn.live.server import KEY_HEADER, MOST_BYTES, Server
+from foldyn.live.server import KEY_HEADER, MOST_BYTES, MOST_CONNECTIONS, Server
 
 
 @pytest.fixture
@@ -120,3 +121,26 @@ def test_a_page_of_another_host_is_not_given(server):
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE"])
 def test_no_other_method_is_known(server, method):
     assert request(server, method, "/compute")[0] == 501
+
+
+def test_connections_are_bounded_and_the_next_is_told_so(server):
+    """Idle ones hold a thread each; as soon as one is gone there is room again."""
+    before = threading.active_count()
+    idle = []
+    for _ in range(MOST_CONNECTIONS):
+        connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+        connection.connect()
+        idle.append(connection)
+    for _ in range(3 * MOST_CONNECTIONS):
+        status, headers, text = request(server, "GET", f"/{server.key}")
+        assert (status, headers["Connection"]) == (503, "close")
+        assert text.startswith("too many connections at once")
+    assert threading.active_count() <= before + MOST_CONNECTIONS
+    for connection in idle:
+        connection.close()
+    deadline = time.monotonic() + 10.0
+    while request(server, "GET", f"/{server.key}")[0] != 200:
+        assert time.monotonic() < deadline
+    status, _, text = request(server, "POST", "/compute")
+    assert status == 200
+    assert json.loads(text) == {"got": {"a": 1}}

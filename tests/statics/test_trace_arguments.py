@@ -42,7 +42,13 @@ def case():
         ({"constant": [0]}, "nothing grows along the path"),
         ({"initial": np.zeros((3, 3))}, "give a State"),
         ({"initial": fd.State(np.zeros((4, 3)))}, r"shape \(4, 3\): the case has \(3, 3\)"),
-        ({"settings": {"tolerance": 1e-6}}, "give statics.Settings"),
+        ({"settings": 1e-6}, "settings: got float, give statics.Settings"),
+        ({"settings": {"tolerence": 1e-6}}, "did you mean 'tolerance'"),
+        ({"settings": {"largest_turn": -3.0}}, "settings: largest_turn = -3.0: must be greater"),
+        ({"until": 0.1}, "until = 0.1: must be a table of node, axis, displacement"),
+        ({"until": {"node": 2, "axis": "z"}}, "until.displacement: missing"),
+        ({"until": {"node": 9, "axis": "z", "displacement": 1.0}}, "until.node = .*out of range"),
+        ({"until": {"node": 2, "axis": "z", "displacement": 0}}, "the path begins there"),
         ({"inertia_relief": 1}, "True or False"),
         ({"inertia_relief": True}, "needs the mass"),
     ],
@@ -75,7 +81,7 @@ def test_bad_settings(values, message):
 
 
 def test_unknown_solver(case):
-    with pytest.raises(InputError, match="choose 'auto' or one of superlu, pardiso"):
+    with pytest.raises(InputError, match="choose one of auto, superlu, pardiso"):
         trace(case, settings=Settings(solver="umfpack"))
 
 
@@ -131,3 +137,18 @@ def test_base_motion_and_histories_play_no_part():
     moved = trace(fd.Case(truss.structure(), supports, [load]), load_factors=[2.0])
     plain = trace(truss.case(), load_factors=[2.0])
     np.testing.assert_array_equal(moved.displacement, plain.displacement)
+
+
+def test_a_table_says_where_a_path_ends_and_how_it_steps(case):
+    """As a function and `Settings` do."""
+    end = -0.4 * VonMises().h
+    tables = trace(
+        case, "arc_length", until={"node": APEX, "axis": "z", "displacement": end},
+        settings={"largest_turn": 2.0},
+    )  # fmt: skip
+    objects = trace(
+        case, "arc_length", until=lambda u, factor: u[APEX, 2] <= end,
+        settings=Settings(largest_turn=2.0),
+    )  # fmt: skip
+    np.testing.assert_array_equal(tables.displacement, objects.displacement)
+    assert tables.displacement[-1, APEX, 2] <= end < tables.displacement[-2, APEX, 2]

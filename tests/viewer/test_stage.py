@@ -14,7 +14,9 @@ from page_samples import page, results
 
 import foldyn as fd
 from foldyn.errors import InputError
+from foldyn.live.page import live_page
 from foldyn.plots.style import CREASE_NAMES, CREASES
+from foldyn.report import Chart, Curve
 from foldyn.viewer import stage
 from foldyn.viewer.sheet import KINDS, edge_pieces
 from foldyn.viewer.stage import OF_SIZE
@@ -148,3 +150,22 @@ def test_a_folding_may_begin_and_end_closed():
     way = fd.fold(shut, 90, steps=2).path
     (about,) = stage({"folding": way}, {}, "title", [1]).about["results"]
     assert about["fields"]["turn"]["on"] == "crease"
+
+
+BREAKING = '<!--<script>"</script><b>&'
+
+
+def test_no_title_can_end_a_script_element_or_open_a_comment_in_it():
+    """After "<!--<script" a browser looks for two ends of the script."""
+    result = next(iter(results("motion").values()))
+    text = stage({BREAKING: result}, {BREAKING: fd.case_of(result)}, BREAKING, [0]).html()
+    (about,) = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text)
+    assert "<" not in about
+    assert json.loads(about)["title"] == BREAKING
+    live = live_page(BREAKING, {"name": BREAKING}, "key")
+    (about,) = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', live)
+    assert "<" not in about
+    assert json.loads(about) == {"name": BREAKING, "key": "key"}
+    chart = Chart("x", "y", [Curve(BREAKING, [0.0, 1.0], [0.0, 1.0])], BREAKING, BREAKING).html()
+    for whole in (live.partition("<main")[0], chart):
+        assert "<!--" not in whole

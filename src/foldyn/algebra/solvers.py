@@ -13,6 +13,7 @@ from foldyn.algebra.pardiso import Pardiso
 from foldyn.algebra.superlu import Factorization, Factorizer, SuperLU
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
+from foldyn.values import choice
 
 
 class Backend(NamedTuple):
@@ -37,11 +38,10 @@ def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
 
     "auto" is the last of `SOLVERS` that is installed and worthwhile for the size.
     """
+    choice("solver", name, ("auto", *SOLVERS))
     if name == "auto":
         fit = [key for key, item in SOLVERS.items() if size >= item.worthwhile and item.found()]
         name = fit[-1]
-    if name not in SOLVERS:
-        raise InputError(f"solver = {name!r}: choose 'auto' or one of {', '.join(SOLVERS)}")
     if not SOLVERS[name].found():
         raise InputError(
             f"solver = {name!r}: needs the package {SOLVERS[name].package}, which is not "

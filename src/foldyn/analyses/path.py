@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import replace
 from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo
 
 from foldyn.analyses.bars import bar
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, arguments_of, counted
@@ -22,7 +23,6 @@ from foldyn.analyses.sections import (
     Positive,
     Section,
     ShownSection,
-    Whole,
     check_mass,
     contact_part,
     one_of,
@@ -31,11 +31,13 @@ from foldyn.analyses.sections import (
 )
 from foldyn.analyses.start import StoredStart
 from foldyn.cases import Case, resolve_nodes
-from foldyn.cases.directions import AXES, DIRECTIONS, check_axis
+from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import load_from
 from foldyn.cases.supports import support_from
 from foldyn.errors import InputError
 from foldyn.statics import METHODS, Point, Settings, trace
+from foldyn.statics.newton import settings_of
+from foldyn.statics.reached import Reached
 from foldyn.values import indices, number, show
 
 SETTINGS = ("tolerance", "largest_turn", "stability")
@@ -74,34 +76,6 @@ NO_BASE = (
 )
 
 
-class Reached(Section):
-    """[analysis.until]: whether a node has moved so far along an axis; `until` of `trace`.
-
-    Attributes
-    ----------
-    node : int
-    axis : {"x", "y", "z"}
-    displacement : float
-        Displacement (m) from the rest position, not zero; reached where the node's own is as far
-        from zero on the same side.
-    """
-
-    node: Whole
-    axis: Annotated[str, PlainValidator(lambda value: check_axis("", value))]
-    displacement: Annotated[float, PlainValidator(lambda value: number("", value))]
-
-    @model_validator(mode="after")
-    def _moves(self) -> Self:
-        if self.displacement == 0.0:
-            raise InputError(" = 0: the path begins there; say where it ends", ".displacement")
-        return self
-
-    def __call__(self, displacement: NDArray, load_factor: float) -> bool:
-        """Whether it is so for displacements (n, 3), m."""
-        moved = displacement[self.node, AXES.index(self.axis)]
-        return bool(moved / self.displacement >= 1.0)
-
-
 class PathSection(Section):
     """[analysis] of kind "statics"."""
 
@@ -111,7 +85,7 @@ class PathSection(Section):
     steps: Count | None = None
     first_step: float | None = None
     constant: Annotated[str | tuple[int, ...], PlainValidator(_constant)] = ()
-    until: Reached | None = None
+    until: Annotated[Reached | None, PlainValidator(Reached.of)] = None
     inertia_relief: bool = False
     tolerance: Annotated[float, Field(ge=1e-14, le=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn
@@ -154,7 +128,7 @@ class PathAnalysis(Analysis):
         "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4",
     )  # fmt: skip
     needs_density = ""
-    takes = arguments_of(trace)
+    takes = (*arguments_of(trace), *SETTINGS)
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -173,6 +147,8 @@ class PathAnalysis(Analysis):
             if one in changes:
                 own[other] = None  # they say the same
         given = {"initial": case_file.start(mass).state, **own, **changes}
+        turned = {name: given.pop(name) for name in SETTINGS if name in given}
+        given["settings"] = replace(settings_of(given["settings"]), **turned)
         case = case_file.case(mass)
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
 from foldyn.errors import InputError, within
-from foldyn.values import number, plain, show, whole
+from foldyn.values import number, parsed, plain, show, single, whole
 
 MOST_VALUES = 1_000_000
 """Values of a key: more are a slip of the finger."""
@@ -140,14 +140,14 @@ def _word(word: str) -> Value:
     word = word.strip()
     for kind in (int, float):
         try:
-            return kind(word)
+            return parsed(word, kind)
         except ValueError:
             continue
     return {"true": True, "false": False}.get(word, word)
 
 
 def _values(listed: Iterable[Any]) -> tuple[Value, ...]:
-    values = [plain(value) for value in listed]
+    values = [plain(single(value)) for value in listed]
     if not values:
         raise InputError(" = []: names no values; give at least one")
     if len(values) > MOST_VALUES:

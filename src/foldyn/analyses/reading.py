@@ -21,9 +21,10 @@ from foldyn.cases import Case, resolve_nodes
 from foldyn.cases.decode import call_from
 from foldyn.cases.models import MODELS, SHELL
 from foldyn.errors import Faults, FoldynWarning, InputError, within
-from foldyn.input_files import from_toml, read_text
-from foldyn.patterns import GENERATORS, Pattern, thicken, welded
-from foldyn.patterns.facets import HINGE, WELD
+from foldyn.input_files import from_toml, path_of, read_text
+from foldyn.patterns import GENERATORS, Pattern, convex, thicken, welded
+from foldyn.patterns.convex import what_was_cut
+from foldyn.patterns.facets import HINGE, LINE, WELD
 from foldyn.structures import Sheet, sheet_from
 from foldyn.values import LARGEST, MOST, SMALLEST, show
 
@@ -57,7 +58,7 @@ def read_case(
         The file cannot be read or anything in it cannot be used; the message names the file, the
         key, the value and what to do.
     """
-    path = Path(path)
+    path = path_of(path)
     text = _text(path)
     document = _parsed(path, text)
     if model is not None or divisions is not None:
@@ -258,9 +259,16 @@ def _radians(angles: Any) -> Any:
 
 
 def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
-    """The pattern with its flat creases as the case file wants them: hinges if it says nothing."""
+    """The pattern with its flat creases as the case file wants them, and convex panels.
+
+    They are hinges if it says nothing.
+    """
     wanted = table.get(FACETS, HINGE)
-    return pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
+    pattern = pattern if wanted == HINGE else welded(pattern, join=wanted == WELD)
+    parts = pattern if wanted == LINE else convex(pattern)
+    if parts is not pattern:
+        warnings.warn(f"pattern: {what_was_cut(pattern, parts)}", FoldynWarning, stacklevel=2)
+    return parts
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

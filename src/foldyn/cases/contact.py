@@ -23,7 +23,7 @@ from foldyn.mechanics.contact.tables import (
     POINT,
     Sheets,
 )
-from foldyn.values import brief, length, number, show, vector
+from foldyn.values import brief, flag, length, number, show, vector
 
 
 @brief
@@ -130,8 +130,7 @@ class Contact(Part):
         if self.stiffness is not None:
             given = number("stiffness", self.stiffness, above=0.0, unit="N/m")
             object.__setattr__(self, "stiffness", given)
-        if not isinstance(self.panels, bool):
-            raise InputError(f" = {show(self.panels)}: give True or False", "panels")
+        object.__setattr__(self, "panels", flag("panels", self.panels))
         if isinstance(self.planes, str) or not isinstance(self.planes, Sequence):
             raise InputError(f" = {show(self.planes)}: must be a list of Plane", "planes")
         for i, plane in enumerate(self.planes):

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError, within
-from foldyn.input_files import read_text
-from foldyn.values import shortened, show, suggest
+from foldyn.input_files import path_of, read_text
+from foldyn.values import parsed, shortened, show, suggest
 
 TIME_UNITS: Mapping[str, Fraction] = {
     "s": Fraction(1),
@@ -71,11 +71,7 @@ def read_columns(
     if _quantity(wanted) is None:
         known = ", ".join(known for units in UNITS.values() for known in units)
         raise InputError(f"unit = {show(unit)}: is not known; choose one of {known}")
-    try:
-        file = Path(path)
-    except TypeError:
-        raise InputError(f"path = {show(path)}: must be the path of a CSV file") from None
-    with _opened(file) as (columns, lines):
+    with _opened(path_of(path)) as (columns, lines):
         chosen = _find("time", time, columns, 0), _find("value", value, columns, 1)
         if chosen[0] == chosen[1]:
             raise InputError(f'time and value: are both the column "{chosen[0].shown}"; name two')
@@ -132,7 +128,7 @@ def read_numbers(
     InputError
         As `Table.from_csv`, but for the order of the lines.
     """
-    with _opened(Path(path)) as (columns, rows):
+    with _opened(path_of(path)) as (columns, rows):
         chosen = [_find(field, heading, columns, 0) for field, (heading, _) in wanted.items()]
         ratios = [
             _time_ratio(item) if unit == "s" else _value_ratio(item, unit)
@@ -149,7 +145,7 @@ def read_numbers(
 
 def read_headings(path: str | os.PathLike[str]) -> list[tuple[str, str | None]]:
     """Names and units of the columns of a CSV file; None where a column has no unit."""
-    with _opened(Path(path)) as (columns, _):
+    with _opened(path_of(path)) as (columns, _):
         return [(column.name, column.unit) for column in columns]
 
 
@@ -275,10 +271,10 @@ def _article(quantity: str) -> str:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        parsed(cell)
     except ValueError:
         return False
-    return "_" not in cell  # 1_000 is a number to Python only
+    return True
 
 
 def _number(

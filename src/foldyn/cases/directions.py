@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.values import choice, indices, show, vector
+from foldyn.values import choice, indices, show, single, vector
 
 AXES = "xyz"
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
@@ -53,6 +53,7 @@ def signed(name: str, direction: Any) -> tuple[int, float]:
 
 def check_pairs(name: str, value: Any) -> tuple[tuple[int, int], ...]:
     """Return pairs of different nodes, from one pair or several."""
+    value = single(value)
     listed = value if isinstance(value, list | tuple | np.ndarray) else ()
     several = len(listed) > 0 and all(isinstance(one, list | tuple | np.ndarray) for one in listed)
     pairs = []

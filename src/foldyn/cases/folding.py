@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.values import number, number_or_list, show
+from foldyn.values import number, number_or_list, parsed, show
 
 SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
 """Sign of the fold angle of each assignment."""
@@ -37,7 +37,7 @@ def check_fraction(name: str, value: Any) -> float:
     given = value
     if isinstance(value, str):
         try:
-            given = float(value.strip().removesuffix("%")) / 100.0
+            given = parsed(value.strip().removesuffix("%")) / 100.0
         except ValueError:
             given = None
         if given is None or not value.strip().endswith("%"):

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases import waveforms
 from foldyn.cases.csv_table import read_columns
-from foldyn.cases.history import Constant, Formula, History, check_flag, set_field
+from foldyn.cases.history import Constant, Formula, History, set_field
 from foldyn.errors import InputError
-from foldyn.values import SMALLEST, brief, number, numbers, show
+from foldyn.values import SMALLEST, brief, flag, number, numbers, show
 
 __all__ = [
     "HISTORIES", "Chirp", "Constant", "HalfSine", "Harmonic", "History", "Pulse", "Ramp", "Step",
@@ -114,7 +114,7 @@ class Ramp(_Lasting):
     def __post_init__(self) -> None:
         """Check the arguments."""
         super().__post_init__()
-        check_flag("smooth", self.smooth)
+        set_field(self, "smooth", flag("smooth", self.smooth))
 
     @property
     def code(self) -> int:  # type: ignore[override]
@@ -274,7 +274,7 @@ class Table(Formula):
             raise InputError(
                 f"times[{i}] = {times[i]}: must be greater than the time before it ({times[i - 1]})"
             )
-        check_flag("smooth", self.smooth)
+        set_field(self, "smooth", flag("smooth", self.smooth))
         set_field(self, "times", times)
         set_field(self, "values", values)
 

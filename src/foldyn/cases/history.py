@@ -170,9 +170,3 @@ def as_history(history: History | Callable[[Any], Any] | None) -> History:
 def set_field(instance: Any, name: str, value: Any) -> None:
     """Set a checked value of a history: the dataclasses are frozen."""
     object.__setattr__(instance, name, value)
-
-
-def check_flag(name: str, value: Any) -> None:
-    """Refuse what is neither true nor false."""
-    if not isinstance(value, bool):
-        raise InputError(f"{name} = {show(value)}: must be true or false")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from foldyn.cases.selection import check_nodes, in_range, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, edge_of
 from foldyn.structures.mesh import double_areas
-from foldyn.values import indices, show
+from foldyn.values import indices, listed, show
 
 PAIRS = 'pairs of vertices, as in [[0, 1], [1, 2]], or a selection such as "xmin"'
 
@@ -21,10 +20,11 @@ def check_edges(name: str, edges: Any) -> str | tuple[tuple[int, int], ...]:
     """Return a selection as text, or edges as a tuple of (low, high); but for their range."""
     if isinstance(edges, str):
         return str(check_nodes(edges, name))
-    if not isinstance(edges, Sequence | np.ndarray) or not len(edges):
+    given = listed(name, edges, PAIRS)
+    if not given:
         raise InputError(f" = {show(edges)}: give {PAIRS}", name)
     pairs = []
-    for k, edge in enumerate(edges):
+    for k, edge in enumerate(given):
         ends = indices(f"{name}[{k}]", edge, "vertex", "the two ends of an edge")
         if len(ends) != 2:
             raise InputError(f" = {show(edge)}: give {PAIRS}", f"{name}[{k}]")

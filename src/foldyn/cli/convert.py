@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from foldyn.cli.options import add_reading, add_switches, flag, frame_of
+from foldyn.cli.options import add_reading, add_switches, flag, frame_of, integer, number
 from foldyn.cli.streams import speech
 from foldyn.errors import InputError
 
@@ -43,14 +43,16 @@ def add_convert(commands: Any) -> None:
         "factor on all lengths, or displacements of a result",
     )
     command.add_argument("--format", help="format of a result, where the ending does not name it")
-    command.add_argument("--every", type=int, help="of a result, take every such sample")
-    command.add_argument("--frames", type=int, help="of a result, take so many samples, evenly")
-    command.add_argument("--seconds", type=float, help="how long an animation (.glb) takes")
+    command.add_argument("--every", type=integer, help="of a result, take every such sample")
+    command.add_argument("--frames", type=integer, help="of a result, take so many samples, evenly")
+    command.add_argument("--seconds", type=number, help="how long an animation (.glb) takes")
     command.add_argument("--rows", help="of tables, what a row is for: time,node (default), time")
     command.add_argument("--fields", help="of a result, these variables: displacement,velocity")
     command.add_argument("--nodes", help="of a result, these nodes: 0,7,12, or a selection: xmax")
-    command.add_argument("--divisions", type=int, help="of input decks, pieces of every edge (16)")
-    command.add_argument("--modes", type=int, help="of input decks, how many frequencies (6)")
+    command.add_argument(
+        "--divisions", type=integer, help="of input decks, pieces of every edge (16)"
+    )
+    command.add_argument("--modes", type=integer, help="of input decks, how many frequencies (6)")
     command.add_argument("--element", help="of Abaqus, kind of the triangles: STRI3 (default), S3")
     add_switches(command, figures=False)
 
@@ -101,7 +103,7 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
     for name in PATTERNS_ONLY:
         if getattr(given, name):
             raise InputError(": only for pattern files; leave it out", f"--{name}")
-    if given.frame is not None and not given.frame.isdecimal():
+    if given.frame is not None and not (given.frame.isascii() and given.frame.isdecimal()):
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
     options = {name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale")}
     frame = None if given.frame is None else int(given.frame)

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH, add_figures, add_results
+from foldyn.cli.options import BOTH, add_figures, add_results, integer, number
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import InputError
 from foldyn.plots import FIGURES
+from foldyn.values import parsed
 
 if TYPE_CHECKING:
     from foldyn.experiment import Course, Estimate, Fit
@@ -59,13 +60,15 @@ def add_fit(commands: Any) -> None:
     fit.add_argument(
         "--sigma",
         action="append",
-        type=float,
+        type=number,
         default=[],
         help="with a case file: standard error (SI units) of the data, for each of them once",
     )
     fit.add_argument("--axis", default="x", help="with a case file: axis of the data (default: x)")
-    fit.add_argument("--starts", type=int, help="searches, from random starts within the bounds")
-    fit.add_argument("--processes", type=int, help="evaluations that run at a time")
+    fit.add_argument(
+        "--starts", type=integer, help="searches, from random starts within the bounds"
+    )
+    fit.add_argument("--processes", type=integer, help="evaluations that run at a time")
     add_results(fit, "NAME-fit")
     add_figures(fit)
 
@@ -191,7 +194,7 @@ def _parameter(text: str) -> Any:
         return Parameter(text.strip())
     key, rest = _halves(text, "--vary")
     try:
-        numbers = [float(part) for part in rest.split(":")]
+        numbers = [parsed(part) for part in rest.split(":")]
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3):

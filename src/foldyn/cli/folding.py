@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.clock import Clock
 from foldyn.cli.convert import RESULT
 from foldyn.cli.folder import check_folder, drawing
-from foldyn.cli.options import add_film, add_reading, add_switches, frame_of
+from foldyn.cli.options import add_film, add_reading, add_switches, frame_of, integer
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import InputError, within
 from foldyn.input_files import read_text
+from foldyn.values import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,7 +51,7 @@ def add_fold(commands: Any) -> None:
     aim.add_argument(
         "--to-frame", metavar="FRAME", help="number or title of the frame to fold to, of the file"
     )
-    command.add_argument("--steps", type=int, default=20, help="states on the way (20)")
+    command.add_argument("--steps", type=integer, default=20, help="states on the way (20)")
     command.add_argument(
         "--start",
         default="auto",
@@ -151,9 +152,9 @@ def read_angles(path: str) -> dict[Any, float]:
             continue
         key: Any = parts[0]
         try:
-            angle = float(parts[-1])
+            angle = parsed(parts[-1])
             if len(parts) == 3:
-                key = (int(parts[0]), int(parts[1]))
+                key = (parsed(parts[0], int), parsed(parts[1], int))
         except ValueError:
             angle = None
         if angle is None or len(parts) not in (2, 3):

@@ -20,7 +20,7 @@ from foldyn.cli.fit import add_fit, run_fit
 from foldyn.cli.folder import reason
 from foldyn.cli.folding import add_fold, run_fold
 from foldyn.cli.lasting import lasting
-from foldyn.cli.options import add_figures, add_film, add_results, flag
+from foldyn.cli.options import add_figures, add_film, add_results, flag, integer, number
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import Outlet, noticed, steady_streams
 from foldyn.cli.study import add_study, study
@@ -63,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
     flag(run, "--resume", "go on with a motion that was cut off, from its last checkpoint")
     run.add_argument(
         "--checkpoint",
-        type=float,
+        type=number,
         metavar="SECONDS",
         help="of a motion: computing time between checkpoints (default: 60)",
     )
@@ -75,7 +75,7 @@ def parser() -> argparse.ArgumentParser:
         "kind; what its [analysis] says, if it is of kind modes, holds unless given here.",
     )
     _add_common(modes, "modes")
-    modes.add_argument("--count", type=int, help="how many modes (default: 6)")
+    modes.add_argument("--count", type=integer, help="how many modes (default: 6)")
     _add_state(modes)
 
     frf = commands.add_parser(
@@ -88,7 +88,7 @@ def parser() -> argparse.ArgumentParser:
     _add_common(frf, "frf")
     frf.add_argument(
         "--frequencies",
-        type=float,
+        type=number,
         nargs=3,
         metavar=("FIRST", "LAST", "COUNT"),
         help="frequencies (Hz), spaced evenly",
@@ -105,10 +105,10 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_case(fidelity, "fidelity")
     fidelity.set_defaults(model=None)
-    fidelity.add_argument("--count", type=int, help="how many modes of the shell (default: 6)")
+    fidelity.add_argument("--count", type=integer, help="how many modes of the shell (default: 6)")
     fidelity.add_argument(
         "--divisions",
-        type=int,
+        type=integer,
         nargs=2,
         metavar=("COARSE", "FINE"),
         help="pieces of every edge of the two shells (default: 6 12, less for large patterns)",
@@ -156,7 +156,7 @@ def _add_common(command: argparse.ArgumentParser, results: str) -> None:
         help="model instead of that of the file; results go to NAME-MODEL-" + results,
     )
     command.add_argument(
-        "--divisions", type=int, metavar="N", help="pieces of every edge of a shell (16)"
+        "--divisions", type=integer, metavar="N", help="pieces of every edge of a shell (16)"
     )
 
 
@@ -171,7 +171,7 @@ def _add_state(command: argparse.ArgumentParser) -> None:
     _add_secant(command)
     command.add_argument(
         "--internal",
-        type=int,
+        type=integer,
         metavar="N",
         help="internal amplitudes of each panel (scheme n5b8e; default: those of the file)",
     )
@@ -181,7 +181,7 @@ def _add_secant(command: argparse.ArgumentParser) -> None:
     """Add the amplitude of superlinear hinges."""
     command.add_argument(
         "--secant",
-        type=float,
+        type=number,
         metavar="DEGREES",
         help="amplitude of the hinges' turns for which superlinear hinges are linearized",
     )

@@ -5,6 +5,17 @@ from __future__ import annotations
 import argparse
 
 from foldyn.plots import ANIMATIONS, FIGURES
+from foldyn.values import parsed
+
+
+def number(text: str) -> float:
+    """Number of an option; its name stands in argparse's message."""
+    return parsed(text)
+
+
+def integer(text: str) -> int:
+    """Whole number of an option."""
+    return parsed(text, int)
 
 
 def flag(command: argparse.ArgumentParser, name: str, text: str) -> None:
@@ -23,14 +34,16 @@ def add_reading(
     command: argparse.ArgumentParser, frame: str, scale: str = "factor on all lengths"
 ) -> None:
     """Add how a pattern file is read; `frame` and `scale` say what these are for."""
-    command.add_argument("--scale", type=float, help=scale)
+    command.add_argument("--scale", type=number, help=scale)
     command.add_argument("--unit", help="unit of the coordinates of the file: mm, cm, m, in, ...")
     command.add_argument("--frame", help=frame)
 
 
 def frame_of(given: str | None) -> int | str | None:
     """Number or title of a frame."""
-    return int(given) if given is not None and given.isdecimal() else given
+    if given is None or not (given.isascii() and given.isdecimal()):
+        return given
+    return int(given)
 
 
 BOTH = "--figures: draws figures; leave out --no-figures"

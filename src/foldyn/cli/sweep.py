@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from foldyn.cli.clock import Clock
 from foldyn.cli.folder import Results, drawing, held
-from foldyn.cli.options import BOTH, add_figures, add_results
+from foldyn.cli.options import BOTH, add_figures, add_results, integer
 from foldyn.cli.stamp import Owner
 from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
@@ -60,14 +60,16 @@ def add_sweep(commands: Any) -> None:
         help="what is measured, as frequencies or peak_frequency[8]; or a function of your own, "
         "[NAME=]module:function or [NAME=]file.py:function",
     )
-    sweep.add_argument("--samples", type=int, metavar="N", help="draw N points instead of a grid")
+    sweep.add_argument(
+        "--samples", type=integer, metavar="N", help="draw N points instead of a grid"
+    )
     sweep.add_argument(
         "--method",
         metavar="latin_hypercube|sobol|saltelli",
         help="how points are drawn (default: latin_hypercube); saltelli is for Sobol indices, and "
         "takes N times the number of keys and two",
     )
-    sweep.add_argument("--seed", type=int, help="of the samples (default: 0)")
+    sweep.add_argument("--seed", type=integer, help="of the samples (default: 0)")
     sweep.add_argument(
         "--tie",
         action="append",
@@ -75,7 +77,10 @@ def add_sweep(commands: Any) -> None:
         help="a key that follows others, as b=360 - a",
     )
     sweep.add_argument(
-        "--processes", type=int, metavar="N", help="points at a time (default: one per processor)"
+        "--processes",
+        type=integer,
+        metavar="N",
+        help="points at a time (default: one per processor)",
     )
     sweep.add_argument(
         "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead"

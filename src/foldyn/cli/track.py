@@ -16,7 +16,7 @@ from foldyn.cli.streams import noted_warnings, progress_bar, speech
 from foldyn.errors import ComputationError, InputError
 from foldyn.input_files import check_file
 from foldyn.studies import find_case
-from foldyn.values import number
+from foldyn.values import number, parsed
 from foldyn.values import whole as whole_number
 from foldyn.writing import whole
 
@@ -173,7 +173,7 @@ def whole_numbers(given: Namespace, name: str, count: int | None = None) -> tupl
 
 def _numbers(option: str, text: str, count: int | None) -> list[float]:
     try:
-        values = [float(part) for part in text.split(",")]
+        values = [parsed(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"{option} {text}: give numbers separated by commas") from None
     if count is not None and len(values) != count:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from foldyn.cli.options import flag
+from foldyn.cli.options import flag, integer
 from foldyn.cli.signals import ENDINGS
 from foldyn.cli.streams import speech
 
@@ -24,7 +24,7 @@ def add_view(commands: Any) -> None:
         "files", metavar="FILE", nargs="+",
         help="case file (TOML) or the name of a shipped one, results (.nc), or a pattern file",
     )  # fmt: skip
-    command.add_argument("--port", type=int, default=0, help="port (default: any that is free)")
+    command.add_argument("--port", type=integer, default=0, help="port (default: any that is free)")
     flag(command, "--no-browser", "print the address and open no browser")
     flag(command, "--quiet", "print nothing but the address")
     flag(command, "--force", "go on even if more than half of the memory is needed, as estimated")

@@ -25,7 +25,7 @@ from foldyn.dynamics.initial import (
 )
 from foldyn.dynamics.keeping import SECONDS, check_keeping
 from foldyn.dynamics.method_choice import AUTO, choose
-from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
+from foldyn.dynamics.methods import METHODS, Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Reporter
@@ -35,7 +35,7 @@ from foldyn.dynamics.system import pack
 from foldyn.dynamics.touch import contact_quantities
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.results import Quantity
-from foldyn.values import number
+from foldyn.values import choice, flag, number, of_kind
 
 if TYPE_CHECKING:
     import xarray
@@ -150,7 +150,7 @@ def simulate(
     and damped creases follow the motion.
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
-    if store is None and resume:
+    if store is None and flag("resume", resume):
         raise InputError(": there is nothing to go on with; name the file of the result", "store")
     motion = prepare(
         case, duration, method, dt, every, initial, force, tolerance, start, spectral_radius,
@@ -178,14 +178,13 @@ def prepare(
     Arguments and exceptions are those of `simulate`; the motion starts with `Motion.run`. One that
     is `kept` on the disk may have more samples than memory holds.
     """
-    if not isinstance(case, Case):
-        raise InputError(f"case: got {type(case).__name__}, give a Case")
+    of_kind("case", case, Case)
+    choice("method", method, (*METHODS, AUTO))
     integrator = method_of("rk4") if method == AUTO else suited(method, case)
     if method != AUTO:
         case = with_mass(integrator, case)
     duration = number("duration", duration, above=0.0)
-    if not isinstance(force, bool):
-        raise InputError(f"force = {force!r}: give True or False")
+    force = flag("force", force)
     if not len(case.free_dofs):
         raise InputError(
             "supports: hold every node along x, y and z, so that nothing can move: free one"
@@ -240,7 +239,9 @@ def prepare(
         )
     span = SPAN * min(plan.dt, critical) * (1.0 if plan.steps else LARGEST_STEP)
     packed = pack(case, span, u, modal)
-    sampler = Sampler(case, sample or {}, u, v, plan.start, contact_quantities(case))
+    sampler = Sampler(
+        case, {} if sample is None else sample, u, v, plan.start, contact_quantities(case)
+    )
     state = u, v, remembered, initial.continuation if initial else None
     return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason)
 

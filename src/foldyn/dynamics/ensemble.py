@@ -29,7 +29,7 @@ from foldyn.errors import FoldynError, FoldynWarning, InputError
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable
-from foldyn.values import number, show, whole
+from foldyn.values import flag, number, of_kind, show, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -98,7 +98,7 @@ def simulate_many(
         Motions that ended before their time; an energy balance that is off by more than 1 %.
     """
     many = _checked(cases, initial)
-    start = number("start", start, unit="s")
+    start, force = number("start", start, unit="s"), flag("force", force)
     duration = number("duration", duration, above=0.0)
     members = [_member(k, case, state) for k, (case, state) in enumerate(many)]
     least = int(np.argmin([member.critical for member in members]))
@@ -138,8 +138,7 @@ def _checked(cases: Any, initial: Any) -> list[tuple[Case, State | None]]:
     if not isinstance(cases, Sequence) or not len(cases):
         raise InputError(f" = {show(cases)}: give a list of cases", "cases")
     for k, case in enumerate(cases):
-        if not isinstance(case, Case):
-            raise InputError(f": got {type(case).__name__}, give a Case", f"cases[{k}]")
+        of_kind(f"cases[{k}]", case, Case)
     if initial is None or isinstance(initial, State):
         return [(case, initial) for case in cases]
     if not isinstance(initial, Sequence) or len(initial) != len(cases):

@@ -24,6 +24,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.mechanics.following import following_force
 from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS
+from foldyn.values import whole
 
 AXES = "xyz"
 FIRST = 0.15  # first step over the largest one, times the fifth root of the tolerance
@@ -48,8 +49,9 @@ def initial_state(result: Any, at: int = -1) -> State:
             break
     else:
         raise InputError("initial_state: the result has neither a time nor a step dimension")
-    if isinstance(at, bool) or not isinstance(at, (int, np.integer)) or not -count <= at < count:
-        raise InputError(f" = {at!r}: the result has samples 0 to {count - 1}", "at")
+    at = whole("at", at)
+    if not -count <= at < count:
+        raise InputError(f" = {at}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
     state = {
         name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()

@@ -27,7 +27,7 @@ from foldyn.lock import LockedError, locked
 from foldyn.results.columns import Columns
 from foldyn.results.netcdf import check_target, load
 from foldyn.results.seal import seal, sound
-from foldyn.values import number, show
+from foldyn.values import flag, number, show
 from foldyn.writing import remove_leftovers, whole
 
 if TYPE_CHECKING:
@@ -271,6 +271,4 @@ def check_keeping(store: Any, checkpoint: Any, resume: Any) -> Keeping:
         raise InputError(f" = {show(store)}: give the file of the result", "store")
     file = check_target(store)
     seconds = number("checkpoint", checkpoint, above=0.0)
-    if not isinstance(resume, bool):
-        raise InputError(f" = {show(resume)}: give True or False", "resume")
-    return Keeping(file, seconds, resume)
+    return Keeping(file, seconds, flag("resume", resume))

@@ -24,6 +24,7 @@ from foldyn.dynamics.snapshot import parts_of, restore, snapshot
 from foldyn.dynamics.stability import (
     MARGIN,
     Growth,
+    checked_place,
     damper_rate,
     largest_frequency,
     stability_limit,
@@ -33,6 +34,7 @@ from foldyn.dynamics.timing import jumps
 from foldyn.errors import InputError
 from foldyn.jit.compiled import ready
 from foldyn.mechanics.threads import run_together
+from foldyn.values import of_kind
 
 
 class Engine(Protocol):
@@ -280,5 +282,6 @@ def critical_step(case: Case, method: str = "rk4", u: ArrayLike | None = None) -
     r from 0 to the largest rate at which modal damping, dashpots and creases damp any motion: for
     RK4 ``|R(s dt)| <= 1``.
     """
-    chosen = suited(method, case)
-    return chosen.critical_step(with_mass(chosen, case), u)
+    of_kind("case", case, Case)
+    chosen, place = suited(method, case), checked_place(case, u)
+    return chosen.critical_step(with_mass(chosen, case), place)

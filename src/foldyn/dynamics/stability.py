@@ -20,7 +20,8 @@ from foldyn.cases import Case, Rayleigh
 from foldyn.dynamics.dampers import dampers
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
-from foldyn.errors import ComputationError
+from foldyn.errors import ComputationError, InputError
+from foldyn.values import numbers, of_kind
 
 MARGIN = 0.9  # of the stability limit: room for stiffening
 _DENSE = 60  # dofs below which a dense eigensolver is quicker and safer
@@ -82,7 +83,18 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     none at rest, cannot make the answer too small. Laws with memory count with what they resist at
     once.
     """
+    u = checked_place(of_kind("case", case, Case), u)
     return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
+
+
+def checked_place(case: Case, u: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Displacements (n, 3), m, of the nodes of a case."""
+    if u is None:
+        return None
+    place, shape = numbers("u", u), case.structure.nodes.shape
+    if place.shape != shape:
+        raise InputError(f": shape {place.shape}; give displacements {shape} of all nodes", "u")
+    return place
 
 
 def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:

@@ -20,7 +20,7 @@ from foldyn.cases.waveforms import CALLED
 from foldyn.dynamics.course import StepPlan
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.memory import GIB, check_memory
-from foldyn.values import number, show, whole
+from foldyn.values import number, show, single, whole
 
 MOST_STEPS = 1e13  # years of computing, whatever the structure
 DEFAULT_FRACTION = 0.5  # of the critical step, where the user leaves the choice to us
@@ -99,6 +99,7 @@ def expected_samples(plan: StepPlan) -> int:
 
 def counted_in_seconds(duration: float, every: int | float) -> bool:
     """Whether a sampling interval is in seconds; refuses one that fits no motion."""
+    every = single(every)
     if isinstance(every, bool) or not isinstance(every, Real):
         raise InputError(f" = {show(every)}: an int counts steps, a float is seconds", "every")
     if isinstance(every, Integral):

@@ -64,7 +64,7 @@ def chosen_nodes(result: xr.Dataset, nodes: int | str | Sequence[int] | None) ->
         return np.arange(count)
     if isinstance(nodes, str):
         words = nodes.replace(",", " ").split()
-        if not all(word.isdecimal() for word in words):
+        if not all(word.isascii() and word.isdecimal() for word in words):
             return np.array(nodes_of(result, nodes), np.int64)
         nodes = [int(word) for word in words]
     asked = np.array(indices("nodes", nodes, "node", "or leave it out for all"), np.int64)

@@ -15,8 +15,9 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.exports import abaqus, csv_tables, glb, mat, opensees, pattern_states, uff, vtkhdf
 from foldyn.exports.chosen import ALONG
+from foldyn.input_files import path_of
 from foldyn.results import case_of, check_result, load
-from foldyn.values import choice, show, suggest
+from foldyn.values import choice, suggest
 from foldyn.viewer.folding import folding_case
 
 
@@ -150,7 +151,7 @@ def export(
                 name,
             )
     if not isinstance(result, xr.Dataset | Case):
-        source = _path("result", result)
+        source = path_of(result, "result")
         if file.exists() and source.exists() and file.samefile(source):
             raise InputError(f"{file}: is the result itself; name another file")
         result = load(source)
@@ -188,15 +189,8 @@ def _case_for(chosen: Export, result: xr.Dataset | Case) -> Case | None:
     return folding_case(result) if kind == "folding" else case_of(result)
 
 
-def _path(name: str, path: Any) -> Path:
-    try:
-        return Path(path)
-    except TypeError:
-        raise InputError(f" = {show(path)}: give the path of a file", name) from None
-
-
 def _file(path: Any) -> Path:
-    file = _path("path", path)
+    file = path_of(path, "path")
     if file.is_dir():
         raise InputError(f"{file}: is a folder; name a file in it")
     if not file.parent.is_dir():

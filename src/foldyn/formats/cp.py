@@ -11,7 +11,7 @@ import math
 
 from foldyn.errors import InputError
 from foldyn.formats.drawing import Drawing
-from foldyn.values import show
+from foldyn.values import parsed, show
 
 LETTERS = {"0": "F", "1": "B", "2": "M", "3": "V", "4": "F"}
 
@@ -49,7 +49,7 @@ def read(text: str) -> Drawing:
                 place,
             )
         try:
-            x1, y1, x2, y2 = (float(word) for word in words[1:])
+            x1, y1, x2, y2 = (parsed(word) for word in words[1:])
         except ValueError:
             raise InputError(f" = {show(line)}: coordinates must be numbers", place) from None
         if not all(map(math.isfinite, (x1, y1, x2, y2))):

@@ -25,10 +25,10 @@ from foldyn.formats.drawing import Drawing
 from foldyn.formats.dxf_writer import ezdxf
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.notes import count
+from foldyn.formats.notes import count, without_length
 from foldyn.formats.units import METERS
 from foldyn.input_files import DEEPEST
-from foldyn.values import LONGEST, shortened
+from foldyn.values import LONGEST, parsed, shortened, show
 
 _LAYERS = (
     ("M", re.compile(r"mountain|^m$")),
@@ -82,6 +82,7 @@ def read(text: str) -> Drawing:
     points: list[NDArray[np.float64]] = []
     letters: list[str] = []
     places: list[str] = []
+    has_length: dict[str, bool] = {}
     total, curved = 0, 0
     for entity, path in paths:
         with _reading(_place(entity)):
@@ -91,6 +92,7 @@ def read(text: str) -> Drawing:
             continue
         pairs = np.stack((along[:-1], along[1:]), axis=1)
         pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+        has_length[_place(entity)] = has_length.get(_place(entity), False) or len(pairs) > 0
         total, curved = total + len(pairs), curved + path.has_curves
         if total > MOST_LINES:
             raise too_many("the lines")
@@ -106,12 +108,13 @@ def read(text: str) -> Drawing:
         meters=_meters(document),
         assumed=1e-3,
         places=tuple(places),
-        repairs=(*repairs[:curved], *skipped),
+        repairs=(*repairs[:curved], *without_length(has_length), *skipped),
         doubts=tuple(color_doubts(colors)),
     )
 
 
 def _document(library: Any, text: str) -> Any:
+    _check_numbers(text)
     logger, handler = logging.getLogger("ezdxf"), logging.NullHandler()
     logger.addHandler(handler)  # else what it logs goes to standard error
     try:
@@ -119,6 +122,21 @@ def _document(library: Any, text: str) -> Any:
             return library.read(io.StringIO(text))
     finally:
         logger.removeHandler(handler)
+
+
+def _check_numbers(text: str) -> None:
+    """Refuse coordinates that are numbers to Python alone."""
+    if text.isascii() and "_" not in text:
+        return
+    lines = text.splitlines()
+    for number, (code, value) in enumerate(zip(lines[::2], lines[1::2], strict=False)):
+        if code.strip().isdecimal() and 10 <= int(code) < 60:
+            try:
+                parsed(value.strip())
+            except ValueError:
+                raise InputError(
+                    f" = {show(value.strip())}: must be a number", f"line {2 * number + 2}"
+                ) from None
 
 
 @contextmanager

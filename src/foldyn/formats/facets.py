@@ -9,7 +9,8 @@ import numpy as np
 
 from foldyn.errors import within
 from foldyn.formats.notes import count
-from foldyn.patterns import Pattern, welded
+from foldyn.patterns import Pattern, convex, welded
+from foldyn.patterns.convex import what_was_cut
 from foldyn.patterns.facets import COPLANAR, FACETS, HINGE, WELD
 from foldyn.patterns.topology import Edge, edge_lookup
 from foldyn.values import choice
@@ -49,6 +50,15 @@ def with_facets(made: Built, drawing: Drawing, facets: str | None) -> Built:
     return made._replace(
         pattern=pattern, diagnosis=replace(told, assumptions=(*told.assumptions, text))
     )
+
+
+def with_convex_panels(made: Built) -> Built:
+    """Cut panels that are not convex."""
+    pattern, told = convex(made.pattern), made.diagnosis
+    if pattern is made.pattern:
+        return made
+    repairs = (*told.repairs, what_was_cut(made.pattern, pattern))
+    return made._replace(pattern=pattern, diagnosis=replace(told, repairs=repairs))
 
 
 def _drawn(made: Built, drawing: Drawing) -> tuple[Edge, ...]:

@@ -25,14 +25,16 @@ from foldyn.formats import (
 )
 from foldyn.formats.building import Built, built
 from foldyn.formats.drawing import Drawing
-from foldyn.formats.facets import with_facets
+from foldyn.formats.facets import with_convex_panels, with_facets
 from foldyn.formats.kept import with_families, without_repetition
 from foldyn.formats.units import METERS
 from foldyn.formats.writers import warn_of_boards
-from foldyn.input_files import read_text
+from foldyn.input_files import path_of, read_text
 from foldyn.patterns import Pattern
+from foldyn.patterns.facets import LINE
 from foldyn.patterns.frames import Frame
-from foldyn.values import choice, number
+from foldyn.patterns.pattern import pattern_of
+from foldyn.values import choice, listed, number, of_kind
 from foldyn.writing import write_bytes
 
 MOST = 32
@@ -113,6 +115,7 @@ def read_pattern(
         joined, as `welded` does. "line": facets, which stay as the `welds` of the pattern. "hinge":
         creases that are flat. Without it facets, as with "weld", where all of them lie in one plane
         with their panels, which a warning says; else hinges. Files by Foldyn say which are facets.
+        Unless it is "line", panels that are not convex are cut along welds, as `convex` does.
 
     Returns
     -------
@@ -174,7 +177,8 @@ def diagnose(
         drawing = fmt.read(text, *((frame,) if fmt.frames else ()))
         made = built(drawing, meters=meters, scale=factor)
         made = with_families(without_repetition(made), drawing)
-        return with_facets(made, drawing, facets)
+        made = with_facets(made, drawing, facets)
+        return made if facets == LINE else with_convex_panels(made)
 
 
 def write_pattern(
@@ -203,8 +207,11 @@ def write_pattern(
     file, fmt = _file_and_format(path)
     if fmt.write is None:
         raise InputError(f"{file}: {fmt.name} files can be read but not written.")
-    if not isinstance(pattern, Pattern):
-        raise InputError(f"pattern = {pattern!r}: give a Pattern to write.")
+    pattern = pattern_of(pattern)
+    frames = [
+        of_kind(f"frames[{k}]", one, Frame)
+        for k, one in enumerate(listed("frames", frames, "frames"))
+    ]
     if frames and not fmt.frames:
         able = ", ".join(end for end, each in FORMATS.items() if each.frames)
         raise InputError(f": {fmt.name} files hold one state; write {able}", "frames", file)
@@ -222,10 +229,7 @@ def write_pattern(
 
 
 def _file_and_format(path: Any) -> tuple[Path, Format]:
-    try:
-        file = Path(path)
-    except TypeError:
-        raise InputError(f"path = {path!r}: give the path of a file.") from None
+    file = path_of(path)
     if os.path.isdir(file):
         raise InputError(f"{file}: is a directory; name a pattern file in it.")
     fmt = FORMATS.get(file.suffix.lower())

@@ -20,7 +20,7 @@ from foldyn.formats.notes import count
 from foldyn.formats.units import METERS
 from foldyn.input_files import from_json
 from foldyn.patterns.transforms import FACE_ORDERS
-from foldyn.values import choice, show
+from foldyn.values import choice, show, whole
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
@@ -83,17 +83,19 @@ def read(text: str, frame: int | str | None = None) -> Drawing:
 
 def _document(text: str) -> tuple[dict[str, Any], list[str]]:
     """Top level of the file, and what had to be repaired to read it."""
-    repairs = []
+    repairs: list[str] = []
+    repeated: list[str] = []
     try:
-        document = from_json(text)
+        document = from_json(text, repeated)
     except InputError as error:
         mended = _COMMA.sub(lambda found: found[1] or "", text)
         commas = len(text) - len(mended)
         try:
-            document = from_json(mended if commas else text)
+            document = from_json(mended if commas else text, repeated)
         except InputError:
             raise InputError(f"{error}, as a FOLD file must be.") from None
         repairs.append(f"{count(commas, 'comma')} before a closing bracket removed")
+    repairs += [f"{show(key)} is there twice, of which the last counts" for key in repeated]
     if not isinstance(document, dict):
         raise InputError("not a FOLD file: its top level must be a JSON object with named fields.")
     return document, repairs
@@ -145,13 +147,14 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
         raise InputError(
             f": the file has {has} of the title {show(chosen)}: titles are {known}", "frame"
         )
-    if isinstance(chosen, bool) or not isinstance(chosen, int) or not 0 <= chosen < len(frames):
+    number = whole("frame", chosen, what="or a title")
+    if not 0 <= number < len(frames):
         raise InputError(
-            f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
+            f" = {number}: the file has the frames 0 to {len(frames) - 1}; give one of these "
             "numbers or a title",
             "frame",
         )
-    return chosen
+    return number
 
 
 def _with_field(document: dict[str, Any], field: str, what: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from numpy.typing import NDArray
 
@@ -14,6 +14,15 @@ _SHOWN = 3
 def count(number: int, noun: str, plural: str = "") -> str:
     """Number and noun, "1 line" or "2 lines"."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
+def without_length(has_length: Mapping[str, bool]) -> list[str]:
+    """What is said of elements that are points, as a scale of 0 makes them, by their place."""
+    places = [place for place, has in has_length.items() if not has]
+    if not places:
+        return []
+    shown = ", ".join(places[:_SHOWN]) + (", ..." if len(places) > _SHOWN else "")
+    return [f"left out {count(len(places), 'element')} of no length: {shown}"]
 
 
 class Notes:

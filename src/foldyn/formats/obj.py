@@ -23,7 +23,7 @@ from foldyn.formats.drawing import Drawing
 from foldyn.formats.units import METERS
 from foldyn.formats.writers import letters
 from foldyn.patterns import Pattern
-from foldyn.values import show
+from foldyn.values import parsed, show
 
 FREEFORM = ("B", "F", "V", "M", "U", "C")
 """Letters of the kinds of `#e`; the last two are ours, for unassigned creases and cuts."""
@@ -32,6 +32,7 @@ GROUPS = {"mountain": "M", "valley": "V", "boundary": "B", "border": "B", "facet
           "flat": "F", "cut": "C"}  # fmt: skip
 """Letters of lines by the beginning of the name of their group."""
 _UNIT = re.compile(r"#.*\bunits?\b\s*[:=]?\s*([a-z]+)", re.IGNORECASE)
+_COMMENT = re.compile(r"(?<=[^\s#])\s+#.*")  # not one that is a line of its own, which may be #e
 _NAMES = {"meters": "m", "millimeters": "mm", "centimeters": "cm", "inches": "in", "feet": "ft"}
 
 
@@ -110,10 +111,13 @@ def read(text: str) -> Drawing:
 
 
 def _lines(text: str) -> list[str]:
-    """Lines; one that ends in a backslash goes on in the next, which is then empty."""
+    """Lines without comments after data; one that ends in a backslash goes on in the next.
+
+    The next is then empty, so that the numbers of lines stay.
+    """
     lines, begun = [], ""
     for line in text.splitlines():
-        whole = begun + line
+        whole = begun + _COMMENT.sub("", line)
         begun = f"{whole[:-1]} " if whole.endswith("\\") else ""
         lines.append("" if begun else whole)
     return lines
@@ -124,7 +128,7 @@ def _coordinates(words: list[str], place: str) -> list[float]:
     try:
         if len(words) < 2:
             raise ValueError
-        x, y, z = (float(word) for word in [*words[:3], "0"][:3])
+        x, y, z = (parsed(word) for word in [*words[:3], "0"][:3])
     except ValueError:
         raise InputError(f": v {show(' '.join(words))}: give x y z, three numbers", place) from None
     if not np.isfinite([x, y, z]).all():
@@ -144,7 +148,7 @@ def _vertex(word: str, known: tuple[int, int], place: str) -> int:
     """
     before, count = known
     try:
-        number = int(word) if len(word) < 20 else 0
+        number = parsed(word, int) if len(word) < 20 else 0
     except ValueError:
         number = 0
     if not (1 <= number <= count or 1 <= -number <= before):
@@ -176,7 +180,7 @@ def _crease(
     if kind not in known_kinds:
         raise InputError(f": {show(kind)} is no kind of edge: give 0 to {len(kinds) - 1}", place)
     try:
-        angle = float(words[3]) if len(words) > 3 else np.nan
+        angle = parsed(words[3]) if len(words) > 3 else np.nan
     except ValueError:
         angle = np.inf
     if not np.isnan(angle) and abs(angle) > 180.0 + 1e-9:

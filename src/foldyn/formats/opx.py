@@ -14,7 +14,7 @@ from foldyn.errors import InputError
 from foldyn.formats.cp import LETTERS
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.xml_text import from_xml, local
-from foldyn.values import show
+from foldyn.values import parsed, show
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -88,7 +88,7 @@ def _title(root: Element) -> str:
 
 def _coordinate(text: str, place: str) -> float:
     try:
-        value = float(text)
+        value = parsed(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

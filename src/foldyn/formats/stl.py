@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
+from foldyn.patterns.convex import triangles_of
 
 PER_METER = 1e3
 
@@ -43,19 +44,7 @@ def triangles(pattern: Pattern) -> NDArray[np.int64]:
     """Vertex numbers (k, 3) of triangles that cover the panels, wound as these are."""
     found: list[tuple[int, ...]] = []
     for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
-        found += [face] if len(face) == 3 else _cut(face, pattern.vertices[list(face)], normal)
+        found += (
+            [face] if len(face) == 3 else triangles_of(face, pattern.vertices[list(face)], normal)
+        )
     return np.array(found, dtype=np.int64)
-
-
-def _cut(face: tuple[int, ...], corners: NDArray, normal: NDArray) -> list[tuple[int, ...]]:
-    """Triangles of a polygon, cut in its mean plane."""
-    import shapely
-
-    first = corners[1] - corners[0]
-    first = first - (first @ normal) * normal
-    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
-    flat = (corners - corners[0]) @ axes.T
-    number = {tuple(point): v for point, v in zip(flat.tolist(), face, strict=True)}
-    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
-    rings = [shapely.orient_polygons(piece).exterior.coords[:3] for piece in pieces]
-    return [tuple(number[x, y] for x, y in ring) for ring in rings]

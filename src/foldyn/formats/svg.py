@@ -20,7 +20,7 @@ from foldyn.formats.curves import CHORD
 from foldyn.formats.drawing import Drawing
 from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
 from foldyn.formats.lines import MOST_LINES, too_many
-from foldyn.formats.notes import count
+from foldyn.formats.notes import count, without_length
 from foldyn.formats.svg_shapes import (
     PIXEL,
     SHAPES,
@@ -196,6 +196,7 @@ def _drawing(
     opacities: list[float] = []
     places: list[str] = []
     taken: Counter[tuple[RGB, RGB | None]] = Counter()
+    has_length: dict[str, bool] = {}
     total = 0
     for (curve, here, style, place), box in zip(lines.curves, boxes, strict=True):
         color = style.color or (0, 0, 0)
@@ -209,6 +210,7 @@ def _drawing(
             along = placed(curve.points(tolerance / growth if growth else tolerance), here)
         pairs = np.stack((along[:-1], along[1:]), axis=1)
         pairs = pairs[(pairs[:, 0] != pairs[:, 1]).any(axis=1)]
+        has_length[place] = has_length.get(place, False) or len(pairs) > 0
         total += len(pairs)
         if total > MOST_LINES:
             raise too_many("the lines")
@@ -230,7 +232,7 @@ def _drawing(
         unit="px" if frame.pixels == 1.0 else "unit",
         name=title,
         places=tuple(places),
-        repairs=(*repairs[:curved], *_skipped(lines.counts)),
+        repairs=(*repairs[:curved], *without_length(has_length), *_skipped(lines.counts)),
         assumptions=said,
         doubts=(*doubts, *color_doubts(taken)),
     )

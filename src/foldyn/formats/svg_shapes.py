@@ -23,8 +23,9 @@ PIXEL = 0.0254 / 96
 """Length of a CSS pixel (m)."""
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6,
           "pt": 96 / 72, "pc": 16.0}  # fmt: skip
-_LENGTH = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z%]*)")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LENGTH = re.compile(rf"({_DIGITS})\s*([A-Za-z%]*)", re.ASCII)
+_NUMBER = re.compile(_DIGITS, re.ASCII)
 _FUNCTION = re.compile(r"\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)[\s,]*")
 _LONGEST = 2000  # letters of a transform
 SHAPES = ("line", "polyline", "polygon", "rect", "circle", "ellipse", "path")
@@ -68,6 +69,11 @@ def numbers(text: str) -> list[float]:
     return [float(word) for word in _NUMBER.findall(text)]
 
 
+def _is_plain(text: str) -> bool:
+    """Whether all numbers of a text are such that others than Python read them alike."""
+    return text.isascii() and "_" not in text
+
+
 def placing(text: str | None, place: str) -> Placing:
     """Affine map of a `transform`."""
     from svgelements import Matrix
@@ -79,7 +85,7 @@ def placing(text: str | None, place: str) -> Placing:
     while end < len(text) <= _LONGEST and (match := _FUNCTION.match(text, end)):
         end = match.end()
     try:
-        if end < len(text):
+        if end < len(text) or not _is_plain(text):
             raise ValueError
         m = Matrix(text)
         found = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f]], dtype=np.float64)
@@ -112,7 +118,10 @@ def curves(element: Element, whole: tuple[float, float], place: str) -> list[Cur
     if name == "line":
         return _polyline([(side("x1", 0), side("y1", 1)), (side("x2", 0), side("y2", 1))])
     if name in ("polyline", "polygon"):
-        given = numbers(element.get("points", ""))
+        text = element.get("points", "")
+        if not _is_plain(text):
+            raise InputError(f" = {show(text)}: give pairs of numbers", f"{place}.points")
+        given = numbers(text)
         points = [(given[k], given[k + 1]) for k in range(0, len(given) - 1, 2)]
         return _polyline(points + points[:1] if name == "polygon" else points)
     if name == "rect":
@@ -175,7 +184,7 @@ def _path(text: str, place: str) -> Iterator[Curve]:
     if text.strip() in ("", "none"):
         return
     try:
-        if text.strip()[0] not in "Mm":
+        if text.strip()[0] not in "Mm" or not _is_plain(text):
             raise ValueError
         path = Path(text)
     except (ValueError, TypeError, IndexError, OverflowError, ZeroDivisionError, AttributeError):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from foldyn.errors import InputError
 from foldyn.formats.line_colors import RGB
 from foldyn.formats.xml_text import local
-from foldyn.values import show
+from foldyn.values import parsed, show
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -174,7 +174,7 @@ def _is_black(word: str) -> bool:
 
 def _share(value: str, place: str) -> float:
     try:
-        share = float(value[:-1]) / 100 if value.endswith("%") else float(value)
+        share = parsed(value[:-1]) / 100 if value.endswith("%") else parsed(value)
     except ValueError:
         raise InputError(f" = {show(value)}: give a number from 0 to 1", place) from None
     return min(1.0, max(0.0, share)) if share == share else 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any
@@ -28,7 +28,7 @@ from foldyn.results import fidelity_dataset
 from foldyn.statics.tracing import check_movable
 from foldyn.structures import Structure, discretize
 from foldyn.structures.plate_frequency import BELOW, plate_frequency
-from foldyn.values import brief, choice, number, show, whole
+from foldyn.values import brief, choice, listed, number, show, whole
 
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
@@ -273,9 +273,8 @@ def named(models: Any, structure: Structure) -> Mapping[str, Mapping[str, Any]]:
             for key in changes:
                 choice(f"models: {name}: argument", key, vars(structure.options))
         return models
-    if isinstance(models, str) or not isinstance(models, Iterable):
-        raise InputError(f' = {show(models)}: give a list of names, as ["plate"]', "models")
-    return {choice("models", name, MODELS): MODELS[name] for name in models}
+    names = listed("models", models, 'names, as ["plate"]')
+    return {choice("models", name, MODELS): MODELS[name] for name in names}
 
 
 def _told(case: Case, own: Case) -> str:

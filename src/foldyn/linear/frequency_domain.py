@@ -16,11 +16,10 @@ from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
-from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
 from foldyn.linear.linearized import Linearized
 from foldyn.linear.modes import rigid_space, unresisted
-from foldyn.values import whole
+from foldyn.values import flag, whole
 
 DIAGONAL = 1e-12  # of the modal damping: couplings of modes that are rounding
 BESIDE = 0.01  # of the lowest eigenvalue above 0: how far below 0 a free body is held up
@@ -106,8 +105,7 @@ class Modal:
         """Check the arguments."""
         if self.count is not None:
             whole("count", self.count, least=1, what="modes")
-        if not isinstance(self.static_correction, bool):
-            raise InputError(f"static_correction = {self.static_correction!r}: give True or False")
+        flag("static_correction", self.static_correction)
 
 
 def modal(

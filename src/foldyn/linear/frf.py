@@ -26,7 +26,7 @@ from foldyn.memory import check_memory
 from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
-from foldyn.values import choice, number, numbers, suggest
+from foldyn.values import choice, number, numbers, of_kind, suggest, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -158,8 +158,7 @@ def frf(
     >>> abs(response.receptance).sel(node=0, axis="x").values.round(1).tolist()
     [17.7, 4.3]
     """
-    if not isinstance(case, Case):
-        raise InputError(f"case: got {type(case).__name__}, give a Case")
+    of_kind("case", case, Case)
     way = METHODS[choice("method", method, METHODS)]
     chosen = _options(way, options)
     frequency = _frequencies(frequencies, way)
@@ -175,6 +174,7 @@ def frf(
             "of the drive instead",
             "secant",
         )
+    internal = whole("internal", internal)
     if internal and way.by_amplitude:
         raise InputError(
             f" = {internal!r}: internal amplitudes are for small vibrations, and the method "

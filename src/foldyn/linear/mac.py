@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
+from foldyn.values import numbers
 
 
 def mac(a: Any, b: Any, mass: Any = None, nodes: Any = None) -> NDArray[np.float64]:
@@ -97,7 +98,10 @@ def _shapes(name: str, given: Any) -> NDArray:
         if "shape" not in given:
             raise InputError(f"{name}: the dataset has no shapes; give modes from foldyn.modes")
         given = given["shape"].transpose("mode", "node", "axis").values
-    array = np.asarray(given)
+    try:
+        array = np.asarray(given)
+    except ValueError:
+        raise InputError(f"{name}: the shapes have different lengths") from None
     if array.ndim == 2:
         array = array[:, :, None]
     if array.ndim != 3 or not array.size or array.dtype.kind not in "fciu":
@@ -123,13 +127,16 @@ def _chosen(first: NDArray, second: NDArray, nodes: Any) -> tuple[NDArray, NDArr
 
 
 def _at(shapes: NDArray, nodes: Any) -> NDArray:
-    numbers = np.asarray(nodes)
-    if numbers.ndim != 1 or not numbers.size or numbers.dtype.kind not in "iu":
+    try:
+        chosen: NDArray = np.asarray(nodes)
+    except ValueError:  # lists of different lengths
+        chosen = np.zeros(0)
+    if chosen.ndim != 1 or not chosen.size or chosen.dtype.kind not in "iu":
         raise InputError(f"nodes = {nodes!r}: give numbers of nodes, or a pair of such lists")
-    beyond = numbers[(numbers < 0) | (numbers >= shapes.shape[1])]
+    beyond = chosen[(chosen < 0) | (chosen >= shapes.shape[1])]
     if beyond.size:
         raise InputError(f"nodes: there is no node {beyond[0]}; there are {shapes.shape[1]}")
-    return shapes[:, numbers]
+    return shapes[:, chosen]
 
 
 def _weighted(shapes: NDArray, mass: Any) -> NDArray:
@@ -137,7 +144,7 @@ def _weighted(shapes: NDArray, mass: Any) -> NDArray:
     count, nodes, components = shapes.shape
     if mass is None:
         return shapes.reshape(count, -1)
-    matrix = mass if sparse.issparse(mass) else np.asarray(mass, float)
+    matrix = mass if sparse.issparse(mass) else numbers("mass", mass)
     if matrix.shape == (nodes,):
         matrix = sparse.diags_array(matrix)
     if matrix.shape != (nodes, nodes):

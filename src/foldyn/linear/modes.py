@@ -28,7 +28,7 @@ from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 from foldyn.statics.stability import oriented
-from foldyn.values import whole
+from foldyn.values import of_kind, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -109,6 +109,7 @@ def modes(
         The state is no equilibrium, or an unstable one; loads do not act at rest; hinges have no
         slope; a mode was missed.
     """
+    of_kind("case", case, Case)
     count = whole("count", count, least=1)
     check_memory(
         "count", f"{float(count):.3g} modes", 8.0 * COPIES * count * case.structure.nodes.size,

@@ -14,7 +14,7 @@ from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.linear.reference import DIVISIONS
 from foldyn.patterns import Pattern
 from foldyn.shells import Shell, ShellOptions, shell
-from foldyn.values import show, whole
+from foldyn.values import of_kind, show, whole
 
 MOST_TRIANGLES = 15_000
 """Of a shell that nobody asked for: its modes take ten to twenty seconds."""
@@ -31,8 +31,7 @@ def check_reduced(case: Any) -> None:
         Not a case, a shell, a structure that `discretize` did not make, a sheet without density,
         or a support, load or mass at the center of a panel.
     """
-    if not isinstance(case, Case):
-        raise InputError(f": got {type(case).__name__}, give a Case", "case")
+    of_kind("case", case, Case)
     structure = case.structure
     if structure.kind == Shell.kind:
         raise InputError(

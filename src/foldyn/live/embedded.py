@@ -20,7 +20,7 @@ from foldyn.report.page import report_html, write_report
 from foldyn.results import case_of, check_result
 from foldyn.statics import Folding
 from foldyn.structures.discretized import Discretized
-from foldyn.values import whole
+from foldyn.values import of_kind, whole
 from foldyn.viewer import Stage, rest_stage, stage
 
 HEIGHT = 820
@@ -105,7 +105,7 @@ def view(what: Any, title: str = "", height: int = HEIGHT) -> View:
     """
     height = whole("height", height, least=100, most=10_000, what="pixels")
     named, make = _maker(what)
-    title = title or named
+    title = of_kind("title", title, str) or named
     return View(title, make(title), height)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from html import escape
 from typing import Any
@@ -17,7 +16,7 @@ def live_page(title: str, about: Mapping[str, Any], key: str) -> str:
     about : what its script reads: "controls" and "offers".
     key : what its requests carry.
     """
-    told = json.dumps({**about, "key": key}).replace("</", "<\\/")
+    told = scripts.in_page({**about, "key": key})
     main = (
         f"<h1>{escape(title)}</h1>\n"
         '<div class="live" id="live"><p>This page needs JavaScript.</p></div>\n'

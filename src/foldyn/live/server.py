@@ -10,7 +10,9 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
+import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -18,6 +20,8 @@ from typing import Any
 HOST = "127.0.0.1"
 MOST_BYTES = 100_000
 """Size of a request's body: a table of numbers needs a hundredth of it."""
+MOST_CONNECTIONS = 32
+"""Connections at a time, each with its thread: a browser has six for a page."""
 PATIENCE = 30.0
 """Seconds after which a connection that says nothing is closed."""
 KEY_HEADER = "X-Foldyn-Key"
@@ -29,6 +33,11 @@ HEADERS: Mapping[str, str] = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
+TOO_MANY = (
+    b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain; charset=utf-8\r\n"
+    b"Connection: close\r\nRetry-After: 30\r\n\r\n"
+    b"too many connections at once: close other windows of this page\n"
+)
 Answer = Callable[[Any], dict[str, Any]]
 
 
@@ -67,6 +76,7 @@ class Server(ThreadingHTTPServer):
         self.key = secrets.token_urlsafe(16)
         self.page = page(self.key).encode()
         self.answers = dict(answers or {})
+        self._free = threading.BoundedSemaphore(MOST_CONNECTIONS)
         super().__init__((HOST, port), _Handler)
 
     @property
@@ -78,6 +88,24 @@ class Server(ThreadingHTTPServer):
     def hosts(self) -> tuple[str, ...]:
         """What a request may call this host: no name that another machine can point here."""
         return tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a connection its thread, or refuse it where as many as there may be are open."""
+        if not self._free.acquire(blocking=False):
+            with suppress(OSError):
+                request.settimeout(0.0)
+                request.sendall(TOO_MANY)
+                request.recv(MOST_BYTES)  # what is left unread would take the answer back
+            self.shutdown_request(request)
+            return
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in its thread."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of browsers that go before they are answered."""

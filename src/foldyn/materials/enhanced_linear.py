@@ -116,8 +116,9 @@ class EnhancedLinear(HingeLaw):
     name: str = "enhanced"
 
     def __post_init__(self) -> None:
-        number("EnhancedLinear: theta1", self.theta1, unit="degrees")
-        number("EnhancedLinear: theta2", self.theta2, unit="degrees")
+        for name in ("theta1", "theta2"):
+            given = number(f"EnhancedLinear: {name}", getattr(self, name), unit="degrees")
+            object.__setattr__(self, name, given)
         if not 0.0 < self.theta1 < self.theta2 < 360.0:
             raise InputError(
                 f"EnhancedLinear: theta1 = {self.theta1}, theta2 = {self.theta2}: need "

@@ -94,8 +94,10 @@ class Eyring(MemoryLaw):
     rate_dependent = True
 
     def __post_init__(self) -> None:
-        number("Eyring: barrier_moment", self.barrier_moment, above=0.0)
-        number("Eyring: rate", self.rate, above=0.0, unit="rad/s")
+        moment = number("Eyring: barrier_moment", self.barrier_moment, above=0.0)
+        object.__setattr__(self, "barrier_moment", moment)
+        rate = number("Eyring: rate", self.rate, above=0.0, unit="rad/s")
+        object.__setattr__(self, "rate", rate)
         _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:

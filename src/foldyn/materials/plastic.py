@@ -74,9 +74,11 @@ class Plastic(MemoryLaw):
     rate_dependent = False
 
     def __post_init__(self) -> None:
-        number("Plastic: yield_moment", self.yield_moment, above=0.0)
-        number("Plastic: isotropic", self.isotropic, least=0.0)
-        number("Plastic: kinematic", self.kinematic, least=0.0)
+        moment = number("Plastic: yield_moment", self.yield_moment, above=0.0)
+        object.__setattr__(self, "yield_moment", moment)
+        for name in ("isotropic", "kinematic"):
+            given = number(f"Plastic: {name}", getattr(self, name), least=0.0)
+            object.__setattr__(self, name, given)
         _ = self.elastic
 
     def branches(self, stiffness: NDArray, length: NDArray) -> tuple[Branch, ...]:

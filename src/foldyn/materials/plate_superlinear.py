@@ -89,7 +89,9 @@ class PlateSuperlinear(HingeLaw):
 
     def __post_init__(self) -> None:
         if self.onset is not None:
-            number("PlateSuperlinear: onset", self.onset, above=0.0, most=360.0, unit="degrees")
+            place = "PlateSuperlinear: onset"
+            onset = number(place, self.onset, above=0.0, most=360.0, unit="degrees")
+            object.__setattr__(self, "onset", onset)
 
     def check(self, field: str) -> None:
         """Refuse it for creases without an onset: only bends have one of their own."""

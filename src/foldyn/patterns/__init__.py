@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foldyn.patterns.boards import Boards
+from foldyn.patterns.convex import convex
 from foldyn.patterns.facets import welded
 from foldyn.patterns.flat_foldability import FlatFoldability
 from foldyn.patterns.generators.arc_miura import arc_miura
@@ -49,6 +50,7 @@ __all__ = [
     "FlatFoldability",
     "Pattern",
     "arc_miura",
+    "convex",
     "curved_pleat",
     "eggbox",
     "flasher",

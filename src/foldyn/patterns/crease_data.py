@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.topology import edge_lookup, vertex_pair
-from foldyn.values import show, suggest
+from foldyn.values import listed, show, single, suggest
 
 ASSIGNED: Mapping[str, str] = {
     "all": "MVU", "mountain": "M", "valley": "V", "flat": "F", "unassigned": "U",
@@ -98,6 +98,7 @@ def _own_way(word: str, size: float, letters: NDArray[np.str_]) -> NDArray[np.fl
 
 
 def _angle(value: Any) -> float:
+    value = single(value)
     if value is None:
         return np.nan
     good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
@@ -123,7 +124,9 @@ def families(given: Any, creases: NDArray[np.int64]) -> Mapping[str, NDArray[np.
                 f": {name!r} is no name for a family: give text other than {', '.join(ASSIGNED)}",
                 "families",
             )
-        pairs = [vertex_pair(f"families[{name!r}]", member) for member in members]
+        place = f"families[{name!r}]"
+        members = listed(place, members, "pairs of vertices, as [(0, 1)]")
+        pairs = [vertex_pair(place, member) for member in members]
         strange = [pair for pair in pairs if pair not in row]
         if strange:
             raise InputError(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 
 from foldyn.errors import InputError
 from foldyn.values import shortened
 
+_UNDERSCORED = re.compile(r"(?<![\w.])[\d.]+_")
 LONGEST = 1000
 """Characters of an expression."""
 DEEPEST = 50
@@ -22,6 +24,8 @@ def parse(text: str) -> ast.expr:
     InputError
         The text cannot be read, or is too long or too deep; the message says that alone.
     """
+    if _UNDERSCORED.search(text):  # a number to Python alone
+        raise InputError("cannot be read")
     if len(text) > LONGEST:
         raise InputError(f"is longer than {LONGEST} characters")
     try:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.crease_data import crease_rows
-from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_lookup, vertex_pair
+from foldyn.values import flag, listed
 
 WELD, LINE, HINGE = FACETS = ("weld", "line", "hinge")
 """What facets become: nothing, where panels can be joined, or welds; welds; creases."""
@@ -61,8 +62,7 @@ def welded(
     >>> fd.welded(square).faces
     ((0, 1, 2, 3),)
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    pattern, join = pattern_of(pattern), flag("join", join)
     rows = _rows(pattern, facets)
     edges = np.concatenate([pattern.creases[rows], pattern.welds])
     if pattern.boards is not None and len(edges):
@@ -72,10 +72,12 @@ def welded(
         )
     beside = np.concatenate([pattern.crease_faces[rows], pattern.weld_faces])
     turned = np.concatenate([pattern.dihedrals[rows], pattern.weld_dihedrals]) - np.pi
-    length = np.linalg.norm(np.diff(pattern.vertices[edges], axis=1)[:, 0], axis=1)
-    order = np.lexsort((edges[:, 1], edges[:, 0], -length.round(12)))
+    order = longest_first(pattern.vertices, edges)
     flat = order[np.abs(turned[order]) <= COPLANAR] if join else order[:0]
-    faces = _joined(pattern, edges[flat].tolist(), beside[flat].tolist())
+    faces = joined(
+        pattern.faces, pattern.vertices, pattern.face_normals, edges[flat].tolist(),
+        beside[flat].tolist(),
+    )  # fmt: skip
     sides = {frozenset(side) for face in faces for side in around(face)}
     kept = np.setdiff1d(np.arange(len(pattern.creases)), rows)
     creases = [_pair(pair) for pair in pattern.creases[kept].tolist()]
@@ -104,7 +106,7 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     if isinstance(facets, str):
         facets = pattern.creases[crease_rows("facets", facets, pattern)]
     row, rows = edge_lookup(pattern.creases), set()
-    for facet in facets:
+    for facet in listed("facets", facets, "pairs of vertices, as [(0, 1)]"):
         pair = vertex_pair("facets", facet)
         if pair not in row:
             raise InputError(f": {pair} is not a crease; name its two vertices", "facets")
@@ -118,14 +120,24 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     return np.array(sorted(rows), dtype=np.int64)
 
 
-def _joined(
-    pattern: Pattern, edges: Sequence[Sequence[int]], beside: Sequence[Sequence[int]]
+def longest_first(vertices: NDArray, edges: NDArray) -> NDArray[np.int64]:
+    """Order of edges (m, 2) by their length; those of one length by their vertices."""
+    length = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1)
+    return np.lexsort((edges[:, 1], edges[:, 0], -length.round(12)))
+
+
+def joined(
+    faces: Sequence[tuple[int, ...]],
+    vertices: NDArray,
+    normals: NDArray,
+    edges: Sequence[Sequence[int]],
+    beside: Sequence[Sequence[int]],
 ) -> list[tuple[int, ...]]:
-    """Faces, joined across edges in their order, given the two faces beside each.
+    """Faces, joined across edges in their order, given the normals and the two faces beside each.
 
     A joined face has the place, the first corner and the plane of the first of its parts.
     """
-    faces, part_of = list(pattern.faces), list(range(len(pattern.faces)))
+    faces, part_of = list(faces), list(range(len(faces)))
 
     def whole(face: int) -> int:
         while part_of[face] != face:
@@ -137,7 +149,7 @@ def _joined(
         if one == two:
             continue
         union = _union(faces[one], faces[two], _pair(edge))
-        if union is not None and _convex(pattern.vertices, union, pattern.face_normals[one]):
+        if union is not None and _convex(vertices, union, normals[one]):
             faces[one], faces[two], part_of[two] = union, (), one
     return [face for face in faces if face]
 
@@ -157,8 +169,13 @@ def _convex(vertices: NDArray, face: Sequence[int], normal: NDArray) -> bool:
     x = vertices[list(face)]
     if np.abs((x - x[0]) @ normal).max() > COPLANAR * np.linalg.norm(x - x[0], axis=1).max():
         return False
+    return bool((corner_turns(x, normal) > STRAIGHT).all())
+
+
+def corner_turns(x: NDArray, normal: NDArray) -> NDArray[np.float64]:
+    """Angles (rad) by which an outline x (k, 3) turns to the left at its corners."""
     along = np.roll(x, -1, axis=0) - x
     before = np.roll(along, 1, axis=0)
     left = np.einsum("ij,j->i", np.cross(before, along), normal)
     ahead = np.einsum("ij,ij->i", before, along)
-    return bool((np.arctan2(left, ahead) > STRAIGHT).all())
+    return np.arctan2(left, ahead)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ from foldyn.patterns.topology import (
     vertex_pair,
 )
 from foldyn.patterns.transforms import Transforms
-from foldyn.values import LONGEST, SHORTEST
+from foldyn.values import LONGEST, SHORTEST, single
 
 _FLAT = 1e-6  # rad from pi: a crease without a letter counts as flat
 _CONTRADICTION = 1e-3  # rad from pi on the wrong side: a letter given is doubted
@@ -228,6 +228,23 @@ class Pattern(Transforms):
         return picture(self, repr(self))
 
 
+class Patterned(Protocol):
+    """What has a pattern: a folding, a structure, what a file was diagnosed as."""
+
+    @property
+    def pattern(self) -> Pattern | None:
+        """Its pattern."""
+        ...
+
+
+def pattern_of(given: Any, name: str = "pattern") -> Pattern:
+    """Return a pattern as it is, or that of what has one."""
+    found = getattr(given, "pattern", given)
+    if isinstance(found, Pattern):
+        return found
+    raise InputError(f": got {type(given).__name__}, give a Pattern", name)
+
+
 def _checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
     try:
         points = np.array(vertices)
@@ -304,6 +321,7 @@ def _given_letters(assignments: Any, topology: Topology) -> tuple[NDArray[np.str
             else:
                 boundary_edges.add(pair)
         return given, boundary_edges
+    assignments = single(assignments)
     if not isinstance(assignments, Sequence | np.ndarray):
         raise InputError(
             f"assignments = {assignments!r}: give a mapping from vertex pairs, a letter for each "

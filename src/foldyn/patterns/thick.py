@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from foldyn.errors import InputError
 from foldyn.patterns.boards import Boards
 from foldyn.patterns.crease_data import crease_values
-from foldyn.patterns.pattern import Pattern
+from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.values import SHORTEST, number, number_or_list, show
 
@@ -80,6 +80,7 @@ def thicken(
     >>> fd.thicken(strip, 0.1).vertices[[1, 2], 2].round(12).tolist()
     [0.05, -0.05]
     """
+    pattern = pattern_of(pattern)
     if pattern.boards is not None:
         raise InputError(": its panels are thick already; thicken the thin one", "pattern")
     sizes = _thickness(thickness, pattern)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
+from foldyn.values import listed
 
 Faces = tuple[tuple[int, ...], ...]
 Edge = tuple[int, int]
@@ -66,8 +67,7 @@ def checked_faces(faces: Any, n_vertices: int) -> Faces:
         No face at all; a face that is not a sequence of integers, is too short, repeats a
         vertex, refers to a vertex that does not exist, or has the vertices of another face.
     """
-    if isinstance(faces, (str, bytes)) or not isinstance(faces, Iterable):
-        raise InputError(f"faces = {faces!r}: give a sequence of faces, each a sequence of ints.")
+    faces = listed("faces", faces, "faces, each a list of vertex numbers")
     result: list[tuple[int, ...]] = []
     seen: dict[tuple[int, ...], int] = {}
     for f, face in enumerate(faces):
@@ -85,10 +85,8 @@ def checked_faces(faces: Any, n_vertices: int) -> Faces:
 
 
 def _checked_face(f: int, face: Any, n_vertices: int) -> tuple[int, ...]:
-    if isinstance(face, (str, bytes)) or not isinstance(face, Iterable):
-        raise InputError(f"faces[{f}] = {face!r}: give a sequence of vertex numbers.")
     numbers: list[int] = []
-    for v in face:
+    for v in listed(f"faces[{f}]", face, "vertex numbers"):
         try:
             if isinstance(v, (bool, np.bool_)):
                 raise TypeError
@@ -187,7 +185,7 @@ def build_topology(faces: Faces, n_vertices: int, welds: Any = ()) -> Topology:
 def _welded(welds: Any, shared: NDArray) -> NDArray[np.bool_]:
     """Which of the edges of two faces (k, 2) are `welds`, pairs of vertices."""
     row, chosen = edge_lookup(shared), np.zeros(len(shared), bool)
-    for pair in welds:
+    for pair in listed("welds", welds, "pairs of vertices, as [(0, 1)]"):
         edge = vertex_pair("welds", pair)
         if edge not in row:
             raise InputError(f": {edge} is not an edge of two panels; leave it out", "welds")

@@ -24,12 +24,13 @@ import xarray as xr
 from xarray.backends import list_engines
 
 from foldyn.errors import InputError
-from foldyn.input_files import check_file
+from foldyn.input_files import check_file, path_of
 from foldyn.results.apart import apart
 from foldyn.results.attributes import FORMAT
 from foldyn.results.contents import check_result, whole_attribute
 from foldyn.results.seal import seal, sound
 from foldyn.results.streams import put
+from foldyn.values import flag
 from foldyn.writing import whole
 
 ENGINE = "h5netcdf"
@@ -92,7 +93,7 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
     InputError
         There is no such file, or it is not a Foldyn result.
     """
-    path = Path(path)
+    path, whole = path_of(path), flag("whole", whole)
     ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)", whole)
     check_result(ds, f"{path}: ")
     try:
@@ -140,7 +141,7 @@ def check_target(path: str | os.PathLike[str]) -> Path:
     InputError
         It is a folder, there is no folder for it, or its name is that of another kind of file.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file")
     if path.suffix.lower() in OTHERS:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around
-from foldyn.structures.mesh import Triangle, check_triangles
+from foldyn.structures.mesh import CUT, Triangle, check_triangles
 
 EQUAL = 1e-6  # relative difference of diagonals that counts as none
 
@@ -71,7 +71,7 @@ def shell_mesh(pattern: Pattern, divisions: int) -> ShellMesh:
         triangles += pieces
         panels += [number] * len(pieces)
     nodes, rows, panel = np.array(points.all), np.array(triangles, np.int64), np.array(panels)
-    remedy = "the panel is not convex enough to be meshed; cut it into convex panels"
+    remedy = f"the panel is not convex enough to be meshed; {CUT}"
     check_triangles(nodes, rows, panel, pattern, remedy)
     return ShellMesh(nodes, rows, panel, edges)
 

@@ -18,6 +18,7 @@ from foldyn.materials import EnhancedLinear, HingeLaw, hinge_law
 from foldyn.mechanics.following import joined, moments, pushes, tensions
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
+from foldyn.patterns.pattern import Patterned
 from foldyn.patterns.topology import Edge
 from foldyn.shells.body import GROUPS, ShellBody
 from foldyn.shells.kernels import ShellModel
@@ -27,7 +28,7 @@ from foldyn.structures import Sheet
 from foldyn.structures.calibration import check_sheet
 from foldyn.structures.clamps import boundary_edges
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness, per_crease
-from foldyn.structures.discretize import check_kinds
+from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
@@ -308,7 +309,7 @@ class Shell(Discretized):
 
 
 def shell(
-    pattern: Pattern,
+    pattern: Pattern | Patterned,
     sheet: Sheet,
     divisions: int = 16,
     mass: str = "lumped",
@@ -359,7 +360,7 @@ def shell(
     >>> fd.shell(pattern, sheet, divisions=4)
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
-    check_kinds(pattern, sheet)
+    pattern, sheet = checked_kinds(pattern, sheet)
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")

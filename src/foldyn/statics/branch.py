@@ -7,9 +7,9 @@ then followed away from the crossing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,16 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.results import case_of, check_result
-from foldyn.statics.newton import Attempt, Settings, Solver, plane
+from foldyn.statics.newton import Attempt, Settings, Solver, plane, settings_of
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.path_methods import METHODS, PathPlan, along
 from foldyn.statics.problem import balance
+from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stability import critical_modes
 from foldyn.statics.stepping import PathStoppedError, Point, Station, Walk, arrive
 from foldyn.statics.tracing import check_steps, on_nodes
-from foldyn.values import choice, whole
+from foldyn.values import choice, function, of_kind, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -44,8 +45,8 @@ def switch_branch(
     mode: int = 0,
     method: str = "arc_length",
     steps: int = 50,
-    until: Callable[[NDArray, float], bool] | None = None,
-    settings: Settings | None = None,
+    until: Callable[[NDArray, float], bool] | Mapping[str, Any] | None = None,
+    settings: Settings | Mapping[str, Any] | None = None,
     progress: Callable[[Point], None] | None = None,
 ) -> xarray.Dataset:
     """Follow the path that crosses a path at a bifurcation.
@@ -81,15 +82,17 @@ def switch_branch(
     """
     check_result(path, "path: ")
     at = _bifurcation(path, at)
-    if direction not in (1, -1):
-        raise InputError(f"direction = {direction!r}: give 1 or -1")
-    whole("mode", mode, least=0)
+    if whole("direction", direction) not in (1, -1):
+        raise InputError(f" = {direction}: give 1 or -1", "direction")
+    mode = whole("mode", mode, least=0)
+    function("progress", progress)
     check_steps(steps, path["displacement"][0].size)
     way = METHODS[choice("method", method, METHODS)]
     if way.rule is None:
         raise InputError(f" = {method!r}: a branch takes 'arc_length' or 'mgdcm'", "method")
     problem = problem_of(path, case, at)
-    solver = Solver(problem, settings)
+    until = until_of(until, problem.case.structure)
+    solver = Solver(problem, settings_of(settings))
     crossing = station_of(solver, problem, path, at)
     facts = {
         "method": method,
@@ -125,8 +128,8 @@ def _bifurcation(path: xarray.Dataset, at: int | None) -> int:
         )
     if at is None:
         return int(steps[0])
-    if at not in steps:
-        raise InputError(f"at = {at!r}: the bifurcations of the path are steps {steps.tolist()}")
+    if whole("at", at) not in steps:
+        raise InputError(f" = {at}: the bifurcations of the path are steps {steps.tolist()}", "at")
     return int(at)
 
 
@@ -134,7 +137,7 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
     """The problem that a path solved, its supports where they are at a step."""
     if "adaptive load" in str(path.attrs.get("not_rerunnable_because", "")):
         raise InputError("path: was traced with an adaptive load, which a path does not keep")
-    case = case_of(path) if case is None else case
+    case = case_of(path) if case is None else of_kind("case", case, Case)
     displacement = path["displacement"].values[at]
     if displacement.shape != case.structure.nodes.shape:
         raise InputError(

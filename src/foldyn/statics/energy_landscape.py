@@ -10,9 +10,9 @@ stiffness), are located to rounding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from foldyn.cases import Case
 from foldyn.errors import ComputationError, InputError
 from foldyn.results import check_result
 from foldyn.statics.branch import problem_of, station_of
-from foldyn.statics.newton import Settings, Solver
+from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.origami import OrigamiProblem
 from foldyn.statics.stability import LostError, Section
 from foldyn.statics.stepping import Station
@@ -117,7 +117,9 @@ class Landscape:
 
 
 def landscape(
-    path: xarray.Dataset, case: Case | None = None, settings: Settings | None = None
+    path: xarray.Dataset,
+    case: Case | None = None,
+    settings: Settings | Mapping[str, Any] | None = None,
 ) -> Landscape:
     """Energy landscape along a path that leads through the states of a bistable structure.
 
@@ -128,7 +130,7 @@ def landscape(
         ("displacement"), of which one must drive it alone.
     case : Case, optional
         The case of the path; needed where the path cannot rebuild it (`foldyn.case_of`).
-    settings : Settings, optional
+    settings : Settings or mapping, optional
 
     Returns
     -------
@@ -143,7 +145,7 @@ def landscape(
     """
     check_result(path, "path: ")
     problem = problem_of(path, case, 0)
-    walker = _Walker(problem, Solver(problem, settings))
+    walker = _Walker(problem, Solver(problem, settings_of(settings)))
     stations = [station_of(walker.solver, problem, path, k) for k in range(path.sizes["step"])]
     if len(stations) < 2:
         raise InputError("path: a landscape needs at least two points")

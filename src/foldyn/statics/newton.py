@@ -13,10 +13,10 @@ often grows once (bars stretch to second order as panels turn) before it vanishe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError, Solution, Unsymmetric
 from foldyn.errors import InputError
 from foldyn.statics.problem import Balance, Problem, balance, clear_share, converged
-from foldyn.values import number, whole
+from foldyn.values import choice, flag, number, whole
 
 COLLIDES = "panel would pass through panel"
 MOST_TURN = 0.2  # rad, of any part within one iteration
@@ -91,8 +91,22 @@ class Settings:
         for name in ("iterations", "target", "cuts"):
             whole(f"settings: {name}", getattr(self, name), least=1)
         for name in ("stability", "locate"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"settings: {name} = {getattr(self, name)!r}: give True or False")
+            flag(f"settings: {name}", getattr(self, name))
+
+
+def settings_of(given: Any) -> Settings:
+    """Settings as they are, or of a mapping of some of their values."""
+    if isinstance(given, Settings):
+        return given
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(
+            f": got {type(given).__name__}, give statics.Settings(...) or a mapping, as "
+            '{"largest_turn": 3.0}',
+            "settings",
+        )
+    for name in given or ():
+        choice("settings", name, Settings.__dataclass_fields__)
+    return Settings(**(given or {}))
 
 
 def plane(normal: NDArray, reach: float) -> Rule:

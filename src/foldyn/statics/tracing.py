@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +17,13 @@ from foldyn.materials.memory_law import VARIABLES
 from foldyn.memory import check_memory
 from foldyn.statics.mechanism import refuse_mechanisms
 from foldyn.statics.memories import FOLLOWED
-from foldyn.statics.newton import Settings, Solver
+from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.origami import AdaptiveLoad, OrigamiProblem, drives, is_actuated
 from foldyn.statics.path_methods import METHODS, PathPlan, Until, along, plan_path
+from foldyn.statics.reached import until_of
 from foldyn.statics.recording import record
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
-from foldyn.values import choice, indices, show, whole
+from foldyn.values import choice, flag, function, indices, of_kind, show, single, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -40,10 +41,10 @@ def trace(
     constant: str | Sequence[int] = (),
     initial: State | None = None,
     first_step: float | None = None,
-    until: Callable[[NDArray, float], bool] | None = None,
+    until: Callable[[NDArray, float], bool] | Mapping[str, Any] | None = None,
     adaptive_load: AdaptiveLoad | None = None,
     inertia_relief: bool = False,
-    settings: Settings | None = None,
+    settings: Settings | Mapping[str, Any] | None = None,
     progress: Callable[[Point], None] | None = None,
 ) -> xarray.Dataset:
     """Follow the equilibria of a case along a load factor.
@@ -73,15 +74,17 @@ def trace(
     first_step : float, optional
         Change of the factor in the first step of "mgdcm" and "arc_length" (default 0.05, or that
         part of the way to the last factor); the next steps are about as long.
-    until : callable, optional
-        Function of displacements (n, 3) and load factor; the path ends at the first point where
-        it is true.
+    until : callable or mapping, optional
+        Function of displacements (n, 3) and load factor, or {"node": 6, "axis": "z",
+        "displacement": -0.03} for a node that moves so far (m); the path ends at the first point
+        where it is true.
     adaptive_load : callable, optional
         Further forces (n, 3), N, as a function of displacements (n, 3) and load factor.
     inertia_relief : bool
         Balance the loads of a body that is free to move by its inertia.
-    settings : Settings, optional
-        Tolerance, step control, stability, linear solver.
+    settings : Settings or mapping, optional
+        Values of `statics.Settings`, as {"largest_turn": 3.0}: tolerance, step control,
+        stability, linear solver.
     progress : callable, optional
         Called with each point found.
 
@@ -121,8 +124,7 @@ def trace(
     >>> path.displacement.sel(node=0, axis="x").values.round(4).tolist()
     [-0.0175, -0.0347]
     """
-    if not isinstance(case, Case):
-        raise InputError(f"case: got {type(case).__name__}, give a Case")
+    of_kind("case", case, Case)
     choice("method", method, METHODS)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
@@ -130,10 +132,11 @@ def trace(
     steady = _constant_loads(case, constant)
     displacement = None if initial is None else displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
-    if settings is not None and not isinstance(settings, Settings):
-        raise InputError(f"settings: got {type(settings).__name__}, give statics.Settings(...)")
-    if not isinstance(inertia_relief, bool):
-        raise InputError(f" = {inertia_relief!r}: give True or False", "inertia_relief")
+    until = until_of(until, case.structure)
+    settings = settings_of(settings)
+    function("adaptive_load", adaptive_load)
+    function("progress", progress)
+    inertia_relief = flag("inertia_relief", inertia_relief)
     check_fill(case.structure.fill, case.body.size)
     problem = OrigamiProblem(
         case, steady, displacement, adaptive_load, inertia_relief,
@@ -209,7 +212,8 @@ def _constant_loads(case: Case, constant: Any) -> tuple[int, ...]:
         if not chosen:
             raise InputError(' = "gravity": the case has no Gravity among its loads', "constant")
         return chosen
-    if np.size(constant) == 0:
+    constant = single(constant)
+    if isinstance(constant, Sized) and not len(constant):
         return ()
     chosen = sorted(indices("constant", constant, "load", 'or "gravity"'))
     for which in chosen:

@@ -14,7 +14,7 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.structures import calibration
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
-from foldyn.values import number, numbers, show
+from foldyn.values import number, number_or_list, numbers, show
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
@@ -22,7 +22,7 @@ PerCrease = float | Sequence[float] | Mapping[str, float] | None
 def per_crease(name: str, value: Any) -> Any:
     """Return values for creases as a number, a tuple, or a new dict by word; None as it is.
 
-    A number, a list and the words are checked with the pattern.
+    How many there are, and the words, is checked with the pattern.
     """
     if isinstance(value, Mapping):
         if not value:
@@ -31,11 +31,7 @@ def per_crease(name: str, value: Any) -> Any:
         if strange:
             raise InputError(f": {show(strange[0])} is no assignment or family of creases", name)
         return {word: number(f"{name}.{word}", value[word]) for word in value}
-    if isinstance(value, bool):
-        raise InputError(f" = {value}: give a number, one for each crease, or a table", name)
-    if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim):
-        return tuple(value)  # a copy that stays as it is
-    return value
+    return None if value is None else number_or_list(name, value, "crease")
 
 
 def fold_stiffness(given: PerCrease, pattern: Pattern, sheet: Sheet) -> NDArray:

@@ -14,6 +14,7 @@ from foldyn.materials import BarLaw, HingeLaw
 from foldyn.materials.plate_superlinear import plate_onset
 from foldyn.memory import check_memory
 from foldyn.patterns import Pattern
+from foldyn.patterns.pattern import Patterned, pattern_of
 from foldyn.structures import calibration as calibrate
 from foldyn.structures.clamps import boundary_edges, clamp_rows, clamp_stiffness
 from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
@@ -24,14 +25,14 @@ from foldyn.structures.presets import resolved
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.sheet import Sheet
 from foldyn.structures.structure import Structure
-from foldyn.values import vector
+from foldyn.values import of_kind, vector
 
 PER_NODE = 5000.0
 """Bytes a node with its tangent: 5200 and 4900 measured with 20,000 and 80,000 nodes."""
 
 
 def discretize(
-    pattern: Pattern,
+    pattern: Pattern | Patterned,
     sheet: Sheet,
     scheme: Literal["n5b8", "n4b5", "n5b8e"] | None = None,
     mass: str | None = None,
@@ -54,7 +55,8 @@ def discretize(
 
     Parameters
     ----------
-    pattern : Pattern
+    pattern : Pattern or Folding
+        Or anything else that has a `pattern`.
     sheet : Sheet
     scheme : {"n5b8", "n4b5", "n5b8e"}
         A center node and spokes in each panel of more than three corners, or cuts along the
@@ -112,7 +114,7 @@ def discretize(
     >>> fd.discretize(pattern, sheet).fold_stiffness.round(4).tolist()
     [0.0503]
     """
-    check_kinds(pattern, sheet)
+    pattern, sheet = checked_kinds(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
         preset, welds=len(pattern.welds) > 0, scheme=scheme, mass=mass,
@@ -132,7 +134,7 @@ def discretize(
     nodes = len(pattern.vertices) + len(pattern.faces)
     check_memory("pattern", f"a structure of {nodes} nodes", PER_NODE * nodes, "take fewer panels")
     calibrate.check_sheet(sheet, pattern)
-    points = _given_centers(centers or {}, pattern, options.scheme)
+    points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
     inner_area, edge_area = calibrate.bar_areas(mesh, pattern, sheet, merlin2)
@@ -181,11 +183,9 @@ def discretize(
     return structure.marked()
 
 
-def check_kinds(pattern: Any, sheet: Any) -> None:
-    """Refuse what is not a pattern and a sheet."""
-    for name, value, kind in (("pattern", pattern, Pattern), ("sheet", sheet, Sheet)):
-        if not isinstance(value, kind):
-            raise InputError(f"{name}: got {type(value).__name__}, give a {kind.__name__}")
+def checked_kinds(pattern: Any, sheet: Any) -> tuple[Pattern, Sheet]:
+    """Pattern, of what has one, and sheet; refuses anything else."""
+    return pattern_of(pattern), of_kind("sheet", sheet, Sheet)
 
 
 def _given_centers(
@@ -193,7 +193,7 @@ def _given_centers(
 ) -> dict[int, NDArray]:
     """Center points by panel number, each of a panel that has a center node."""
     points = {}
-    for panel, point in centers.items():
+    for panel, point in of_kind("centers", centers, Mapping).items():
         known = isinstance(panel, int | np.integer) and 0 <= panel < len(pattern.faces)
         if not known or len(pattern.faces[panel]) < 4 or scheme == "n4b5":
             raise InputError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.structures.sheet import Sheet
-from foldyn.values import brief, length, number, show
+from foldyn.values import brief, length, number, show, single
 
 
 @brief
@@ -106,6 +106,7 @@ class Laminate:
 
 def check_layers(name: str, layers: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
     """Layers of a laminate as tuples of numbers, checked."""
+    layers = single(layers)
     listed = isinstance(layers, Sequence | np.ndarray) and not isinstance(layers, str)
     if not listed or not len(layers):
         raise InputError(

@@ -13,6 +13,8 @@ from foldyn.errors import InputError
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Edge, around
 
+CUT = 'cut it with fd.convex(pattern) (in a case file, leave out facets = "line")'
+"""Remedy for panels that are not convex."""
 PARALLEL = 1e-12  # of two vectors: the squared sine of an angle that rounding spoils
 Triangle = tuple[int, int, int]
 
@@ -76,7 +78,7 @@ def n5b8(pattern: Pattern, centers: Mapping[int, NDArray] | None = None) -> Mesh
         return [(a, b, hub) for a, b in around(face)], [(hub, a) for a in face]
 
     nodes = np.concatenate([pattern.vertices, points[sizes > 3]])
-    remedy = 'its center cannot see every edge; use scheme = "n4b5" or cut the panel'
+    remedy = f'its center cannot see every edge; {CUT}, or use scheme = "n4b5"'
     return _mesh(pattern, nodes, np.array(number), spokes, remedy)
 
 

@@ -175,7 +175,7 @@ def _argument(text: str, what: str, word: str) -> Any:
     if what == MODEL:
         return word
     least = 1 if what == MODE else 0
-    if not word.isdecimal() or int(word) < least:
+    if not (word.isascii() and word.isdecimal()) or int(word) < least:
         raise InputError(f" = {show(text)}: {what} = {show(word)}: give a number from {least} on")
     return int(word)
 

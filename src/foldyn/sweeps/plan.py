@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from foldyn.analyses import CaseFile
@@ -15,11 +14,12 @@ from foldyn.analyses.reading import case_of_document, read_document, validated
 from foldyn.analyses.sections import SweepSection
 from foldyn.analyses.ties import ties_of
 from foldyn.errors import Faults, InputError, within
+from foldyn.input_files import path_of
 from foldyn.sweeps.job import ASIDE, Job, this_program
 from foldyn.sweeps.measure import Asked, Measure, asked, of_callable
 from foldyn.sweeps.measures import MEASURES
 from foldyn.sweeps.points import GRID, Point, grid, samples
-from foldyn.values import MOST, choice, show, whole
+from foldyn.values import MOST, choice, listed, show, whole
 
 MASS = "model.mass"
 
@@ -80,10 +80,7 @@ def plan_of(
     ties: Mapping[str, str] | None,
 ) -> Plan:
     """Check the arguments of `foldyn.sweep`; raises `InputError`."""
-    try:
-        path = Path(case)
-    except TypeError:
-        raise InputError(f"case: got {type(case).__name__}, give the path of a case file") from None
+    path = path_of(case, "case")
     document = read_document(path)
     case_file = case_of_document(path, document)
     table = case_file.sweep
@@ -134,7 +131,7 @@ def _chosen(
         method=choice("method", method or SAMPLINGS[0], SAMPLINGS),
         seed=whole("seed", seed or 0, least=0, most=MOST),
         vary=keys,
-        ties=_ties(ties or {}),
+        ties=_ties({} if ties is None else ties),
     )
 
 
@@ -162,14 +159,14 @@ def _with_masses(
 def _measures(wanted: Sequence[Any] | Mapping[str, Any] | None) -> tuple[Asked, ...]:
     if isinstance(wanted, str) or callable(wanted):
         wanted = [wanted]
-    if not wanted:
+    if wanted is None or not (asked_for := listed("measures", wanted, "measures")):
         raise InputError(
             f": none; give at least one of {', '.join(MEASURES)}, or a function", "measures"
         )
     if isinstance(wanted, Mapping):
         found = [of_callable(name, function) for name, function in wanted.items()]
     else:
-        found = [_measure(one, k) for k, one in enumerate(wanted)]
+        found = [_measure(one, k) for k, one in enumerate(asked_for)]
     names = [one.name for one in found]
     for name in names:
         if names.count(name) > 1:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 MODULES = (
     "data", "numbers", "colors", "camera", "gl", "painter", "annotations", "vector", "charts",
@@ -68,6 +70,11 @@ def style(*more: str) -> str:
     """Text of the style, and of more styles by name."""
     own = [_text(f"static/{name}.css") for name in ("page", *more)]
     return "\n".join([_text("third_party/uplot/uPlot.min.css"), *own])
+
+
+def in_page(value: Any) -> str:
+    """JSON for a script element: no text in it can end the element, or open a comment."""
+    return json.dumps(value).replace("<", "\\u003c")
 
 
 def digest(text: str) -> str:

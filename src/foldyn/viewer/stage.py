@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +21,7 @@ from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.fields import Field, energies, fields, folding_fields
 from foldyn.viewer.folding import folding_case
+from foldyn.viewer.scripts import in_page
 from foldyn.viewer.sheet import sheet
 
 OF_SIZE, OF_LARGEST, OF_COLORS = 5e-5, 1e-3, 4e-3
@@ -57,7 +57,7 @@ class Stage:
 
     def html(self, key: str = "stage") -> str:
         """Write as HTML, with names that begin with a key; the page must have the script."""
-        about = json.dumps(self.whole()).replace("</", "<\\/")
+        about = in_page(self.whole())
         return (
             f'<div class="foldyn" data-foldyn="{key}">'
             "<p>This part of the page needs JavaScript.</p></div>\n"

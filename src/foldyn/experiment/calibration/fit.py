@@ -129,7 +129,7 @@ def fit(
     """
     confidence = number("confidence", confidence, above=0.0, below=1.0)
     whole("processes", processes, least=1, most=MOST_PROCESSES)
-    made = problem(case, data, parameters, ties or {})
+    made = problem(case, data, parameters, {} if ties is None else ties)
     points = made.space.starts(starts, seed)
     began = time.perf_counter()
     with pool_of(partial(_evaluate, made), processes) as pool:

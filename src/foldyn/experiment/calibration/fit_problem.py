@@ -22,8 +22,9 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.parameters import Parameter, Space, space
 from foldyn.experiment.calibration.sight import Sight
+from foldyn.input_files import path_of
 from foldyn.program import program
-from foldyn.values import show
+from foldyn.values import listed, show
 
 STEADY = "generalized_alpha"
 """Integrator of a fit where the case file leaves the choice open."""
@@ -149,11 +150,9 @@ def problem(
         One cannot be used: a case file at the values to start from, a measurement that its case
         cannot predict, a parameter that the case file does not have.
     """
-    try:
-        path = Path(case)
-    except TypeError:
-        raise InputError(f"case: got {type(case).__name__}, give the path of a case file") from None
+    path = path_of(case, "case")
     document = read_document(path)
+    measurements = listed("data", measurements, "measurements")
     if not measurements:
         raise InputError("data: none; give at least one measurement")
     for number, one in enumerate(measurements):

@@ -6,8 +6,6 @@ import math
 from numbers import Real
 from typing import Any
 
-import numpy as np
-
 from foldyn.errors import InputError
 from foldyn.memory import check_memory
 from foldyn.values import length, number, show, whole
@@ -49,13 +47,6 @@ def acute(name: str, value: Any) -> float:
     """Return an acute angle (degrees) of a panel, in radians."""
     remedy = "; it is the acute corner of the panel, so give 180 minus an obtuse one"
     return math.radians(angle_between(name, value, 0.0, 90.0, remedy))
-
-
-def flag(name: str, value: Any) -> bool:
-    """Return a choice between two."""
-    if not isinstance(value, bool | np.bool_):
-        raise InputError(f" = {show(value)}: must be True or False (true or false in TOML)", name)
-    return bool(value)
 
 
 def check_size(fields: str, vertices: int) -> None:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from foldyn.errors import within
-from foldyn.patterns.generators.arguments import check_size, flag
+from foldyn.patterns.generators.arguments import check_size
 from foldyn.patterns.generators.assembly import assembled
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge
-from foldyn.values import length, whole
+from foldyn.values import flag, length, whole
 
 LETTERS = {"hub": "V", "ray": "V", "ridge": "M", "inner_bend": "V", "outer_bend": "M"}
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from foldyn.errors import within
-from foldyn.patterns.generators.arguments import angle_between, check_size, flag
+from foldyn.patterns.generators.arguments import angle_between, check_size
 from foldyn.patterns.generators.assembly import assembled
 from foldyn.patterns.pattern import Pattern
-from foldyn.values import length, whole
+from foldyn.values import flag, length, whole
 
 
 def kresling(

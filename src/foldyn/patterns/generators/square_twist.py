@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from foldyn.errors import InputError, within
-from foldyn.patterns.generators.arguments import acute, flag, fold_dihedral, sizes
+from foldyn.patterns.generators.arguments import acute, fold_dihedral, sizes
 from foldyn.patterns.generators.rigid_folding import folded
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.topology import Edge, edge_of
+from foldyn.values import flag
 
 
 def square_twist(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from foldyn.errors import CrossingWarning, FoldynWarning, InputError
 from foldyn.mechanics.crossings import crossing_panels
 from foldyn.patterns import Pattern
+from foldyn.patterns.pattern import pattern_of
 from foldyn.patterns.picture import picture
 from foldyn.patterns.transforms import FACE_ORDERS
 from foldyn.results.crossings import pairs_text
@@ -32,7 +33,7 @@ from foldyn.statics.folding.ways import (
     largest_strain,
     wrong_ways,
 )
-from foldyn.values import choice, whole
+from foldyn.values import choice, function, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -257,8 +258,8 @@ def fold(
     >>> folding.kind, folding.pattern.dihedrals.round(6)
     ('rigid', array([1.570796]))
     """
-    if not isinstance(pattern, Pattern):
-        raise InputError(f": got {type(pattern).__name__}, give a Pattern", "pattern")
+    pattern = pattern_of(pattern)
+    function("progress", progress)
     if pattern.boards is not None:
         raise InputError(
             ": has thick panels, which hinge off its planes; fold the thin pattern, then thicken",

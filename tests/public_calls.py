@@ -1,0 +1,255 @@
+"""A small sound call of every public function and class, by name: what tests vary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import foldyn as fd
+
+POINTS = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, 0.0), (2.0, 1.0)]
+PANELS = [(0, 1, 2, 3), (1, 4, 5, 2)]
+
+Calls = Mapping[str, tuple[Callable[..., Any], dict[str, Any]]]
+
+
+@cache
+def pattern() -> fd.Pattern:
+    """Two squares, bent."""
+    return fd.patterns.simple_fold(a=1.0, b=1.0, dihedral=120)
+
+
+@cache
+def sheet() -> fd.Sheet:
+    return fd.Sheet(1e6, 0.25, 0.01, density=1000.0)
+
+
+@cache
+def case() -> fd.Case:
+    """One side held, the other pushed."""
+    made = fd.discretize(pattern(), sheet())
+    return fd.Case(
+        made, [fd.Fix([0, 1, 2, 3])], [fd.Force([4, 5], (0, 0, 1e-3))], fd.Rayleigh(alpha=1.0)
+    )
+
+
+DATA: Calls = {
+    "Sheet": (fd.Sheet, {
+        "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5, "density": 1000.0,
+        "length_scale_ratio": 2.0, "panels": [fd.PanelSheet([0], thickness=0.25)],
+    }),
+    "PanelSheet": (fd.PanelSheet, {
+        "panels": [0, 1], "youngs_modulus": 1e6, "poissons_ratio": 0.25, "thickness": 0.5,
+        "density": 1000.0,
+    }),
+    "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
+    "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy"}),
+    "Impose": (fd.Impose, {"nodes": [0, 1], "axis": "x", "value": [0.5, 0.25]}),
+    "BaseMotion": (fd.BaseMotion, {"axis": "x", "value": 0.5, "history": fd.Ramp(1.0)}),
+    "Spring": (fd.Spring, {
+        "stiffness": 2.0, "between": [(0, 1)], "rest_length": 0.5,
+    }),
+    "Dashpot": (fd.Dashpot, {"coefficient": 2.0, "nodes": 0, "direction": (1.0, 0.0, 0.0)}),
+    "Link": (fd.Link, {"nodes": [0, 1], "to": [2, 3, 4]}),
+    "Force": (fd.Force, {"nodes": [0, 1], "vector": (1.0, 0.0, 0.5), "history": fd.Step(0.5)}),
+    "Gravity": (fd.Gravity, {"acceleration": (0.0, 0.0, -9.5)}),
+    "Actuate": (fd.Actuate, {"creases": [0], "angle": [90.0]}),
+    "TotalForce": (fd.TotalForce, {"total": (1.0, 0.0, 0.5), "edges": [(0, 1)]}),
+    "LineLoad": (fd.LineLoad, {"edges": [(0, 1)], "force_per_length": (1.0, 0.0, 0.5)}),
+    "Pressure": (fd.Pressure, {"pressure": 2.0, "panels": [0, 1]}),
+    "CreaseMoment": (fd.CreaseMoment, {"creases": [0], "moment": [0.5]}),
+    "Temperature": (fd.Temperature, {
+        "change": 0.125, "expansion": 0.5, "curvature": 0.25, "panels": [0], "layers": None,
+        "history": None,
+    }),
+    "Rayleigh": (fd.Rayleigh, {"alpha": 0.5, "beta": 0.25, "state": "start"}),
+    "ModalDamping": (fd.ModalDamping, {"ratios": 0.5, "count": 3, "state": "start"}),
+    "CreaseDamping": (fd.CreaseDamping, {"coefficient": 0.5, "creases": [0]}),
+    "PointMass": (fd.PointMass, {"nodes": [0], "mass": 0.5}),
+    "Contact": (fd.Contact, {
+        "thickness": 0.5, "friction": 0.25, "stiffness": 2.0, "panels": False,
+        "planes": [fd.Plane((0, 0, 0), (0, 0, 1))],
+    }),
+    "Plane": (fd.Plane, {
+        "point": (0.0, 0.5, 0.0), "normal": (0.0, 0.0, 1.0), "friction": 0.5,
+        "motion": (0.0, 0.5, 1.0), "history": fd.Ramp(1.0),
+    }),
+    "Constant": (fd.Constant, {}),
+    "Pulse": (fd.Pulse, {"duration": 0.5}),
+    "HalfSine": (fd.HalfSine, {"duration": 0.5}),
+    "Ramp": (fd.Ramp, {"duration": 0.5, "smooth": True}),
+    "Step": (fd.Step, {"time": 0.5}),
+    "Harmonic": (fd.Harmonic, {"frequency": 0.5, "phase": 30.0}),
+    "Chirp": (fd.Chirp, {"start": 0.5, "end": 2.0, "duration": 4.0, "phase": 30.0}),
+    "Table": (fd.Table, {"times": [0.0, 0.5, 1.0], "values": [0.0, 1.0, 0.5], "smooth": True}),
+    "Function": (fd.Function, {"function": np.sin, "at": [0.5]}),
+    "EnhancedLinear": (fd.EnhancedLinear, {
+        "theta1": 45.0, "theta2": 315.0, "rest": "as_published",
+    }),
+    "PlateSuperlinear": (fd.PlateSuperlinear, {"onset": 0.5}),
+    "Prony": (fd.Prony, {"ratios": [0.5, 0.25], "times": [1.0, 2.0], "law": "linear"}),
+    "Plastic": (fd.Plastic, {
+        "yield_moment": 0.5, "isotropic": 0.25, "kinematic": 0.125, "law": "linear",
+    }),
+    "Eyring": (fd.Eyring, {"barrier_moment": 0.5, "rate": 0.25, "law": "linear"}),
+    "State": (fd.State, {"displacement": [[0.5, 0.0, 0.0]], "velocity": [[0.0, 0.5, 0.0]]}),
+    "Quantity": (fd.Quantity, {"units": "m", "text": "", "dims": ("node",), "function": None}),
+    "Pattern": (fd.Pattern, {
+        "vertices": POINTS, "faces": PANELS, "assignments": {(1, 2): "V"}, "name": "two",
+        "fold_angles": [0.5], "families": {"middle": [(1, 2)]}, "welds": [],
+    }),
+    "Case": (fd.Case, {
+        "structure": fd.discretize(pattern(), sheet()), "supports": [fd.Fix([0, 1, 2, 3])],
+        "loads": [fd.Force([4, 5], (0, 0, 1e-3))], "damping": fd.Rayleigh(alpha=1.0),
+        "masses": [fd.PointMass([4], 0.5)], "contact": fd.Contact(thickness=0.01),
+    }),
+    "thicken": (fd.thicken, {"pattern": pattern(), "thickness": 0.01, "offsets": 0.005}),
+    "welded": (fd.welded, {
+        "pattern": fd.Pattern(POINTS, PANELS), "facets": [(1, 2)], "join": False,
+    }),
+    "convex": (fd.convex, {"pattern": pattern()}),
+    "discretize": (fd.discretize, {
+        "pattern": pattern(), "sheet": sheet(), "scheme": "n5b8", "mass": "consistent",
+        "bar_law": "ogden", "fold_law": "enhanced", "bend_law": "linear", "calibration": "plate",
+        "crease_stiffness": 0.5, "crease_rest": 90.0, "centers": {0: (0.433, 0.5, 0.25)},
+        "clamped": [], "rigid": None, "straight": [], "preset": "plate",
+    }),
+    "shell": (fd.shell, {
+        "pattern": pattern(), "sheet": sheet(), "divisions": 2, "mass": "lumped",
+        "fold_law": "enhanced", "crease_stiffness": 0.5, "crease_rest": 90.0,
+        "clamped": [(0, 1)], "rigid": [0],
+    }),
+}  # fmt: skip
+
+PATTERNS: Calls = {
+    "simple_fold": (fd.patterns.simple_fold, {"a": 1.0, "b": 0.5, "dihedral": 60.0}),
+    "miura": (fd.patterns.miura, {
+        "cells": (2, 1), "a": 1.0, "b": 0.5, "panel_angle": 60.0, "dihedral": 60.0,
+    }),
+    "arc_miura": (fd.patterns.arc_miura, {
+        "cells": (2, 4), "a": 1.0, "b": 1.0, "panel_angle": 60.0, "second_angle": 75.0,
+        "dihedral": 90.0,
+    }),
+    "eggbox": (fd.patterns.eggbox, {
+        "cells": (2, 1), "a": 1.0, "b": 1.0, "panel_angle": 75.0, "dihedral": 60.0,
+    }),
+    "kresling": (fd.patterns.kresling, {
+        "sides": 6, "radius": 1.0, "height": 0.5, "twist": 30.0, "storeys": 2, "alternating": True,
+    }),
+    "waterbomb": (fd.patterns.waterbomb, {"cells": (4, 5), "a": 1.0, "b": 1.0, "dihedral": 120.0}),
+    "yoshimura": (fd.patterns.yoshimura, {"cells": (6, 4), "a": 0.5, "b": 1.0, "dihedral": 160.0}),
+    "curved_pleat": (fd.patterns.curved_pleat, {
+        "pleats": 4, "segments": 9, "a": 0.5, "radius": 1.0, "arc": 90.0, "dihedral": 110.0,
+    }),
+    "miura_tube": (fd.patterns.miura_tube, {
+        "cells": 3, "a": 1.0, "b": 1.0, "panel_angle": 60.0, "dihedral": 90.0,
+    }),
+    "zipper_tubes": (fd.patterns.zipper_tubes, {
+        "cells": 3, "a": 1.0, "b": 1.0, "panel_angle": 60.0, "dihedral": 90.0,
+    }),
+    "resch": (fd.patterns.resch, {"cells": (3, 3), "a": 1.0, "dihedral": 120.0}),
+    "square_twist": (fd.patterns.square_twist, {
+        "a": 1.0, "b": 1.0, "panel_angle": 45.0, "dihedral": 100.0, "symmetric": False,
+    }),
+    "flasher": (fd.patterns.flasher, {"sides": 6, "a": 1.0, "rings": 2, "folded": False}),
+}  # fmt: skip
+
+CASE = """
+[pattern]
+kind = "simple_fold"
+dihedral = 120
+[sheet]
+youngs_modulus = 1e6
+poissons_ratio = 0.25
+thickness = 0.01
+density = 1000.0
+[[supports]]
+nodes = [0, 1, 2, 3]
+[analysis]
+kind = "modes"
+count = 2
+"""
+
+
+def solved(folder: Path) -> Calls:
+    """Calls of what computes, reads and writes; files are in a folder."""
+    run = fd.simulate(case(), 0.02, dt=1e-3)
+    path = fd.trace(case(), load_factors=[0.0, 0.5, 1.0])
+    found = fd.modes(case(), count=2)
+    light = fd.Case(fd.discretize(pattern(), sheet(), preset="herkal"), [fd.Fix([0, 1, 2, 3])])
+    fd.save(run, folder / "run.nc")
+    fd.write_pattern(folder / "pattern.fold", pattern())
+    (folder / "case.toml").write_text(CASE)
+    reading = {
+        "path": folder / "pattern.fold", "scale": 2.0, "unit": "m", "frame": 0, "facets": "hinge",
+    }  # fmt: skip
+    return {
+        "simulate": (fd.simulate, {
+            "case": case(), "duration": 0.02, "method": "rk4", "dt": 1e-3, "every": 2,
+            "initial": fd.State(), "force": False, "tolerance": None, "start": 0.0,
+            "progress": None, "spectral_radius": None, "sample": None, "store": None,
+            "checkpoint": 60.0, "resume": False,
+        }),
+        "simulate_many": (fd.simulate_many, {
+            "cases": [light], "duration": 0.02, "dt": 1e-4, "every": 100, "initial": None,
+            "start": 0.0, "force": False, "threads": 1,
+        }),
+        "trace": (fd.trace, {
+            "case": case(), "method": "newton", "load_factors": [0.0, 1.0], "steps": None,
+            "constant": (), "initial": None, "first_step": None, "until": None,
+            "adaptive_load": None, "inertia_relief": False,
+            "settings": {"largest_turn": 5.0, "stability": True, "iterations": 20},
+            "progress": None,
+        }),
+        "switch_branch": (fd.switch_branch, {  # refused: the path has no bifurcation
+            "path": path, "at": 1, "direction": 1, "case": case(), "mode": 0,
+            "method": "arc_length", "steps": 2, "until": None, "settings": None, "progress": None,
+        }),
+        "landscape": (fd.landscape, {"path": path, "case": case(), "settings": {}}),
+        "modes": (fd.modes, {
+            "case": case(), "count": 2, "state": None, "secant": 2.0, "load_factor": 1.0,
+            "internal": 0, "verify": True, "solver": "superlu",
+        }),
+        "frf": (fd.frf, {
+            "case": case(), "drive": fd.Force([4], (0, 0, 1.0)), "frequencies": [1.0, 2.0],
+            "state": None, "method": "direct", "secant": None, "amplitude": 1.0,
+            "load_factor": 1.0, "internal": 0, "progress": None,
+        }),
+        "fold": (fd.fold, {
+            "pattern": fd.Pattern(POINTS, PANELS, {(1, 2): "V"}), "fraction": 0.5, "angles": None,
+            "steps": 2, "start": "auto", "panels": "whole", "progress": None,
+        }),
+        "critical_step": (fd.critical_step, {"case": case(), "method": "rk4", "u": None}),
+        "initial_state": (fd.initial_state, {"result": run, "at": 1}),
+        "mac": (fd.mac, {"a": found, "b": found, "mass": [1.0, 2.0], "nodes": [4, 5]}),
+        "case_of": (fd.case_of, {"ds": run}),
+        "save": (fd.save, {"ds": run, "path": folder / "again.nc"}),
+        "load": (fd.load, {"path": folder / "run.nc", "whole": True}),
+        "export": (fd.export, {"result": run, "path": folder / "run.csv", "format": None}),
+        "view": (fd.view, {"what": pattern(), "title": "t", "height": 500}),
+        "read_case": (fd.read_case, {
+            "path": folder / "case.toml", "model": "bars_and_hinges", "divisions": None,
+        }),
+        "read_pattern": (fd.read_pattern, reading),
+        "diagnose": (fd.diagnose, reading),
+        "write_pattern": (fd.write_pattern, {
+            "path": folder / "written.fold", "pattern": pattern(), "frames": (),
+        }),
+        "sweep": (fd.sweep, {
+            "case": folder / "case.toml", "vary": {"sheet.thickness": [0.01, 0.02]},
+            "measures": ["frequency"], "samples": None, "method": None, "seed": None, "ties": None,
+            "processes": 1, "scheduler": None, "folder": None, "progress": None,
+        }),
+        "fit": (fd.fit, {  # refused: nothing to fit to
+            "case": folder / "case.toml", "data": [], "parameters": [], "ties": None, "starts": 1,
+            "seed": 0, "processes": 1, "confidence": 0.95, "folder": None, "progress": None,
+        }),
+        "fidelity": (fd.fidelity, {  # refused: such models are not known
+            "case": case(), "count": 2, "divisions": [2, 3], "models": ["none"], "secant": 2.0,
+            "progress": print,
+        }),
+    }  # fmt: skip
