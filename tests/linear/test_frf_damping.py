@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from frf_structures import chain, chain_matrices, largest_error, miura_case, smooth_miura
 from scipy.linalg import eigh
 
 import foldyn as fd
+from foldyn.algebra import complex_symmetric, superlu
+from foldyn.linear.linearized import linearize
 from foldyn.signals import half_power
 
 F = np.linspace(0.1, 4.0, 60)
@@ -66,7 +70,7 @@ def test_ratios_of_modes(name):
 
 
 def test_at_a_resonance_that_only_modal_damping_limits():
-    """The undamped matrix is singular there: Woodbury's formula would fail."""
+    """The undamped matrix is singular there, and Woodbury's formula alone would fail."""
     plain = chain()
     case = fd.Case(plain.structure, plain.supports, damping=fd.ModalDamping(0.02))
     peaks = np.sqrt(VALUES) / (2 * np.pi)
@@ -163,3 +167,29 @@ def test_stepped_sine_refuses_modes_of_the_start():
     case = fd.Case(case.structure, case.supports, damping=fd.ModalDamping(0.1, 2, "start"))
     with pytest.raises(fd.errors.InputError, match="K0 or modes where the one before has ended"):
         fd.frf(case, fd.Force([7], (1e-5, 0, 0)), [1.0], method="stepped_sine")
+
+
+@pytest.mark.parametrize("method", ["direct", "harmonic"])
+def test_all_modes_damped_leave_the_matrix_sparse(method, monkeypatch):
+    """Its factors are those of the undamped matrix, and the response is that of the full one."""
+    case = replace(miura_case(), damping=fd.ModalDamping(0.02))
+    system = linearize(case)
+    assert len(system.modal) == len(system.free)
+    there = abs(system.stiffness) + abs(system.mass)
+    sizes = []
+
+    def factorize(matrix, **options):
+        sizes.append((matrix.shape, matrix.nnz))
+        return superlu.factorize(matrix, **options)
+
+    monkeypatch.setattr(complex_symmetric, "factorize", factorize)
+    f = fd.modes(case, 3).frequency.values
+    drive = fd.Force([case.free_dofs[-1] // 3], (0, 0, 1))
+    found = fd.frf(case, drive, f, method=method)
+    assert set(sizes) == {(there.shape, there.nnz)}
+    load = system.projected(np.eye(case.structure.nodes.size)[case.free_dofs[-1]])
+    for k, omega in enumerate(2 * np.pi * f):
+        matrix = system.stiffness - omega**2 * system.mass
+        matrix = matrix.toarray() + 1j * omega * (system.modal.T @ system.modal)
+        exact = system.expanded(np.linalg.solve(matrix, load)[:, None])[:, 0]
+        assert largest_error(found.receptance.values[k].ravel(), exact) < 1e-9
