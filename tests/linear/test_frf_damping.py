@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from frf_structures import chain, chain_matrices, largest_error, miura_case, smooth_miura
+from scipy import sparse
 from scipy.linalg import eigh
 
 import foldyn as fd
@@ -82,6 +83,22 @@ def test_at_a_resonance_that_only_modal_damping_limits():
                 VALUES[1 - k] - VALUES[k] + 0.04j * np.sqrt(VALUES[k] * VALUES[1 - k])
             )
             assert complex(found.receptance[k, 1, 0]) == pytest.approx(own + other, rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 30])
+def test_a_matrix_that_only_modal_damping_makes_regular(size):
+    """A = sum of (k - 1) v_k v_k', singular along v_1, which alone is damped."""
+    axes = np.linalg.qr(np.random.default_rng(1).standard_normal((size, size)))[0]
+    axes = axes if size > 2 else np.eye(size)  # no rounding: a pivot is exactly zero
+    values = np.arange(size, dtype=float)
+    matrix = sparse.csc_array((axes * values) @ axes.T).astype(complex)
+    load = axes @ np.ones(size)
+    found = complex_symmetric.solve(matrix, load, axes[:, :1].T, 0.1j)
+    exact = axes @ (1.0 / np.where(values > 0.0, values, 0.1j))
+    assert largest_error(found, exact) < 1e-12
+    assert np.isnan(complex_symmetric.solve(matrix, load)).all()
+    if size > 1:  # what is damped is another direction
+        assert np.isnan(complex_symmetric.solve(matrix, load, axes[:, 1:2].T, 0.1j)).all()
 
 
 def test_half_power_of_the_peaks():

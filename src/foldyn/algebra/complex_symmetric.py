@@ -68,5 +68,6 @@ def _factors(matrix: sparse.csc_array, rows: NDArray, weight: complex) -> Soluti
     """
     if not len(rows):
         return factorize(matrix, pivot=PIVOT)
-    beside = sparse.diags_array(1j * BESIDE * _EPS * np.abs(matrix.diagonal()))
+    terms = np.abs(matrix.diagonal()) + abs(weight) * np.einsum("ri,ri->i", rows, rows)
+    beside = sparse.diags_array(1j * BESIDE * _EPS * terms)
     return Updated(factorize(sparse.csc_array(matrix + beside), pivot=PIVOT), rows, weight)
