@@ -97,12 +97,13 @@ class Shell(Discretized):
         )
 
     @property
-    def coarser(self) -> Shell | None:
-        """The same with half as many pieces of every edge; None of one piece."""
-        half = self.options.divisions // 2
-        if not half:
-            return None
-        return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=half)))
+    def divisions(self) -> int:
+        """Pieces of every edge."""
+        return self.options.divisions
+
+    def meshed(self, divisions: int) -> Shell:
+        """The same with so many pieces of every edge."""
+        return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=divisions)))
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
