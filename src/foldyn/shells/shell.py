@@ -31,6 +31,7 @@ from foldyn.structures.discretize import check_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
+from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
@@ -361,6 +362,7 @@ def shell(
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
     check_kinds(pattern, sheet)
+    doubt_units(pattern, sheet)
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")

@@ -14,7 +14,7 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.structures import calibration
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
-from foldyn.values import number, numbers, show
+from foldyn.values import doubt_degrees, number, numbers, show
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
@@ -69,6 +69,7 @@ def fold_rest(
         raise InputError(
             f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
         )
+    doubt_degrees("crease_rest", degrees[chosen])
     rest, given_there = np.radians(degrees)[crease], chosen[crease]
     if given_there.all():
         return rest
