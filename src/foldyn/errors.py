@@ -180,3 +180,11 @@ class FoldynWarning(UserWarning):
 
 class CrossingWarning(FoldynWarning):
     """Panels pass through each other in a result; the message says which, and when first."""
+
+
+class StretchWarning(FoldynWarning):
+    """Bars hold much of the strain energy: they are too stiff in the plane of the panels."""
+
+
+class UnitsWarning(FoldynWarning):
+    """A number is probably in other units: degrees are asked for, and SI."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, UnitsWarning
 
 LARGEST, SMALLEST = 1e50, 1e-50
 """Sizes of numbers other than 0, in SI units: their fourth powers and quotients stay in range."""
@@ -26,6 +27,10 @@ LONGEST, SHORTEST = 1e30, 1e-30
 """Sizes of lengths (m), whose eighth powers occur: a thousand universes to less than Planck's."""
 MOST = 2**63 - 1
 """Largest whole number: what arrays of them hold."""
+ROUND, DIGITS = 7.0, 1e-4
+"""Largest angle in radians, and how near it is to a part of pi."""
+PARTS = np.array([*range(1, 13), 18])
+"""Such parts: multiples of 10 and of 15 degrees among them."""
 SHOWN = 60
 """Characters of a value in a message."""
 UNITS: Mapping[str, str] = {
@@ -268,7 +273,33 @@ def number(
     ):
         if not fits:
             raise InputError(f" = {show(value)}: must be {words} {bound:g}{unit}", name)
+    if unit == " degrees":
+        doubt_degrees(name, result)
     return result
+
+
+def doubt_degrees(name: str, value: Any) -> None:
+    """Warn of an angle (degrees), or of angles all of which are so, that is one in radians.
+
+    Below 7 and a simple part of pi to four digits, as np.pi / 3 or 1.0472.
+    """
+    angles = np.abs(np.ravel(np.asarray(value, float)))
+    angles = angles[angles > 0.0]
+    if not angles.size or angles.max() > ROUND:
+        return
+    parts = angles[:, None] * PARTS / np.pi
+    whole_parts = np.rint(parts)
+    near = (whole_parts > 0.0) & (np.abs(parts - whole_parts) <= DIGITS * parts)
+    if near.any(axis=1).all():
+        part = int(PARTS[near[0].argmax()])
+        times = int(whole_parts[0, near[0].argmax()])
+        pi = f"{'' if times == 1 else f'{times} '}pi{'' if part == 1 else f'/{part}'}"
+        warnings.warn(
+            f"{name} = {angles[0]:.5g} is {pi}, but angles are in degrees: give "
+            f"{180.0 * times / part:g} if that is meant in radians",
+            UnitsWarning,
+            stacklevel=3,
+        )
 
 
 def length(name: str, value: Any) -> float:

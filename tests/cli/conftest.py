@@ -93,7 +93,9 @@ class Workplace:
         out, err = self.capsys.readouterr()
         after = self.contents()
         assert {name: after.get(name) for name in before} == before, "a file was changed"
-        return Outcome(status, out, err, sorted(set(after) - set(before)))
+        # towers stretch, and their tests are about something else
+        told = "".join(line for line in err.splitlines(True) if "warning: bars hold" not in line)
+        return Outcome(status, out, told, sorted(set(after) - set(before)))
 
     def run(self, content: str | bytes, *arguments: str) -> Outcome:
         """Write case.toml and run it without figures."""

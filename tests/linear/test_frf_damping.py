@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from frf_structures import chain, chain_matrices, largest_error, miura_case, smooth_miura
+from scipy import sparse
 from scipy.linalg import eigh
 
 import foldyn as fd
+from foldyn.algebra import complex_symmetric, superlu
+from foldyn.linear.linearized import linearize
 from foldyn.signals import half_power
 
 F = np.linspace(0.1, 4.0, 60)
@@ -66,7 +71,7 @@ def test_ratios_of_modes(name):
 
 
 def test_at_a_resonance_that_only_modal_damping_limits():
-    """The undamped matrix is singular there: Woodbury's formula would fail."""
+    """The undamped matrix is singular there, and Woodbury's formula alone would fail."""
     plain = chain()
     case = fd.Case(plain.structure, plain.supports, damping=fd.ModalDamping(0.02))
     peaks = np.sqrt(VALUES) / (2 * np.pi)
@@ -78,6 +83,22 @@ def test_at_a_resonance_that_only_modal_damping_limits():
                 VALUES[1 - k] - VALUES[k] + 0.04j * np.sqrt(VALUES[k] * VALUES[1 - k])
             )
             assert complex(found.receptance[k, 1, 0]) == pytest.approx(own + other, rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 30])
+def test_a_matrix_that_only_modal_damping_makes_regular(size):
+    """A = sum of (k - 1) v_k v_k', singular along v_1, which alone is damped."""
+    axes = np.linalg.qr(np.random.default_rng(1).standard_normal((size, size)))[0]
+    axes = axes if size > 2 else np.eye(size)  # no rounding: a pivot is exactly zero
+    values = np.arange(size, dtype=float)
+    matrix = sparse.csc_array((axes * values) @ axes.T).astype(complex)
+    load = axes @ np.ones(size)
+    found = complex_symmetric.solve(matrix, load, axes[:, :1].T, 0.1j)
+    exact = axes @ (1.0 / np.where(values > 0.0, values, 0.1j))
+    assert largest_error(found, exact) < 1e-12
+    assert np.isnan(complex_symmetric.solve(matrix, load)).all()
+    if size > 1:  # what is damped is another direction
+        assert np.isnan(complex_symmetric.solve(matrix, load, axes[:, 1:2].T, 0.1j)).all()
 
 
 def test_half_power_of_the_peaks():
@@ -163,3 +184,29 @@ def test_stepped_sine_refuses_modes_of_the_start():
     case = fd.Case(case.structure, case.supports, damping=fd.ModalDamping(0.1, 2, "start"))
     with pytest.raises(fd.errors.InputError, match="K0 or modes where the one before has ended"):
         fd.frf(case, fd.Force([7], (1e-5, 0, 0)), [1.0], method="stepped_sine")
+
+
+@pytest.mark.parametrize("method", ["direct", "harmonic"])
+def test_all_modes_damped_leave_the_matrix_sparse(method, monkeypatch):
+    """Its factors are those of the undamped matrix, and the response is that of the full one."""
+    case = replace(miura_case(), damping=fd.ModalDamping(0.02))
+    system = linearize(case)
+    assert len(system.modal) == len(system.free)
+    there = abs(system.stiffness) + abs(system.mass)
+    sizes = []
+
+    def factorize(matrix, **options):
+        sizes.append((matrix.shape, matrix.nnz))
+        return superlu.factorize(matrix, **options)
+
+    monkeypatch.setattr(complex_symmetric, "factorize", factorize)
+    f = fd.modes(case, 3).frequency.values
+    drive = fd.Force([case.free_dofs[-1] // 3], (0, 0, 1))
+    found = fd.frf(case, drive, f, method=method)
+    assert set(sizes) == {(there.shape, there.nnz)}
+    load = system.projected(np.eye(case.structure.nodes.size)[case.free_dofs[-1]])
+    for k, omega in enumerate(2 * np.pi * f):
+        matrix = system.stiffness - omega**2 * system.mass
+        matrix = matrix.toarray() + 1j * omega * (system.modal.T @ system.modal)
+        exact = system.expanded(np.linalg.solve(matrix, load)[:, None])[:, 0]
+        assert largest_error(found.receptance.values[k].ravel(), exact) < 1e-9

@@ -79,7 +79,7 @@ def test_displacements_are_those_of_the_study(miura):
     result = miura[1].result
     assert float(result["deflection"]) == pytest.approx(23.95e-3, abs=1e-4)
     assert result["deflection_error"].values == pytest.approx([-0.28, 0.005, 0.024], abs=5e-3)
-    assert 0.0 < float(result["deflection_mesh_error"]) < 0.011  # a coarser mesh is softer
+    assert 0.0 < float(result["deflection_mesh_error"]) < 0.02  # a coarser mesh is softer
 
 
 def test_the_models_of_case_study_2(miura):
@@ -185,7 +185,7 @@ def test_it_is_read_as_it_was_saved(quick, tmp_path):
     fd.save(found.result, tmp_path / "fidelity.nc")
     again = fd.Fidelity(fd.load(tmp_path / "fidelity.nc"))
     assert str(again) == str(found)
-    assert again.table("plate") == found.table("plate")
+    np.testing.assert_array_equal(again.table("plate"), found.table("plate"))
 
 
 def test_the_shell_is_held_and_loaded_as_the_case():
@@ -328,7 +328,9 @@ def test_advice_follows_from_the_numbers():
     none = advised([10.0, 20.0], [[0.5, -0.2], [0.0, 0.0]]).advice
     assert "No model has the lowest mode, 10 Hz, within 10 % of the shell: take the" in none
     coarse = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([0.0, -0.05]))
-    assert "The finer mesh of the shell is itself up to 5.0 % off" in coarse.advice
+    assert "The finer mesh of the shell is itself about 5.0 % off" in coarse.advice
+    unsettled = advised([10.0, 20.0], [[0.0, 0.0], [0.0, 0.0]], mesh_error=np.array([np.nan, 0.0]))
+    assert "The meshes of the shell have not converged for mode 1: what" in unsettled.advice
     assert reach(partly.result, "plate", 3) == ("plate", 2, 0.02)
 
 
@@ -390,7 +392,7 @@ def test_a_panel_that_no_shell_has_is_refused():
         ({"count": 0}, "count = 0: must be a whole number, at least 1"),
         ({"divisions": 12}, "divisions = 12: give two numbers, as in (6, 12)"),
         ({"divisions": (8, 8)}, "divisions = [8, 8]: the second mesh must be the finer one"),
-        ({"divisions": (0, 8)}, "divisions = 0: must be a whole number, at least 1"),
+        ({"divisions": (0, 8)}, "divisions = 0: must be a whole number, at least 2"),
         ({"secant": 0.0}, "secant = 0.0: must be"),
         ({"models": "plate"}, 'models = "plate": give a list of names, as ["plate"]'),
         ({"models": ["plates"]}, "models = \"plates\": did you mean 'plate'? choose one of"),

@@ -1,14 +1,71 @@
-"""Limits of values that two meshes have (Richardson's extrapolation).
+"""Limits of values on finer and finer meshes (Richardson's extrapolation).
 
-An error of the order h^2, h the size of the pieces, is told by two meshes: with N and M < N pieces
-of every edge, f_N + (f_N - f_M) / ((N/M)^2 - 1) is the limit.
+With n pieces of every edge an error of order p is c n^-p. Where the order is known, two meshes give
+the limit; of three meshes with n1 < n2 < n3 pieces the changes also give the order that they show:
+
+    (f2 - f1) / (f3 - f2) = (n1^-p - n2^-p) / (n2^-p - n3^-p).
+
+Only meshes that show about the order of the elements, 2, tell their error (Roache, Annu. Rev.
+Fluid Mech. 29, 1997; Eca and Hoekstra, J. Comput. Phys. 262, 2014): where errors of opposite signs
+compete, the changes may be small, or of any sign, far from the limit.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+ORDER = 2.0  # of the elements
+LEAST, MOST = 1.0, 3.0  # observed orders that are near it
+SETTLED = 1e-3  # of the value: changes that are no error worth an order
 
 
-def extrapolated(coarse: Any, fine: Any, ratio: float) -> Any:
+class Convergence(NamedTuple):
+    """What three meshes show.
+
+    Attributes
+    ----------
+    order : (k,)
+        Observed; 2 of values that hardly change; nan where it is not between 1 and 3: the meshes
+        have not converged.
+    limit : (k,)
+        What the values tend to; nan likewise.
+    """
+
+    order: NDArray[np.float64]
+    limit: NDArray[np.float64]
+
+
+def extrapolated(coarse: Any, fine: Any, ratio: float, order: Any = ORDER) -> Any:
     """What values tend to that two meshes have, the fine one with `ratio` times the divisions."""
-    return fine + (fine - coarse) / (ratio**2 - 1.0)
+    return fine + (fine - coarse) / (ratio**order - 1.0)
+
+
+def convergence(values: ArrayLike, divisions: Sequence[int]) -> Convergence:
+    """Observed order and limit of values (3, k) on meshes of so many divisions, increasing.
+
+    Orders above 2 count as 2 in the limit, which makes the error the larger.
+    """
+    first, second, third = np.asarray(values, float)
+    early, late = second - first, third - second
+    order = np.array([_observed(*both, divisions) for both in zip(early, late, strict=True)])
+    settled = np.maximum(np.abs(early), np.abs(late)) <= SETTLED * np.abs(third)
+    order = np.where(settled, ORDER, order)
+    ratio = divisions[2] / divisions[1]
+    return Convergence(order, extrapolated(second, third, ratio, np.minimum(order, ORDER)))
+
+
+def _observed(early: float, late: float, divisions: Sequence[int]) -> float:
+    """Order that two changes show; nan where it is not near that of the elements."""
+
+    def miss(order: float) -> float:
+        one, two, three = (float(n) ** -order for n in divisions)
+        return early * (two - three) - late * (one - two)
+
+    if not miss(LEAST) * miss(MOST) < 0.0:
+        return np.nan
+    return float(brentq(miss, LEAST, MOST))

@@ -174,13 +174,15 @@ def _modes(found: Fidelity) -> Table:
     rows: list[list[Any]] = []
     for every in zip(*tables, strict=True):
         first = every[0]
-        row = [f"{first.mode}{'' if first.below else ' *'}", first.shell, 100.0 * first.mesh_error]
+        mesh = 100.0 * first.mesh_error
+        row = [f"{first.mode}{'' if first.below else ' *'}", first.shell]
+        row.append("not converged" if np.isnan(mesh) else mesh)
         rows.append([*row, *(f"{_told(mode.error, 'lost')} ({mode.mac:.2f})" for mode in every)])
     return Table(
         ["mode", "shell (Hz)", "mesh (%)", *found.models],
         rows,
-        "Elastic modes of the shell: frequency extrapolated in the size of its mesh, and how far "
-        "the finer mesh is off; errors of the models in % and, in parentheses, their MAC. "
+        "Elastic modes of the shell: frequency extrapolated in the size of its mesh, and about how "
+        "far the finer mesh is off; errors of the models in % and, in parentheses, their MAC. "
         f"{'; '.join(legend(found))}.",
     )
 
@@ -195,9 +197,10 @@ def _notes(found: Fidelity) -> str:
     notes = [
         f"The shell has the same pattern, sheet, creases, supports and masses, meshes of {coarse} "
         f"and {fine} divisions of every edge ({facts['triangles']} triangles) and consistent mass; "
-        "frequencies are extrapolated with the square of the mesh size. Modes are paired by their "
-        "MAC at the nodes that both have, modes of nearly equal frequency as a space. Supports "
-        "hold the same vertices in both."
+        "frequencies are extrapolated with the square of the mesh size, and their errors estimated "
+        f"with the order that these meshes show together with one of {coarse // 2}. Modes are "
+        "paired by their MAC at the nodes that both have, modes of nearly equal frequency as a "
+        "space. Supports hold the same vertices in both."
     ]
     if facts["rigid"]:
         notes.append(f"{facts['rigid']} rigid motions that nothing resists are left out.")

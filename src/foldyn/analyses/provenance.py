@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foldyn.cases import Contact, History
+from foldyn.linear.advice import percent
 from foldyn.materials.law import Law
 from foldyn.plots.load_curves import history_name
 from foldyn.report.album import ByRule
@@ -150,12 +151,28 @@ def _contact(contact: Contact) -> str:
 
 def mesh_error(result: xarray.Dataset) -> str:
     """What a result says of its mesh, in words; empty where there is nothing to say."""
-    if "mesh_error" not in result.attrs:
+    if "mesh_divisions" not in result.attrs:
         return ""
-    percent = 100.0 * float(result.attrs["mesh_error"])
+    told, order = result.attrs, np.atleast_1d(result.attrs["mesh_order"])
+    first, second, third = (int(n) for n in told["mesh_divisions"])
+    meshes = f"{first}, {second} and {third} pieces of every edge"
+    error = 100.0 * float(told["mesh_error"])
+    if np.isnan(told["mesh_changes"]).any():
+        return (
+            f"this mesh cannot be judged: with {first} piece{'s' * (first > 1)} of every edge some "
+            "of the lowest modes are not there yet; take more divisions"
+        )
+    if np.isnan(error):
+        early, late = (percent(change) for change in told["mesh_changes"])
+        return (
+            f"this mesh has not converged: with {meshes} one of the lowest frequencies changes by "
+            f"{early} and then by {late}; take more divisions"
+        )
+    low, high = f"{order.min():.1f}", f"{order.max():.1f}"
     return (
-        f"the lowest frequencies are {abs(percent):.2g} % too {'low' if percent < 0.0 else 'high'} "
-        "with this mesh, by extrapolation from it and one half as fine"
+        f"the lowest frequencies are about {abs(error):.2g} % too "
+        f"{'low' if error < 0.0 else 'high'} with this mesh, by meshes of {meshes} (observed order "
+        f"{low if low == high else f'{low} to {high}'})"
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.values import number, number_or_list, parsed, show
+from foldyn.values import doubt_degrees, number, number_or_list, parsed, show
 
 SIGNS: Mapping[str, float] = {"V": 1.0, "M": -1.0}
 """Sign of the fold angle of each assignment."""
@@ -56,6 +56,7 @@ def _within(name: str, value: Any, low: float, high: float, hint: str) -> Angles
             raise InputError(
                 f" = {angle:g}: must lie between {low:g} and {high:g} degrees{hint}", place
             )
+    doubt_degrees(name, checked)
     return checked
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,10 +25,11 @@ from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack
-from foldyn.errors import FoldynError, FoldynWarning, InputError
+from foldyn.errors import FoldynError, FoldynWarning, InputError, StretchWarning
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import result_dataset
 from foldyn.results.quantities import MOTION, energies_of, variable
+from foldyn.structures.stretching import MOST, REMEDY, stretch
 from foldyn.values import flag, number, of_kind, show, whole
 
 if TYPE_CHECKING:
@@ -130,7 +131,9 @@ def simulate_many(
         "threads": min(threads, len(parts)), "energy_error": error,
     }  # fmt: skip
     case = members[0].case
-    return _dataset(case, plan, out, audited(case.energy_groups), outcome, facts)
+    names = audited(case.energy_groups)
+    _warn_of_stretch(case, dict(zip(names, out[3].transpose(2, 0, 1), strict=True)))
+    return _dataset(case, plan, out, names, outcome, facts)
 
 
 def _checked(cases: Any, initial: Any) -> list[tuple[Case, State | None]]:
@@ -211,6 +214,22 @@ def _judged(
             stacklevel=3,
         )
     return outcome, off[bad]
+
+
+def _warn_of_stretch(case: Case, energies: Mapping[str, NDArray]) -> None:
+    """Warn of the motion in which bars hold most of the strain energy, if that is much."""
+    every = range(len(energies["kinetic"]))
+    found = [stretch(case.structure, {name: e[k] for name, e in energies.items()}) for k in every]
+    shares = [0.0 if one is None else one.share for one in found]
+    worst = int(np.argmax(shares))
+    if shares[worst]:
+        warnings.warn(
+            f"bars hold {shares[worst]:.0%} of the strain energy of cases[{worst}] where that is "
+            f"largest, the most of {np.count_nonzero(shares)} motions with more than {MOST:.0%}: "
+            f"{REMEDY}",
+            StretchWarning,
+            stacklevel=3,
+        )
 
 
 def _dataset(

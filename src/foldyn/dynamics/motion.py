@@ -38,9 +38,11 @@ from foldyn.errors import (
     FoldynWarning,
     InstabilityError,
     MotionInterrupted,
+    StretchWarning,
 )
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
+from foldyn.structures.stretching import REMEDY, stretch
 
 if TYPE_CHECKING:
     import xarray
@@ -109,7 +111,22 @@ class Motion:
             when = f"t = {self._output.time(crossings.first[0]):.6g} s"
             text = crossings.text(when, self.stored)
             warnings.warn(text, CrossingWarning, stacklevel=4)
-        return self._dataset(crossings)
+        result = self._dataset(crossings)
+        if text := self._stretch(result):
+            warnings.warn(text, StretchWarning, stacklevel=4)
+        return result
+
+    def _stretch(self, result: xarray.Dataset) -> str:
+        """Warning where bars hold much of the strain energy; empty otherwise."""
+        names = audited(self.case.energy_groups)
+        found = stretch(self.case.structure, {name: result[name].values for name in names})
+        if found is None:
+            return ""
+        at = float(result["time"][found.at])
+        return (
+            f"bars hold {found.share:.0%} of the strain energy where that is largest, at t = "
+            f"{at:.6g} s: {REMEDY}"
+        )
 
     def _judge(self) -> None:
         self.audit()

@@ -67,12 +67,7 @@ def _sentences(result: xarray.Dataset) -> Iterator[str]:
         )
     if "deflection" in result:
         yield _statics(result, best)
-    mesh = float(np.abs(result["mesh_error"].values[: below or None]).max())
-    if mesh > MESH:
-        yield (
-            f"The finer mesh of the shell is itself up to {size(mesh)} off what it tends to: "
-            "compare again with finer divisions."
-        )
+    yield from _mesh(result, below)
     yield SCOPE
 
 
@@ -130,7 +125,9 @@ def _statics(result: xarray.Dataset, best: Reach) -> str:
         f"{percent(error)} ({model})" if np.isfinite(error) else f"no stiffness at all ({model})"
         for model, error in told.items()
     )
-    return f"Displacements under its forces, if those are small: {', '.join(texts)}."
+    mesh = np.isnan(result["deflection_mesh_error"])
+    uncertain = "; those of the shell have not converged" if mesh else ""
+    return f"Displacements under its forces, if those are small: {', '.join(texts)}{uncertain}."
 
 
 def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
@@ -139,6 +136,23 @@ def reach(result: xarray.Dataset, model: str, below: int) -> Reach:
     bad = np.flatnonzero(error > LARGEST)
     count = int(bad[0]) if len(bad) else below
     return Reach(model, count, float(error[:count].max()) if count else float("inf"))
+
+
+def _mesh(result: xarray.Dataset, below: int) -> Iterator[str]:
+    """How far the shell itself may be off."""
+    error = np.abs(result["mesh_error"].values[: below or None])
+    unsettled = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(error)))
+    if unsettled:
+        yield (
+            f"The meshes of the shell have not converged for mode{'s' * (',' in unsettled)} "
+            f"{unsettled}: what is said of {'them' if ',' in unsettled else 'it'} is not certain; "
+            "compare again with finer divisions."
+        )
+    elif error.max() > MESH:
+        yield (
+            f"The finer mesh of the shell is itself about {size(float(error.max()))} off what it "
+            "tends to: compare again with finer divisions."
+        )
 
 
 def _missed(result: xarray.Dataset, best: Reach) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from foldyn.algebra.extrapolation import extrapolated
+from foldyn.algebra.extrapolation import convergence, extrapolated
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning, InputError, within
 from foldyn.linear.compared import OWN, Fidelity
@@ -64,7 +64,9 @@ def fidelity(
     The shell has the pattern, sheet, creases, supports, loads and masses of the case, and
     consistent mass. Its lowest elastic modes about rest, extrapolated from two meshes, are paired
     with those of each model by their MAC at the nodes that both have. Where forces act and
-    supports hold the sheet, displacements along small forces are compared too.
+    supports hold the sheet, displacements along small forces are compared too. A third mesh, half
+    as fine, shows with which order the shell converges, and so how far it is off, or that it has
+    not converged.
 
     Parameters
     ----------
@@ -74,8 +76,8 @@ def fidelity(
     count : int
         How many elastic modes of the shell.
     divisions : (int, int), optional
-        Pieces of every edge of the two shells: (6, 12), or fewer where the pattern has so many
-        panels that the shell would be large; a warning then says so.
+        Pieces of every edge of the two finer shells: (6, 12), or fewer where the pattern has so
+        many panels that the shell would be large; a warning then says so.
     models : sequence of str, or mapping of str to mapping, optional
         What stands beside the case's own model: names of `foldyn.linear.fidelity.MODELS`, by
         default those of them that take its other options, or arguments of `discretize` in place
@@ -126,8 +128,8 @@ class Comparison:
         As it was given.
     count : int
         How many modes of the shell.
-    shells : (Case, Case)
-        It with the coarser and with the finer shell, its forces alone as loads.
+    shells : (Case, Case, Case)
+        It with shells of three meshes, the finest last, its forces alone as loads.
     compared : mapping of str to Case
         It with each model, its own first, likewise.
     not_forces : tuple of int
@@ -137,7 +139,7 @@ class Comparison:
 
     case: Case
     count: int
-    shells: tuple[Case, Case]
+    shells: tuple[Case, Case, Case]
     compared: Mapping[str, Case]
     not_forces: tuple[int, ...]
     secant: float | None
@@ -145,9 +147,9 @@ class Comparison:
     def run(self, progress: Callable[[str], None] = lambda step: None) -> Fidelity:
         """Compute it; `progress` is told the steps, one by one."""
         began = time.perf_counter()
-        coarse, fine = (one.structure.options.divisions for one in self.shells)
-        progress(f"shell with {coarse} and {fine} divisions")
-        true = reference_modes(*self.shells, self.count + BEYOND)
+        divisions = [one.structure.options.divisions for one in self.shells]
+        progress("shell with {}, {} and {} divisions".format(*divisions))
+        true = reference_modes(self.shells, self.count + BEYOND)
         count = min(self.count, len(true.frequency))
         if not count:
             raise InputError(": nothing of its shell vibrates; free some of its nodes", "case")
@@ -175,7 +177,7 @@ class Comparison:
         facts = {
             "limit": BELOW * limit,
             "plate_frequency": limit,
-            "divisions": [coarse, fine],
+            "divisions": divisions[1:],
             "triangles": len(true.case.structure.triangles),
             "rigid": int((true.found["eigenvalue"] <= 0.0).sum()),
             "secant": self.secant,
@@ -197,16 +199,17 @@ class Comparison:
 
         held : names of the models that supports and hinges hold.
         """
-        coarse, fine = (one.structure.options.divisions for one in self.shells)
-        works = [small_loads(case).work for case in self.shells]
-        true = extrapolated(works[0], works[1], fine / coarse)
+        divisions = [one.structure.options.divisions for one in self.shells]
+        works = np.array([small_loads(case).work for case in self.shells])
+        true = extrapolated(works[1], works[2], divisions[2] / divisions[1])
+        limit = convergence(works[:, None], divisions).limit.item()
         own = np.array([
             small_loads(case, self.secant).work if name in held else np.inf
             for name, case in self.compared.items()
         ])  # fmt: skip
         return {
             "deflection": true / float(np.abs(rest_forces(self.compared[OWN])).sum()),
-            "deflection_mesh_error": works[1] / true - 1.0,
+            "deflection_mesh_error": works[2] / limit - 1.0,
             "deflection_error": own / true - 1.0,
         }
 
@@ -229,7 +232,7 @@ def comparison(
         with within("" if name == OWN else f"models: {name}: "):
             check_movable(held)
     coarse, fine = meshes(case.structure.pattern, divisions)
-    shells = shell_of(forces, coarse), shell_of(forces, fine)
+    shells = shell_of(forces, coarse // 2), shell_of(forces, coarse), shell_of(forces, fine)
     return Comparison(case, count, shells, compared, tuple(others), secant)
 
 

@@ -5,7 +5,6 @@ The static response of the modes left out completes those superposed.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,10 +50,8 @@ def direct(
     response = np.zeros((len(frequency), len(system.free)), np.complex128)
     for k, f in enumerate(frequency):
         omega = 2.0 * np.pi * f
-        matrix = dynamic_stiffness(system, omega)
-        for term in terms:
-            motion = solution(matrix, system.modal, omega, term.shape)
-            response[k] += motion * term.factor(omega)
+        load = np.sum([term.shape * term.factor(omega) for term in terms], axis=0)
+        response[k] = solve(dynamic_stiffness(system, omega), load, system.modal, 1j * omega)
         report(Progress(k + 1.0, float(len(frequency)), k + 1, 0.0))
     warn_at(frequency[np.isnan(response).any(axis=1)], RESONANCE)
     return Answer(response, {}, {})
@@ -66,23 +63,6 @@ def dynamic_stiffness(system: Linearized, omega: float) -> sparse.csc_array:
     if system.branches is not None:
         undamped = undamped + system.branches.stiffness(1j * omega)
     return sparse.csc_array(undamped + 1j * omega * system.damping)
-
-
-def solution(
-    matrix: sparse.csc_array, rows: NDArray, omega: float, load: NDArray
-) -> NDArray[np.complex128]:
-    """Solution x (nf,) of (A + i w G'G) x = load, A a sparse matrix, G the rows (r, nf).
-
-    With y = sqrt(i w) G x / s as further unknowns the matrix stays sparse, and symmetric, and may
-    be solved where A alone is singular: [A, a G'; a G, -s^2] with a = s sqrt(i w), any s > 0.
-    """
-    if not len(rows) or omega == 0.0:
-        return solve(matrix, load)
-    scale = math.sqrt(omega) * float(np.abs(rows).sum(axis=1).max()) or 1.0
-    across = sparse.csc_array(scale * np.sqrt(1j * omega) * rows)
-    corner = -(scale**2) * sparse.eye_array(len(rows))
-    bordered = sparse.block_array([[matrix, across.T], [across, corner]], format="csc")
-    return solve(bordered, np.concatenate([load, np.zeros(len(rows))]))[: len(load)]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from foldyn.algebra.eigen import SHIFT, Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.dynamics.progress import Reporter, reporter
-from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.excitation import Answer, absolute, drive_of
+from foldyn.errors import FoldynWarning, InputError, StretchWarning
+from foldyn.linear.excitation import NAMED, Answer, absolute, drive_of
 from foldyn.linear.frequency_domain import Direct, Modal, direct, modal
 from foldyn.linear.harmonic import REFERENCE, HarmonicBalance, harmonic
 from foldyn.linear.linearized import Linearized, linearize
@@ -26,6 +26,7 @@ from foldyn.memory import check_memory
 from foldyn.results import frf_dataset
 from foldyn.results.quantities import RESPONSES, variable
 from foldyn.signals import convert_response
+from foldyn.structures.stretching import MOST, REMEDY, resists_stretch, stretching
 from foldyn.values import choice, number, numbers, of_kind, suggest, whole
 
 if TYPE_CHECKING:
@@ -189,6 +190,7 @@ def frf(
             system = linearize(case, state, way.secant or secant, load_factor, internal)
             _warn_of_instability(system)
             answer = way.compute(system, driven, frequency, chosen, report)
+            _warn_of_stretch(system, frequency, answer.response)
             response, displacement = absolute(system, driven, answer.response), system.displacement
             own = {"soft_hinges": system.soft, "internal": system.internal or None}
         else:
@@ -222,6 +224,27 @@ def _warn_of_instability(system: Linearized) -> None:
             f"the state is an unstable equilibrium ({unstable} negative eigenvalues): a motion "
             "leaves it, and the response is that of the equations only",
             FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_stretch(system: Linearized, frequency: NDArray, response: NDArray) -> None:
+    """Warn where bars hold much of the strain energy of the response (m, nf) at a peak of it."""
+    structure, motion = system.case.structure, np.nan_to_num(response).T
+    if not resists_stretch(structure):
+        return
+    strain = np.einsum("im,im->m", motion.conj(), system.stiffness @ motion).real
+    beside = np.concatenate([[0.0], strain, [0.0]])
+    peaks = np.flatnonzero((strain > beside[:-2]) & (strain >= beside[2:]))
+    bars = stretching(structure, system.displacement, system.expanded(motion[:, peaks]))
+    told = bars > MOST * strain[peaks]
+    if told.any():
+        share = (bars[told] / strain[peaks[told]]).clip(max=1.0)
+        listed = ", ".join(f"{f:.4g}" for f in frequency[peaks[told]][:NAMED])
+        warnings.warn(
+            f"bars hold more than {MOST:.0%} of the strain energy of the response at {listed} Hz "
+            f"({share.max():.0%} at most), where peaks may lie far too high: {REMEDY}",
+            StretchWarning,
             stacklevel=3,
         )
 

@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.complex_symmetric import solve
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter
 from foldyn.errors import InputError
 from foldyn.linear.excitation import Answer, Drive, drive_terms, warn_at
-from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness, solution
+from foldyn.linear.frequency_domain import RESONANCE, dynamic_stiffness
 from foldyn.linear.linearized import Linearized, equivalent_slope
 from foldyn.materials import Superlinear
 from foldyn.values import number, whole
@@ -186,7 +187,7 @@ class _Balance:
         while len(slopes) < most and self.iterations < self.options.iterations:
             self.iterations += 1
             matrix = sparse.csc_array(self.stiffness + self.hinges.change(slope))
-            motion = solution(matrix, self.modal, self.omega, self.load)
+            motion = solve(matrix, self.load, self.modal, 1j * self.omega)
             if np.isnan(motion).any() or not len(slope):
                 return motion, slope
             if before is not None:

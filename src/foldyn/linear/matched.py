@@ -55,8 +55,6 @@ def matched(true: Reference, count: int, case: Case, found: xarray.Dataset) -> M
     if "between_shape" in found:
         own = np.concatenate([own, elastic(found, count + SPARE, "between_shape")[1]], axis=1)
     partner, mac = np.full(len(wanted), np.nan), np.zeros(len(wanted))
-    if not len(frequency):
-        return Matched(partner, partner, mac)
     for pair in pairs(wanted, shape[:count], frequency, own[:, seen], weights[seen]):
         mac[pair.first] = pair.mac
         if pair.mac >= LEAST:

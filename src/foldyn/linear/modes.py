@@ -21,13 +21,14 @@ from foldyn.algebra.eigen import EPS, Pencil, Spectrum, lowest
 from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import FoldynWarning
+from foldyn.errors import FoldynWarning, StretchWarning
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize
 from foldyn.memory import check_memory
 from foldyn.results import modes_dataset
 from foldyn.statics.rigid import free_rigid_motions, rigid_motions
 from foldyn.statics.stability import oriented
+from foldyn.structures.stretching import MOST, REMEDY, resists_stretch, stretching
 from foldyn.values import of_kind, whole
 
 if TYPE_CHECKING:
@@ -121,6 +122,7 @@ def modes(
     space, along = rigid_space(linear), _unit_translations(linear)
     spectrum = lowest(pencil, count, unresisted(linear, space), verify)
     _warn(spectrum)
+    _warn_of_stretch(linear, spectrum)
     statistics = {
         "count": count,
         "state": state if isinstance(state, str) else "rest" if state is None else "given",
@@ -253,6 +255,26 @@ def _warn(spectrum: Spectrum) -> None:
             f"the count of eigenvalues differs by {abs(spectrum.missed)} from the modes found: "
             "frequencies may be missing; ask for another count of modes",
             FoldynWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_stretch(linear: Linearized, spectrum: Spectrum) -> None:
+    structure = linear.case.structure
+    if not resists_stretch(structure):
+        return
+    bars = stretching(structure, linear.displacement, linear.expanded(spectrum.shapes))
+    share = np.divide(bars, spectrum.values, out=np.zeros_like(bars), where=spectrum.values > 0.0)
+    told = np.flatnonzero(share > MOST)
+    if len(told):
+        worst = told[share[told].argmax()]
+        numbers = ", ".join(str(k + 1) for k in told)
+        warnings.warn(
+            f"bars hold more than {MOST:.0%} of the strain energy of mode{'s' * (len(told) > 1)} "
+            f"{numbers} (mode {worst + 1}: {min(share[worst], 1.0):.0%}), and the "
+            f"{'frequencies' if len(told) > 1 else 'frequency'} may come out far too high: "
+            f"{REMEDY}",
+            StretchWarning,
             stacklevel=3,
         )
 

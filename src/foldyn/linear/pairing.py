@@ -60,6 +60,8 @@ def pairs(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> li
     """
     from scipy.optimize import linear_sum_assignment
 
+    if not len(fa) or not len(fb):
+        return []
     alike = likeness(fa, a, fb, b, mass)
     cost = 1.0 - alike + FREQUENCY_WEIGHT * np.abs(np.log(fb[None, :] / fa[:, None]))
     first, second = linear_sum_assignment(cost)

@@ -3,21 +3,79 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from foldyn.algebra.extrapolation import extrapolated
+from foldyn.algebra.extrapolation import convergence, extrapolated
 from foldyn.cases import Case
 from foldyn.errors import FoldynWarning
 from foldyn.linear.modes import modes
+from foldyn.linear.pairing import pairs
+from foldyn.structures.discretized import Discretized
 from foldyn.values import brief
 
-DIVISIONS = (6, 12)  # of every edge in the two meshes
+DIVISIONS = (6, 12)  # of every edge in the two meshes, beside which stands one half as fine
+SPARE = 3  # further modes of each mesh, which may change places with those that count
 RIGID = 6  # modes without stiffness that a sheet may have
 SAME_PLACE = 1e-6  # of the pattern's size: how near a node of the mesh must be
+
+
+class MeshModes(NamedTuple):
+    """Elastic modes of a shell on one mesh.
+
+    Attributes
+    ----------
+    structure : Discretized
+    frequency : (k,)
+        Hz, increasing.
+    shape : (k, n, 3)
+    found : xarray.Dataset
+        All as they were computed, rigid ones included; empty where nothing can move.
+    """
+
+    structure: Discretized
+    frequency: NDArray
+    shape: NDArray
+    found: xarray.Dataset
+
+    def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
+        """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
+        from scipy.spatial import cKDTree
+
+        apart, place = cKDTree(self.structure.nodes).query(nodes)
+        seen = np.flatnonzero(apart < SAME_PLACE * self.structure.pattern.size)
+        return seen, self.shape[:, place[seen]]
+
+
+def mesh_modes(case: Case, count: int) -> MeshModes:
+    """The lowest elastic modes on the mesh of a case: `count`, and a few to spare."""
+    structure = case.structure
+    if not len(case.free_dofs):  # of a coarse mesh
+        still = np.zeros((0, *structure.nodes.shape))
+        return MeshModes(structure, np.zeros(0), still, xarray.Dataset())
+    found = modes_at_rest(case, count + SPARE)
+    return MeshModes(structure, *elastic(found, count + SPARE), found)
+
+
+def same_modes(own: MeshModes, meshes: Sequence[MeshModes], count: int) -> NDArray[np.float64]:
+    """Frequencies (meshes, k) of the lowest modes on one mesh, and of the same ones on others.
+
+    Modes are paired by their shapes at the nodes that two meshes share, for a coarse mesh may
+    change the order of close ones. At most `count`; nan of modes that a mesh does not have.
+    """
+    first, k = own.frequency[:count], min(count, len(own.frequency))
+    frequencies = np.full((len(meshes), k), np.nan)
+    for row, mesh in zip(frequencies, meshes, strict=True):
+        seen, shape = own.at(mesh.structure.nodes)
+        weights = np.ones(len(seen))
+        for pair in pairs(first, shape[:k], mesh.frequency, mesh.shape[:, seen], weights):
+            row[pair.first] = mesh.frequency[pair.second]
+    return frequencies
 
 
 @brief
@@ -27,8 +85,11 @@ class Reference:
 
     Attributes
     ----------
-    frequency, coarse, fine : (k,)
-        Frequencies extrapolated from two meshes, and those of the meshes, Hz.
+    frequency : (k,)
+        Frequencies extrapolated from two meshes, Hz.
+    mesh_error : (k,)
+        Relative errors of the finer mesh by the order that it shows with two coarser ones; nan
+        where the meshes have not converged.
     shape : (k, n, 3)
         Shapes of the fine mesh.
     case : Case
@@ -38,25 +99,14 @@ class Reference:
     """
 
     frequency: NDArray
-    coarse: NDArray
-    fine: NDArray
+    mesh_error: NDArray
     shape: NDArray
     case: Case
     found: xarray.Dataset
 
-    @property
-    def mesh_error(self) -> NDArray:
-        """Relative errors (k,) of the fine mesh against the extrapolated frequencies."""
-        return self.fine / self.frequency - 1.0
-
     def at(self, nodes: NDArray) -> tuple[NDArray, NDArray]:
         """Which of points (m, 3) are nodes of the mesh (j,), and the shapes there (k, j, 3)."""
-        from scipy.spatial import cKDTree
-
-        structure = self.case.structure
-        apart, place = cKDTree(structure.nodes).query(nodes)
-        seen = np.flatnonzero(apart < SAME_PLACE * structure.pattern.size)
-        return seen, self.shape[:, place[seen]]
+        return MeshModes(self.case.structure, self.frequency, self.shape, self.found).at(nodes)
 
 
 def elastic(
@@ -86,20 +136,20 @@ def modes_at_rest(
         asked = min(max(asked + missing, 2 * asked), most)
 
 
-def reference_modes(coarse: Case, fine: Case, count: int) -> Reference:
-    """The lowest elastic modes of a shell, from two meshes of it, held alike.
+def reference_modes(cases: Sequence[Case], count: int) -> Reference:
+    """The lowest elastic modes of a shell, from three meshes of it, held alike.
 
     Parameters
     ----------
-    coarse, fine : Case
-        Shells of different `divisions`.
+    cases : (Case, Case, Case)
+        Shells of increasing `divisions`. The last two give the frequencies, all three their error.
     count : int
-        How many modes, if both have as many.
+        How many modes, if those two have as many.
     """
-    (low, _), found = elastic(modes_at_rest(coarse, count), count), modes_at_rest(fine, count)
-    high, shape = elastic(found, count)
-    k = min(len(low), len(high))
-    ratio = fine.structure.options.divisions / coarse.structure.options.divisions
-    limit = extrapolated(low[:k], high[:k], ratio)
+    _, coarse, fine = meshes = [mesh_modes(case, count) for case in cases]
+    values = same_modes(fine, meshes, min(count, len(coarse.frequency)))
+    divisions = [case.structure.options.divisions for case in cases]
+    limit = extrapolated(values[1], values[2], divisions[2] / divisions[1])
+    error = values[2] / convergence(values, divisions).limit - 1.0
     rank = np.argsort(limit, kind="stable")  # which close modes of a coarse mesh may change
-    return Reference(limit[rank], low[rank], high[rank], shape[rank], fine, found)
+    return Reference(limit[rank], error[rank], fine.shape[rank], cases[-1], fine.found)

@@ -144,10 +144,10 @@ def meshes(pattern: Pattern, given: Sequence[int] | None) -> tuple[int, int]:
 
 
 def checked_divisions(given: Any, name: str = "divisions") -> tuple[int, int]:
-    """Two increasing whole numbers."""
+    """Two increasing whole numbers, from 2: a mesh of half the first stands beside them."""
     if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 2:
         raise InputError(f" = {show(given)}: give two numbers, as in (6, 12)", name)
-    coarse, fine = (whole(name, value, least=1) for value in given)
+    coarse, fine = (whole(name, value, least=2) for value in given)
     if coarse >= fine:
         raise InputError(f" = {show(given)}: the second mesh must be the finer one", name)
     return coarse, fine

@@ -120,7 +120,7 @@ ESTIMATES: Mapping[str, Quantity] = {
 """and what its method adds to it."""
 FIDELITY: Mapping[str, Quantity] = {
     "frequency": Quantity("Hz", "frequency of the shell, extrapolated from its meshes", ("mode",)),
-    "mesh_error": Quantity("1", "error of the finer mesh against that", ("mode",)),
+    "mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)", ("mode",)),
     "error": Quantity("1", "error of a frequency (infinite: lost)", ("mode", "model")),
     "mac": Quantity("1", "MAC with the mode of the shell", ("mode", "model")),
     "options": Quantity(text="arguments of discretize", dims=("model",)),
@@ -129,7 +129,7 @@ FIDELITY: Mapping[str, Quantity] = {
     "model_seconds": Quantity("s", "time for the modes of a model", ("model",)),
     "cost_ratio": Quantity("1", "time of the shell over that of a model", ("model",)),
     "deflection": Quantity("m", "displacement of the shell along small loads, extrapolated"),
-    "deflection_mesh_error": Quantity("1", "error of the finer mesh against that"),
+    "deflection_mesh_error": Quantity("1", "error of the finest mesh (nan: not converged)"),
     "deflection_error": Quantity("1", "error of the displacement (infinite: soft)", ("model",)),
 }
 """What a comparison of models with the shell holds, the last three where forces act on it."""

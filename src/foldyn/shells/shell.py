@@ -32,6 +32,7 @@ from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.mesh import lengths
+from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.rigid_plates import Plate, check_welds, checked_panels, rigid_plates
 from foldyn.structures.swelling import Swelling, chord_turns
 from foldyn.values import choice, show, whole
@@ -98,12 +99,13 @@ class Shell(Discretized):
         )
 
     @property
-    def coarser(self) -> Shell | None:
-        """The same with half as many pieces of every edge; None of one piece."""
-        half = self.options.divisions // 2
-        if not half:
-            return None
-        return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=half)))
+    def divisions(self) -> int:
+        """Pieces of every edge."""
+        return self.options.divisions
+
+    def meshed(self, divisions: int) -> Shell:
+        """The same with so many pieces of every edge."""
+        return shell(self.pattern, self.sheet, **vars(replace(self.options, divisions=divisions)))
 
     kind: ClassVar[str] = "shell"
     energy_groups: ClassVar[Mapping[str, str]] = GROUPS
@@ -361,6 +363,7 @@ def shell(
     <Shell: 45 nodes, 64 triangles, 1 folds, mass lumped>
     """
     pattern, sheet = checked_kinds(pattern, sheet)
+    doubt_units(pattern, sheet)
     divisions = whole("divisions", divisions, least=1)
     choice("mass", mass, MASSES)
     hinge_law(fold_law, "fold_law")

@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.errors import ComputationError, CrossingWarning, FoldynWarning, MotionInterrupted
+from foldyn.errors import (
+    ComputationError,
+    CrossingWarning,
+    FoldynWarning,
+    MotionInterrupted,
+    StretchWarning,
+)
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
 from foldyn.results import path_dataset
 from foldyn.results.crossings import crossings_of
@@ -34,6 +40,7 @@ from foldyn.statics.stepping import (
 )
 from foldyn.structures.locking import kept_apart, locks
 from foldyn.structures.mesh import hinge_angles
+from foldyn.structures.stretching import REMEDY, stretch
 
 if TYPE_CHECKING:
     import xarray
@@ -196,6 +203,8 @@ def _dataset(
         at = int(crossings.first[0])
         when = f"point {at} (load factor {points[at].factor:.6g})"
         warnings.warn(crossings.text(when, len(points)), CrossingWarning, stacklevel=5)
+    if message := _stretch_warning(problem, points, energies):
+        warnings.warn(message, StretchWarning, stacklevel=5)
     own = "an adaptive load, a function of the user's own, acted on it"
     result = path_dataset(
         problem.case,
@@ -227,6 +236,20 @@ def _dataset(
         (own,) if adaptive else (),
     )
     return crossings.recorded(result)
+
+
+def _stretch_warning(
+    problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray]
+) -> str:
+    """Warning where bars hold much of the strain energy; empty otherwise."""
+    by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
+    found = stretch(problem.structure, by_group)
+    if found is None:
+        return ""
+    return (
+        f"bars hold {found.share:.0%} of the strain energy where that is largest, at point "
+        f"{found.at} (load factor {points[found.at].factor:.6g}): {REMEDY}"
+    )
 
 
 def _recorded(

@@ -14,7 +14,7 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.structures import calibration
 from foldyn.structures.mesh import hinge_angles, lengths
 from foldyn.structures.sheet import Sheet
-from foldyn.values import number, number_or_list, numbers, show
+from foldyn.values import doubt_degrees, number, number_or_list, numbers, show
 
 PerCrease = float | Sequence[float] | Mapping[str, float] | None
 
@@ -65,6 +65,7 @@ def fold_rest(
         raise InputError(
             f"crease_rest = {closed[0]:g}: must lie between 0 and 360 degrees (flat: 180)"
         )
+    doubt_degrees("crease_rest", degrees[chosen])
     rest, given_there = np.radians(degrees)[crease], chosen[crease]
     if given_there.all():
         return rest

@@ -21,6 +21,7 @@ from foldyn.structures.creases import PerCrease, fold_rest, fold_stiffness
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
+from foldyn.structures.plausibility import doubt_units
 from foldyn.structures.presets import resolved
 from foldyn.structures.rigid_plates import check_welds, checked_panels, rigid_panels
 from foldyn.structures.sheet import Sheet
@@ -106,6 +107,12 @@ def discretize(
     InputError
         An argument out of range, a panel that cannot be cut, a crease closed at rest.
 
+    Warns
+    -----
+    UnitsWarning
+        The sheet's numbers are probably not in SI units: as thick as a fifth of an edge, or with
+        a wave speed that no material has.
+
     Examples
     --------
     >>> import foldyn as fd
@@ -115,6 +122,7 @@ def discretize(
     [0.0503]
     """
     pattern, sheet = checked_kinds(pattern, sheet)
+    doubt_units(pattern, sheet)
     edges = boundary_edges(clamped, pattern, "clamped")
     options = resolved(
         preset, welds=len(pattern.welds) > 0, scheme=scheme, mass=mass,

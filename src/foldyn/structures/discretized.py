@@ -170,9 +170,13 @@ class Discretized:
         return read_only(np.array(self.pattern.lines))
 
     @property
-    def coarser(self) -> Discretized | None:
-        """The same with a coarser mesh, for those that have one."""
+    def divisions(self) -> int | None:
+        """Pieces of every edge in its mesh; None without one."""
         return None
+
+    def meshed(self, divisions: int) -> Discretized:
+        """The same with another mesh, for those that have one."""
+        raise NotImplementedError
 
     @property
     def condensed(self) -> Discretized | None:

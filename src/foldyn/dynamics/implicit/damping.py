@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.algebra.woodbury import Updated
 from foldyn.mechanics.tangent import block_keys
 from foldyn.mechanics.viscous import WIDTH, Viscous, put_gradients
 
@@ -87,18 +88,4 @@ class ModalTerm:
         """Factors of the sum."""
         if not len(self._rows) or weights.damping == 0.0:
             return factors
-        return _Woodbury(factors, self._rows, weights.damping)
-
-
-class _Woodbury:
-    """Solves (A + w G'G) x = b with the factors of A."""
-
-    def __init__(self, factors: Any, rows: NDArray, weight: float) -> None:
-        self._factors, self._rows = factors, rows
-        self._moved = np.stack([factors.solve(row.copy()) for row in rows], axis=1)
-        self._small = np.eye(len(rows)) / weight + rows @ self._moved
-
-    def solve(self, b: NDArray) -> NDArray:
-        """Solution x."""
-        x = self._factors.solve(b)
-        return x - self._moved @ np.linalg.solve(self._small, self._rows @ x)
+        return Updated(factors, self._rows, weights.damping)

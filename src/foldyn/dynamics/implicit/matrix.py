@@ -5,9 +5,7 @@ puts the entries between free dofs straight into what is factorized: a band with
 along the sheet or, where that would be too wide, a sparse matrix.
 
 Modal damping, a product with rows G of all dofs, would fill the matrix. It is added to what is
-factorized, A, by Woodbury's formula,
-
-    (A + w G'G)^-1 = A^-1 - A^-1 G' (1/w + G A^-1 G')^-1 G A^-1.
+factorized by Woodbury's formula.
 """
 
 from __future__ import annotations

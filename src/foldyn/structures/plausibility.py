@@ -1,0 +1,65 @@
+"""Sheets whose numbers are probably in other units than SI: told, and computed all the same."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+from foldyn.errors import UnitsWarning
+from foldyn.patterns import Pattern
+from foldyn.structures.sheet import Sheet
+
+THICK = 0.2  # of the shortest edge of a panel: no thin sheet any more
+SLOWEST, FASTEST = 10.0, 25e3  # m/s, sqrt(E / rho): from soft gels to diamond
+USUAL = 2000.0  # m/s
+PRESSURES = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+DENSITIES = {"g/cm3": 1e3, "t/mm3": 1e12}
+
+
+def doubt_units(pattern: Pattern, sheet: Sheet) -> None:
+    """Warn of a thickness or a wave speed that no sheet of such panels has."""
+    for text in _doubts(pattern, sheet):
+        warnings.warn(text, UnitsWarning, stacklevel=3)
+
+
+def _doubts(pattern: Pattern, sheet: Sheet) -> Iterator[str]:
+    x, count = pattern.vertices, len(pattern.faces)
+    loops = (x[list(face)] for face in pattern.faces)
+    shortest = np.array([
+        np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).min() for loop in loops
+    ])  # fmt: skip
+    thickness = sheet.values("thickness", count)
+    thick = thickness / shortest
+    worst = int(thick.argmax())
+    if thick[worst] > THICK:
+        yield (
+            f"sheet: thickness = {thickness[worst]:g} m is {thick[worst]:.2g} times the shortest "
+            f"edge of panel {worst}, {shortest[worst]:.3g} m, which is no thin sheet (at most "
+            f"{THICK:g}): lengths are in m; if the thickness is meant in mm, give "
+            f"{1e-3 * thickness[worst]:g}"
+        )
+    modulus, density = (sheet.values(name, count) for name in ("youngs_modulus", "density"))
+    speed = np.sqrt(modulus / density)  # nan without a density
+    wrong = np.flatnonzero((speed < SLOWEST) | (speed > FASTEST))
+    if len(wrong):
+        k = int(wrong[0])
+        yield (
+            f"sheet: youngs_modulus = {modulus[k]:g} Pa with density = {density[k]:g} kg/m3: sound "
+            f"would travel at {speed[k]:.3g} m/s in it, but does so at {SLOWEST:g} to {FASTEST:g} "
+            f"m/s in all materials; {_meant(modulus[k], density[k], speed[k])}"
+        )
+
+
+def _meant(modulus: float, density: float, speed: float) -> str:
+    """What makes the speed that of usual materials."""
+    slow = speed < SLOWEST
+    factors = PRESSURES if slow else DENSITIES
+
+    def off(unit: str) -> float:
+        return abs(np.log(speed / USUAL) + (0.5 if slow else -0.5) * np.log(factors[unit]))
+
+    unit = min(factors, key=off)
+    name, value = ("youngs_modulus", modulus) if slow else ("density", density)
+    return f"if {name} is meant in {unit}, give {value * factors[unit]:g}"

@@ -1,0 +1,109 @@
+"""Numbers that are probably in other units: told, with what was probably meant."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import UnitsWarning
+from foldyn.studies import find_case, shipped_cases
+
+SMALL = fd.patterns.miura(cells=(1, 1), a=0.04, b=0.04, panel_angle=60, dihedral=60)
+STEEL = (2e11, 0.3, 1e-4, 7850.0)
+
+
+def told(compute) -> list[str]:
+    """What is said of units."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        compute()
+    return [str(one.message) for one in caught if one.category is UnitsWarning]
+
+
+@pytest.mark.parametrize("model", [fd.discretize, fd.shell])
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((2e11, 0.3, 0.3, 7850.0), "thickness = 0.3 m is 7.5 times the shortest .* give 0.0003$"),
+        ((200.0, 0.3, 1e-4, 7850.0), "200 Pa .* at 0.16 m/s .* meant in GPa, give 2e[+]11$"),
+        ((3500.0, 0.3, 1e-4, 1200.0), "3500 Pa .* at 1.71 m/s .* meant in MPa, give 3.5e[+]09$"),
+        ((2e11, 0.3, 1e-4, 7.85), "7.85 kg/m3: .* if density is meant in g/cm3, give 7850$"),
+        ((2e11, 0.3, 1e-4, 7.85e-9), "if density is meant in t/mm3, give 7850$"),
+    ],
+)
+def test_sheets(model, given, message):
+    with pytest.warns(UnitsWarning, match=message) as caught:
+        model(SMALL, fd.Sheet(*given))
+    assert len(caught) == 1
+
+
+def test_a_panel_of_its_own():
+    thick = fd.PanelSheet([2], thickness=0.1)
+    (text,) = told(lambda: fd.discretize(SMALL, fd.Sheet(*STEEL, panels=[thick])))
+    assert "thickness = 0.1 m is 2.5 times the shortest edge of panel 2, 0.04 m" in text
+
+
+@pytest.mark.parametrize("density", [None, 1.0, 1000.0])
+def test_sheets_of_the_paper(density):
+    sheet = fd.Sheet(1e6, 0.25, 0.01, density)
+    assert told(lambda: fd.discretize(fd.patterns.miura(), sheet)) == []
+
+
+@pytest.mark.parametrize("name", shipped_cases())
+def test_shipped_cases(name):
+    case_file = fd.read_case(find_case(name))
+    assert told(lambda: case_file.case(case_file.masses[0])) == []
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: fd.patterns.miura(panel_angle=np.pi / 3), "panel_angle = 1.0472 is pi/3, .* 60 "),
+        (lambda: fd.patterns.miura(dihedral=2.0944), "dihedral = 2.0944 is 2 pi/3, .* give 120 "),
+        (lambda: fd.patterns.kresling(twist=-np.pi / 9), "twist = 0.34907 is pi/9, .* give 20 "),
+        (lambda: fd.Actuate("all", angle=np.pi), "angle = 3.1416 is pi, .* give 180 "),
+        (lambda: fd.Actuate("all", fold_angle=[0.0, np.pi / 2]), "fold_angle = 1.5708 is pi/2"),
+        (
+            lambda: fd.discretize(SMALL, fd.Sheet(*STEEL), crease_rest=np.pi / 4),
+            "crease_rest = 0.785.* is pi/4, .* give 45 ",
+        ),
+    ],
+)
+def test_radians(make, message):
+    with pytest.warns(UnitsWarning, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    "angle", [0.1, 0.5, 1, 1.05, 1.5, 1.57, 2, 2.5, 3, 3.14, 3.5, 4, 5, 5.5, 6, 6.3, 7, 9.42478]
+)
+def test_small_angles_in_degrees(angle):
+    assert told(lambda: fd.patterns.simple_fold(dihedral=angle)) == []
+    assert told(lambda: fd.Actuate("all", angle=[angle, 120.0])) == []
+
+
+def test_a_case_file_says_it_once(tmp_path, capsys):
+    from foldyn.cli.main import main
+
+    text = """
+[pattern]
+kind = "miura"
+panel_angle = 1.0471975511965976
+[sheet]
+youngs_modulus = 200.0
+poissons_ratio = 0.3
+thickness = 0.01
+density = 1000.0
+[[supports]]
+nodes = "xmin"
+[analysis]
+kind = "modes"
+"""
+    (tmp_path / "case.toml").write_text(text)
+    main(["run", str(tmp_path / "case.toml"), "--no-figures", "--out", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert said.count("is pi/3, but angles are in degrees: give 60") == 1
+    assert said.count("if youngs_modulus is meant in MPa, give 2e+08") == 1

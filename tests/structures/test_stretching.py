@@ -1,0 +1,102 @@
+"""Where bars hold much of the strain energy, which they resist too much: that is told, once."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import StretchWarning
+from foldyn.structures.stretching import stretch, stretching
+from foldyn.studies import find_case
+
+SHEET = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
+LINEAR = {"bar_law": "linear", "fold_law": "linear", "bend_law": "linear"}
+MIURA = fd.patterns.miura(cells=(1, 1), a=1.0, b=1.0, panel_angle=60, dihedral=60)
+TOWER = fd.patterns.kresling(sides=6, radius=1.0, height=0.9, twist=30)
+FOLDING = [fd.Fix([0, 1, 2], "x"), fd.Fix([1], "y"), fd.Fix([0, 2, 6, 8], "z")]
+
+
+def told(compute) -> list[str]:
+    """What is said of bars that stretch."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        compute()
+    return [str(one.message) for one in caught if one.category is StretchWarning]
+
+
+def held(pattern, supports, model=fd.discretize, loads=(), **options) -> fd.Case:
+    options = options or {"mass": "circumcenter", "preset": "herkal", **LINEAR}
+    return fd.Case(model(pattern, SHEET, **options), supports, loads, fd.Rayleigh(0.5))
+
+
+def test_the_share_in_a_mode_is_that_of_its_energies():
+    """Half the difference quotient of the energies of bars and of all, along the shape."""
+    case = held(MIURA, FOLDING)
+    found = fd.modes(case, 27)
+    body, shapes = case.body, found["shape"].values
+    bars = stretching(case.structure, 0.0 * shapes[0], shapes.reshape(len(shapes), -1).T)
+    for shape, mine, value in zip(shapes, bars, found.eigenvalue.values, strict=True):
+        step = 1e-7 / np.abs(shape).max()
+        energies = body.energies(body.dofs(step * shape))
+        assert 2.0 * energies.sum() / step**2 == pytest.approx(value, rel=1e-4)
+        assert 2.0 * energies[0] / step**2 == pytest.approx(mine, rel=1e-3, abs=1e-6 * value)
+    share = bars / found.eigenvalue.values
+    assert share[:3].max() < 0.01 and share[-1] > 0.9
+
+
+def test_modes():
+    assert told(lambda: fd.modes(held(MIURA, FOLDING), 6)) == []
+    tower = held(TOWER, [fd.Fix("zmin")])
+    (text,) = told(lambda: fd.modes(tower, 3))
+    assert text.startswith("bars hold more than 5% of the strain energy of modes 1, 2, 3 (mode ")
+    assert "foldyn fidelity" in text and "--model shell" in text
+    assert told(lambda: fd.modes(held(TOWER, [fd.Fix("zmin")], fd.shell, divisions=2), 3)) == []
+
+
+def test_frequency_responses():
+    first = fd.modes(held(MIURA, FOLDING), 1).frequency.values[0]
+    f = first * np.linspace(0.5, 1.5, 41)
+    push = fd.Force([7], (1.0, 0, 0))
+    assert told(lambda: fd.frf(held(MIURA, FOLDING), push, f)) == []
+    tower = held(TOWER, [fd.Fix("zmin")])
+    f = fd.modes(tower, 1).frequency.values[0] * np.linspace(0.9, 1.1, 41)
+    (text,) = told(lambda: fd.frf(tower, fd.Force([6], (0, 0, 1.0)), f))
+    assert text.startswith("bars hold more than 5% of the strain energy of the response at ")
+    assert float(text.split(" at ")[1].split()[0]) == pytest.approx(f[20], rel=0.02)
+
+
+def test_paths_and_motions():
+    push = [fd.Force([7], (0.01, 0, 0), fd.HalfSine(0.5))]
+    case = held(MIURA, FOLDING, loads=push)
+    assert told(lambda: fd.trace(case, "newton", [0.0, 1.0])) == []
+    assert told(lambda: fd.simulate(case, 0.5, "rk4")) == []
+    load = [fd.Force(list(range(6, 12)), (0, 0, -1e-3))]
+    tower = held(TOWER, [fd.Fix("zmin")], loads=load)
+    (text,) = told(lambda: fd.trace(tower, "newton", [0.0, 1.0]))
+    assert text.startswith("bars hold 100% of the strain energy where that is largest, at point 1")
+    (text,) = told(lambda: fd.simulate(tower, 0.05, "rk4"))
+    assert "of the strain energy where that is largest, at t = 0.0" in text
+
+
+@pytest.mark.parametrize(("name", "count"), [("kresling", 1), ("miura-bending", 0)])
+def test_shipped_cases(name, count):
+    assert len(told(lambda: fd.read_case(find_case(f"gallery/{name}")).run())) == count
+
+
+def test_what_is_not_told():
+    """Bars by hand, which are what they are; a body that hardly strains; nothing but rounding."""
+    s = held(MIURA, FOLDING).structure
+    bars, folds = np.array([0.0, 9.0]), np.array([0.0, 1.0])
+    of = {"strain_bars": bars, "strain_folds": folds, "strain_bends": folds}
+    assert stretch(s, of) == (1, 9.0 / 11.0)
+    assert stretch(s, of | {"kinetic": np.array([1e5])}) is None
+    assert stretch(s, {name: 1e-20 * energy for name, energy in of.items()}) is None
+    assert stretch(s, of | {"strain_bars": 0.01 * bars}) is None
+    by_hand = fd.Structure(s.nodes, s.bars, s.bar_area, s.sheet)
+    assert stretch(by_hand, of) is None
+    turning = fd.State(0.0 * s.nodes, np.cross([0.0, 0.0, 1.0], s.nodes - s.nodes.mean(axis=0)))
+    free = fd.Case(s)
+    assert told(lambda: fd.simulate(free, 0.2, "rk4", initial=turning)) == []
