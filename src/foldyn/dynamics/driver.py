@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -76,7 +77,8 @@ def simulate(
         Simulated time (s). The last step is the last that does not go beyond it.
     method : str, default "rk4"
         Integrator, a name of `foldyn.dynamics.METHODS`, or "auto" for the one that should be
-        quickest: the documentation has a page on them.
+        quickest, and another one where its energies do not balance: the documentation has a page on
+        them.
     dt : float, optional
         Time step (s). Explicit methods: without it half the critical step, shortened to divide
         `every`. Implicit methods and `dormand_prince`, which choose their steps by their error:
@@ -138,7 +140,8 @@ def simulate(
     Warns
     -----
     FoldynWarning
-        The energy balance is off by more than 1 % of the energies at play.
+        The energy balance is off by more than 1 % of the energies at play; or was, and "auto"
+        has computed the motion anew.
     CrossingWarning
         Panels pass through each other at a sample that was looked at.
 
@@ -195,13 +198,18 @@ def prepare(
     check_touching(case, u, float(start))
     remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
-    reason = ""
+    reason, better = "", None
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
-        method, reason = choose(
+        chosen = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
         )
-        integrator = method_of(method)
+        integrator, reason = method_of(chosen.method), chosen.reason
+        if chosen.better:
+            better = partial(
+                prepare, case, duration, chosen.better, dt, every, initial, force, tolerance, start,
+                None, sample, kept,
+            )  # fmt: skip
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
@@ -242,7 +250,7 @@ def prepare(
     packed = pack(case, span, u, modal)
     sampler = Sampler(case, sample or {}, u, v, plan.start, contact_quantities(case))
     state = u, v, remembered, initial.continuation if initial else None
-    return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason)
+    return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason, better)
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:

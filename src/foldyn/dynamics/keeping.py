@@ -97,6 +97,11 @@ class Keeping:
             result.close()
         return result if same else None
 
+    def keeps(self, about: Mapping[str, Any]) -> bool:
+        """Whether what is kept is this motion."""
+        kept = self._read()
+        return kept is not None and kept[_ABOUT]["motion"] == json.loads(json.dumps(about))
+
     def begin(
         self, about: Mapping[str, Any], rows: Mapping[str, tuple[int, ...]]
     ) -> dict[str, NDArray] | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
-from foldyn.dynamics.doubts import doubts
+from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
-from foldyn.dynamics.identity import identity, key_of
+from foldyn.dynamics.identity import identity as identity_of
+from foldyn.dynamics.identity import key_of
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.keeping import KEY, Keeping
 from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
@@ -61,11 +63,12 @@ class Motion:
     def __init__(
         self, case: Case, method: Integrator, plan: StepPlan, critical: float, force: bool,
         state: tuple[NDArray, NDArray, NDArray | str | None, Continuation | None], packed: Packed,
-        sampler: Sampler, reason: str = "",
+        sampler: Sampler, reason: str = "", better: Callable[[], Motion] | None = None,
     ) -> None:  # fmt: skip
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._state, self.packed, self._sampler = state, packed, sampler
+        self._better = better
         self._rounding = Rounding(packed.body)
         self._engine: Engine | None = None
         self._ended = int(Outcome.DONE), -1
@@ -92,8 +95,11 @@ class Motion:
         What is kept on the disk meanwhile stays there, with the samples of the result where there
         are many, until the result is saved.
         """
+        if keeping is not None and keeping.resume and self._other is not None:
+            if keeping.keeps(self._other.identity()):
+                return self._other.run(progress, keeping)
         self._integrated(progress, keeping)
-        return self.result()
+        return self.result(progress)
 
     def samples(self, progress: bool | Reporter | None = None) -> Samples:
         """Integrate the motion; its samples alone, which do not carry the case."""
@@ -101,8 +107,14 @@ class Motion:
         self._judge()
         return self._output.written(self.stored)
 
-    def result(self) -> xarray.Dataset:
-        """What was integrated, with the warnings that it deserves."""
+    def result(self, progress: bool | Reporter | None = None) -> xarray.Dataset:
+        """What was integrated, with the warnings that it deserves.
+
+        Where the energies do not balance and there is a better method, it is computed anew.
+        """
+        self.audit()
+        if self._better is not None and is_off(self._output.balance, self._rounding):
+            return self._anew(progress)
         self._judge()
         crossings = self._crossings()
         if len(crossings.first):
@@ -110,6 +122,30 @@ class Motion:
             text = crossings.text(when, self.stored)
             warnings.warn(text, CrossingWarning, stacklevel=4)
         return self._dataset(crossings)
+
+    @cached_property
+    def _other(self) -> Motion | None:
+        """The same motion by the better method, if there is one."""
+        if self._better is None:
+            return None
+        other, off = self._better(), f"was off by more than {INACCURATE:.0%}"
+        other.reason = f"{self.reason}; anew, since the energy balance of {self.method.name} {off}"
+        return other
+
+    def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
+        assert self._other is not None
+        name = self._other.method.name
+        warnings.warn(
+            f"the motion is computed anew with {name}: with {self.method.name}, which auto chose, "
+            f"its energy balance is off by {self._output.balance.relative:.1%} of the energies at "
+            f'play; method = "{name}" saves the first attempt',
+            FoldynWarning,
+            stacklevel=5,
+        )
+        self._start()  # gives its samples' memory back
+        if self._keeping is not None:
+            self._keeping.remove()
+        return self._other.run(progress, self._keeping)
 
     def _judge(self) -> None:
         self.audit()
@@ -241,11 +277,14 @@ class Motion:
     def _identity(self) -> dict[str, Any]:
         *state, continued = self._state
         state.append(continued.values if continued else None)
-        return identity(self.case, self.method, self.plan, state, self._sampler.rows)
+        return identity_of(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
         """Its result, if it is finished and to be gone on with."""
-        return keeping.finished(key_of(self._identity()))
+        found = keeping.finished(key_of(self.identity()))
+        if found is None and keeping.resume and self._other is not None:
+            return self._other.finished(keeping)
+        return found
 
     def _fits(self, length: int) -> int:
         """Steps, at most `length`, for whose samples there is room."""
@@ -268,7 +307,7 @@ class Motion:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
         if self._keeping is None:
             return 0.0
-        about = self._identity() | {"threads": engine.threads}
+        about = self.identity() | {"threads": engine.threads}
         kept = self._keeping.begin(about, self._output.rows)
         if kept is None:
             return 0.0
@@ -340,7 +379,7 @@ class Motion:
             self._continuations(),
         )  # fmt: skip
         if self._keeping is not None:
-            result.attrs[KEY] = key_of(self._identity())
+            result.attrs[KEY] = key_of(self.identity())
         return crossings.recorded(self._output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
