@@ -25,7 +25,7 @@ from foldyn.dynamics.initial import (
     warn_of_unstable_damping,
 )
 from foldyn.dynamics.keeping import SECONDS, check_keeping
-from foldyn.dynamics.method_choice import AUTO, choose
+from foldyn.dynamics.method_choice import AUTO, Choice, choose
 from foldyn.dynamics.methods import Integrator, method_of, suited, with_mass
 from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
@@ -48,6 +48,7 @@ TOLERANCE = 1e-6  # relative error of a step that is chosen by it
 IMPLICIT_TOLERANCE = 1e-5  # the same of methods of order 2: 130 steps in a vibration's period
 LARGEST_STEP = 1e-3  # of the largest step: one that is short against loads that steps resolve
 FLOOR = 1e-8  # of the longest bar: the least displacement that errors are measured by
+FINER = 4  # times shorter steps where those of central differences were too long
 SPAN = 0.05  # of a step: distance of the points between which a user's history is differentiated
 
 
@@ -198,18 +199,13 @@ def prepare(
     check_touching(case, u, float(start))
     remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
-    reason, better = "", None
+    chosen = Choice(integrator.name, "")
     if method == AUTO:
         timing.counted_in_seconds(duration, every)
         chosen = choose(
             case, u, v, float(start), duration, dt, every, tolerance, IMPLICIT_TOLERANCE, modal
         )
-        integrator, reason = method_of(chosen.method), chosen.reason
-        if chosen.better:
-            better = partial(
-                prepare, case, duration, chosen.better, dt, every, initial, force, tolerance, start,
-                None, sample, kept,
-            )  # fmt: skip
+        integrator = method_of(chosen.method)
     integrator = _with_radius(integrator, spectral_radius)
     if not integrator.implicit or not is_lumped(case.mass):
         check_mass(case.mass, case.constraints.determined)
@@ -250,7 +246,17 @@ def prepare(
     packed = pack(case, span, u, modal)
     sampler = Sampler(case, sample or {}, u, v, plan.start, contact_quantities(case))
     state = u, v, remembered, initial.continuation if initial else None
-    return Motion(case, integrator, plan, critical, force, state, packed, sampler, reason, better)
+    better = None
+    if chosen.better:
+        if chosen.better == chosen.method:
+            dt, every = plan.dt / FINER, plan.every * FINER
+        better = partial(
+            prepare, case, duration, chosen.better, dt, every, initial, force, tolerance, start,
+            None, sample, kept,
+        )  # fmt: skip
+    return Motion(
+        case, integrator, plan, critical, force, state, packed, sampler, chosen.reason, better
+    )
 
 
 def _with_radius(method: Integrator, spectral_radius: float | None) -> Integrator:

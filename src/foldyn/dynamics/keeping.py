@@ -99,8 +99,8 @@ class Keeping:
 
     def keeps(self, about: Mapping[str, Any]) -> bool:
         """Whether what is kept is this motion."""
-        kept = self._read()
-        return kept is not None and kept[_ABOUT]["motion"] == json.loads(json.dumps(about))
+        kept, now = self._read(), json.loads(json.dumps(about))
+        return kept is not None and now.items() <= kept[_ABOUT]["motion"].items()
 
     def begin(
         self, about: Mapping[str, Any], rows: Mapping[str, tuple[int, ...]]

@@ -16,8 +16,7 @@ from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
 from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
-from foldyn.dynamics.identity import identity as identity_of
-from foldyn.dynamics.identity import key_of
+from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
 from foldyn.dynamics.keeping import KEY, Keeping
 from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
@@ -95,9 +94,9 @@ class Motion:
         What is kept on the disk meanwhile stays there, with the samples of the result where there
         are many, until the result is saved.
         """
-        if keeping is not None and keeping.resume and self._other is not None:
-            if keeping.keeps(self._other.identity()):
-                return self._other.run(progress, keeping)
+        again = keeping is not None and keeping.resume and self._other
+        if keeping and again and keeping.keeps(again._identity()):
+            return again.run(progress, keeping)
         self._integrated(progress, keeping)
         return self.result(progress)
 
@@ -128,17 +127,25 @@ class Motion:
         """The same motion by the better method, if there is one."""
         if self._better is None:
             return None
-        other, off = self._better(), f"was off by more than {INACCURATE:.0%}"
-        other.reason = f"{self.reason}; anew, since the energy balance of {self.method.name} {off}"
+        other = self._better()
+        own = self._told_from(other)[0]
+        off = f"with {own} the energy balance was off by more than {INACCURATE:.0%}"
+        other.reason = f"{self.reason}; computed anew: {off}"
         return other
+
+    def _told_from(self, other: Motion) -> tuple[str, str]:
+        """How this motion is computed, unlike another one: in words, and as an argument."""
+        if self.method is other.method:
+            return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
+        return self.method.name, f'method = "{self.method.name}"'
 
     def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
-        name = self._other.method.name
+        own, (new, ask) = self._told_from(self._other)[0], self._other._told_from(self)
         warnings.warn(
-            f"the motion is computed anew with {name}: with {self.method.name}, which auto chose, "
-            f"its energy balance is off by {self._output.balance.relative:.1%} of the energies at "
-            f'play; method = "{name}" saves the first attempt',
+            f"the motion is computed anew with {new}: with {own}, which auto chose, its energy "
+            f"balance is off by {self._output.balance.relative:.1%} of the energies at play; {ask} "
+            "saves the first attempt",
             FoldynWarning,
             stacklevel=5,
         )
@@ -277,11 +284,11 @@ class Motion:
     def _identity(self) -> dict[str, Any]:
         *state, continued = self._state
         state.append(continued.values if continued else None)
-        return identity_of(self.case, self.method, self.plan, state, self._sampler.rows)
+        return identity(self.case, self.method, self.plan, state, self._sampler.rows)
 
     def finished(self, keeping: Keeping) -> xarray.Dataset | None:
         """Its result, if it is finished and to be gone on with."""
-        found = keeping.finished(key_of(self.identity()))
+        found = keeping.finished(key_of(self._identity()))
         if found is None and keeping.resume and self._other is not None:
             return self._other.finished(keeping)
         return found
@@ -307,7 +314,7 @@ class Motion:
         """Go on from the last checkpoint, if there is one; seconds that were spent until then."""
         if self._keeping is None:
             return 0.0
-        about = self.identity() | {"threads": engine.threads}
+        about = self._identity() | {"threads": engine.threads}
         kept = self._keeping.begin(about, self._output.rows)
         if kept is None:
             return 0.0
@@ -379,7 +386,7 @@ class Motion:
             self._continuations(),
         )  # fmt: skip
         if self._keeping is not None:
-            result.attrs[KEY] = key_of(self.identity())
+            result.attrs[KEY] = key_of(self._identity())
         return crossings.recorded(self._output.whole(result, self.stored))
 
     def _statistics(self) -> dict[str, Any]:
