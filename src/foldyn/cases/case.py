@@ -165,10 +165,7 @@ class Case(Supported, Loaded, Damped):
         body = self.elastic_body
         if self.contact is None:
             return body
-        held = self.fixed & ~self.imposed
-        for vector, _ in self.base_terms:
-            held &= vector == 0.0
-        still = np.asarray(held.all(axis=1))
+        still = np.all(self.still, axis=1)
         return TouchingBody(body, self.contact.sheets(self.structure, still))
 
     @cached_property

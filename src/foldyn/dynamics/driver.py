@@ -196,7 +196,7 @@ def prepare(
         )
     start = number("start", start, unit="s")
     u, v = check_start(case, initial)
-    check_touching(case, u, float(start))
+    check_touching(case, u, float(start), float(start) + duration)
     remembered = check_state(case, initial.memory if initial else None)
     modal = modal_rows(case, u)
     chosen = Choice(integrator.name, "")
