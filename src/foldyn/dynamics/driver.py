@@ -303,6 +303,7 @@ def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float
     fast = [f"beta = {case.rayleigh.beta:g} s"] if case.rayleigh.beta > 0.0 else []
     fast += ["the dashpots"] if case.dashpots else []
     fast += ["the damping of the creases"] if case.crease_damping.any() else []
+    fast += ["the damping of strain rates"] if case.strain_damping else []
     if not fast:
         return
     supports = [support for support in case.supports if not isinstance(support, Dashpot)]
@@ -310,7 +311,7 @@ def _warn_of_damping(case: Case, method: Integrator, u: NDArray, critical: float
     without = method.critical_step(slow, u)
     if without > DAMPING_COST * critical:
         warnings.warn(
-            f"{' and '.join(fast)} make{'' if len(fast) > 1 or not case.rayleigh.beta else 's'} "
+            f"{' and '.join(fast)} make{'' if len(fast) > 1 or case.dashpots else 's'} "
             f"the critical step {without / critical:.0f} "
             f"times smaller ({critical:.3g} s instead of {without:.3g} s): an explicit method must "
             "resolve the damping of the fastest vibration; an implicit one need not: "

@@ -33,6 +33,7 @@ from foldyn.dynamics.stability import (
 )
 from foldyn.dynamics.system import Packed, place, scratch
 from foldyn.dynamics.timing import check_room, check_samples, expected_samples
+from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
     CrossingWarning,
@@ -53,6 +54,7 @@ EXPLODED = 1.0  # relative energy error above which the motion is stopped
 # Panels that cross are looked for at samples so far apart that it takes a small share of the time
 PER_LOOK = 500  # force evaluations of an explicit method from one to the next, at least
 IMPLICIT_WORK = 25  # how many of them one of an implicit method, with its solution, stands for
+LOOKS = 100  # samples at which panels that turn are looked at
 FEW = 1000  # triangles looked at that take no time to speak of
 
 
@@ -159,6 +161,15 @@ class Motion:
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
         if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
             warnings.warn(text, FoldynWarning, stacklevel=5)
+        if text := self._turns():
+            warnings.warn(text, FoldynWarning, stacklevel=5)
+
+    def _turns(self) -> str:
+        """Say where constant damping resists panels that turn; empty where it does not."""
+        if not resists_turns(self.case, self.packed):
+            return ""
+        seen = self._output.looked_at(self.stored, LOOKS)
+        return turns_told(self.case, self.packed, self._state[0], *seen, self._output.balance.scale)
 
     def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
         self._keeping = keeping
