@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foldyn.cases import Case, Continuation
 from foldyn.dynamics.audit import Rounding, audited
 from foldyn.dynamics.course import Outcome, Samples, StepPlan
-from foldyn.dynamics.doubts import INACCURATE, doubts, is_off
+from foldyn.dynamics.doubts import doubts, is_off
 from foldyn.dynamics.failures import failure, smaller_step
 from foldyn.dynamics.identity import identity, key_of
 from foldyn.dynamics.initial import begin
@@ -23,6 +23,7 @@ from foldyn.dynamics.methods import Compiled, Engine, Implicit, Integrator
 from foldyn.dynamics.output import Output
 from foldyn.dynamics.progress import Progress, Reporter, reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
+from foldyn.dynamics.second_attempt import announced, reason_of
 from foldyn.dynamics.stability import (
     MARGIN,
     damper_rate,
@@ -32,7 +33,7 @@ from foldyn.dynamics.stability import (
     stability_limit,
 )
 from foldyn.dynamics.system import Packed, place, scratch
-from foldyn.dynamics.timing import check_room, check_samples, expected_samples
+from foldyn.dynamics.timing import check_room, check_samples, expected_samples, steps_taken
 from foldyn.dynamics.turned import resists_turns, turns_told
 from foldyn.errors import (
     ComputationError,
@@ -127,30 +128,15 @@ class Motion:
     @cached_property
     def _other(self) -> Motion | None:
         """The same motion by the better method, if there is one."""
-        if self._better is None:
-            return None
-        other = self._better()
-        own = self._told_from(other)[0]
-        off = f"with {own} the energy balance was off by more than {INACCURATE:.0%}"
-        other.reason = f"{self.reason}; computed anew: {off}"
+        other = self._better() if self._better else None
+        if other is not None:
+            other.reason = reason_of(other, self)
         return other
-
-    def _told_from(self, other: Motion) -> tuple[str, str]:
-        """How this motion is computed, unlike another one: in words, and as an argument."""
-        if self.method is other.method:
-            return f"steps of {self.plan.dt:.3g} s", f"dt = {self.plan.dt:.6g}"
-        return self.method.name, f'method = "{self.method.name}"'
 
     def _anew(self, progress: bool | Reporter | None) -> xarray.Dataset:
         assert self._other is not None
-        own, (new, ask) = self._told_from(self._other)[0], self._other._told_from(self)
-        warnings.warn(
-            f"the motion is computed anew with {new}: with {own}, which auto chose, its energy "
-            f"balance is off by {self._output.balance.relative:.1%} of the energies at play; {ask} "
-            "saves the first attempt",
-            FoldynWarning,
-            stacklevel=5,
-        )
+        text = announced(self._other, self, self._output.balance.relative)
+        warnings.warn(text, FoldynWarning, stacklevel=5)
         self._start()  # gives its samples' memory back
         if self._keeping is not None:
             self._keeping.remove()
@@ -159,17 +145,12 @@ class Motion:
     def _judge(self) -> None:
         self.audit()
         size, remedy = float(self.course.tally.farthest), smaller_step(self)
-        if text := doubts(self._output.balance, self._rounding, self.plan, size, remedy):
+        texts = [doubts(self._output.balance, self._rounding, self.plan, size, remedy)]
+        if resists_turns(self.case, self.packed):
+            seen, scale = self._output.looked_at(self.stored, LOOKS), self._output.balance.scale
+            texts.append(turns_told(self.case, self.packed, self._state[0], *seen, scale))
+        for text in filter(None, texts):
             warnings.warn(text, FoldynWarning, stacklevel=5)
-        if text := self._turns():
-            warnings.warn(text, FoldynWarning, stacklevel=5)
-
-    def _turns(self) -> str:
-        """Say where constant damping resists panels that turn; empty where it does not."""
-        if not resists_turns(self.case, self.packed):
-            return ""
-        seen = self._output.looked_at(self.stored, LOOKS)
-        return turns_told(self.case, self.packed, self._state[0], *seen, self._output.balance.scale)
 
     def _integrated(self, progress: bool | Reporter | None, keeping: Keeping | None = None) -> None:
         self._keeping = keeping
@@ -402,14 +383,9 @@ class Motion:
 
     def _statistics(self) -> dict[str, Any]:
         plan, tally, engine = self.plan, self.course.tally, self._engine
-        steps = int(tally.steps)
         facts: dict[str, Any] = {
             "method": self.method.name,
-            "dt": plan.dt,
-            "steps": plan.steps,
-            "start": plan.start,
-            "duration": plan.end - plan.start,
-            "every": plan.every,
+            **steps_taken(plan, tally),
             "critical_step": self.critical,
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
@@ -418,15 +394,5 @@ class Motion:
         }
         if self.reason:
             facts["method_reason"] = self.reason
-        if not plan.steps:
-            facts |= {
-                "dt": float(tally.time - plan.start) / max(steps, 1),
-                "steps": steps,
-                "every": plan.every or plan.interval,
-                "tolerance": plan.tolerance,
-                "refused_steps": int(tally.refused),
-                "smallest_step": float(tally.shortest) if steps else 0.0,
-                "largest_step": float(tally.longest),
-            }
         facts["force_evaluations"] = int(tally.evaluations)
         return facts | (engine.facts() if engine else {})
