@@ -7,6 +7,7 @@ import pytest
 
 import foldyn as fd
 from contact_sheets import strip
+from foldyn.cases.touching import _followers
 from foldyn.dynamics import prepare
 from foldyn.errors import InputError
 
@@ -72,6 +73,18 @@ def test_panels_that_supports_move_through_each_other():
         prepare(lowered(3e-3, fd.Contact()), 0.02, every=0.01)
     prepare(lowered(1e-3, fd.Contact()), 0.02, every=0.01)
     prepare(lowered(3e-3, None), 0.02, every=0.01)
+
+
+def test_panels_without_a_center_have_no_node_of_that_number():
+    """Three triangles; the last node is free, and stays so."""
+    nodes = [[0, 0, 0], [0.04, 0, 0], [0, 0.04, 0], [0, 0, 1e-3], [0.04, 0, 1e-3], [0, 0.04, 1e-3]]
+    free = [[0.06, 0, 0], [0.1, 0, 0], [0.06, 0.04, 0]]
+    pattern = fd.Pattern(nodes + free, [(0, 1, 2), (3, 4, 5), (6, 7, 8)])
+    s = fd.discretize(pattern, fd.Sheet(1e9, 0.3, 2e-4, 700.0))
+    supports = [fd.Fix([0, 1, 2]), fd.Fix([3, 4, 5, 6, 7], "xy"), fd.Fix([6, 7], "z")]
+    drop = fd.Impose([3], "z", -5e-4, LATE)
+    prepare(fd.Case(s, [*supports, drop], contact=fd.Contact()), 0.02, every=0.01)
+    assert len(_followers(fd.Case(s, supports), np.arange(9) < 8)[0]) == 0
 
 
 def test_paths_refuse_the_same():

@@ -150,6 +150,7 @@ def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]
     ends = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
     beside = sparse.csr_array((np.ones(len(ends)), ends.T), (size, size))
     centers = np.asarray(getattr(structure, "centers", ()), np.int64)
+    centers = centers[centers >= 0]  # others have none
     centers = centers[~decided[centers] & (beside[centers] @ ~decided == 0)]
     mean = sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])
     return centers, mean
